@@ -158,3 +158,16 @@ def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, 
     mechanism = trunnion.read(DURANGO)
     for changed in (mechanism, mechanism.with_friction("rolling-bearing"), mechanism.with_friction("off")):
         agree(*both(changed, 40))
+
+
+def test_samples_are_the_same_by_any_number_of_threads() -> None:
+    mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    one, other = (
+        trunnion.tolerance(
+            mechanism, methods=["monte-carlo"], samples=9000, steps=30, engine="compiled", jobs=jobs, chunk=2048
+        )
+        for jobs in (1, 3)
+    )
+    assert {"engine", "mean", "histogram"} <= {*one.attrs, *one.data_vars}
+    for name, variable in one.data_vars.items():
+        np.testing.assert_array_equal(variable.values, other[name].values, err_msg=str(name))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,7 @@ class VectorKernel(CompiledKernel):
             remedy = "pip install 'trunnion[compiled]', or use the engine numpy"
             raise MechanismError(Finding(what, "engine", remedy)) from None
         self._programs: dict[tuple[Any, ...], MachineCode] = {}
+        self._recording = Lock()
         self._graphs: dict[tuple[Any, ...], tuple[Graph, list[int]]] = {}
 
     def check(self, values: Values) -> None:
@@ -92,6 +94,10 @@ class VectorKernel(CompiledKernel):
 
     def program(self, inputs: _Inputs) -> MachineCode:
         """The machine code for numbers of this structure."""
+        with self._recording:
+            return self._program(inputs)
+
+    def _program(self, inputs: _Inputs) -> MachineCode:
         from trunnion.engines.machine_code import MachineCode, vector_width
         from trunnion.engines.program import program
 

@@ -11,12 +11,13 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Generic
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studies.tolerance.checkpoint import Checkpoint
-from trunnion.studies.tolerance.processes import Interruption, Processes
+from trunnion.studies.tolerance.processes import Interruption, Processes, unheard
 from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Portion, Prepared, T, Tally, mixed, part_of
 from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count
 
@@ -57,12 +58,36 @@ class Here(Generic[T]):
         pass
 
 
-def _crew(job: Job[T], jobs: int, cluster: str | None, left: int) -> Crew[T]:
+class Threads(Generic[T]):
+    """`Crew` of several threads of this process, for what leaves Python's interpreter lock most of the time."""
+
+    def __init__(self, job: Job[T], jobs: int) -> None:
+        self.workers = jobs
+        self._prepared = job.prepare()
+        with unheard():  # Ctrl-C is for the main thread
+            self._pool = ThreadPoolExecutor(jobs)
+        self._given: set[Future[Portion[T]]] = set()
+
+    def give(self, blocks: Blocks) -> None:
+        with unheard():
+            self._given.add(self._pool.submit(part_of, self._prepared, blocks))
+
+    def wait(self) -> Sequence[Portion[T]]:
+        done, self._given = wait(self._given, return_when=FIRST_COMPLETED)
+        return [future.result() for future in done]
+
+    def close(self, finished: bool) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+
+def _crew(job: Job[T], jobs: int, cluster: str | None, left: int, threads: bool) -> Crew[T]:
     if cluster is not None:
         from trunnion.studies.tolerance.cluster import Cluster  # its package is an extra
 
         return Cluster(job, cluster, min(jobs, left))
-    return Here(job) if min(jobs, left) <= 1 else Processes(job, min(jobs, left))
+    if min(jobs, left) <= 1:
+        return Here(job)
+    return Threads(job, min(jobs, left)) if threads else Processes(job, min(jobs, left))
 
 
 def _checked(jobs: int | None, chunk: int | None, resume: bool, checkpoint: object) -> int:
@@ -90,6 +115,7 @@ def run(
     checkpoint: str | os.PathLike[str] | None = None,
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
+    threads: bool = False,
 ) -> JobRun[T]:
     """Do the job, or what a checkpoint leaves of it.
 
@@ -97,7 +123,8 @@ def run(
     chunk: samples handed out at a time, rounded up to whole blocks; by default what takes about a second (on a
     cluster ten). cluster: "local" (a Dask cluster of `jobs` processes here) or the address of a Dask scheduler.
     checkpoint: file that the tally is written to every 30 s or more, at Ctrl-C, at an error and at the end.
-    resume: go on from that file if it is there. progress: called with the samples done, in this thread.
+    resume: go on from that file if it is there. progress: called with the samples done, in this thread. threads: of
+    this process in place of processes.
 
     Raises MechanismError, with one finding each, if the checkpoint is damaged or of another job, if the same blocks
     end three workers in turn, if the cluster cannot be reached. Whatever is raised, what is done is kept first.
@@ -112,7 +139,7 @@ def run(
         stated = None if chunk is None else math.ceil(chunk / job.block_size)
         pace = Pace(stated, NEAR if cluster is None else FAR)
         with Interruption() as interruption:
-            crew = _crew(job, jobs, cluster, plan.left)
+            crew = _crew(job, jobs, cluster, plan.left, threads)
             spread = _Spread(job, crew, plan, pace, kept, progress, arithmetic, tally)
             try:
                 spread.go(interruption)

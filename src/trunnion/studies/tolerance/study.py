@@ -84,10 +84,11 @@ def tolerance(
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         alone = job.samples * job.positions < FEW and cluster is None
-        jobs = 1 if jobs is None and (alone or engine != "numpy") else jobs
+        jobs = 1 if jobs is None and (alone or engine == "jax") else jobs
         ran = runner.run(
-            job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress
-        )
+            job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
+            threads=engine == "compiled",
+        )  # fmt: skip
         tally, stopped = ran.tally, ran.stopped
         notes += [*chosen, *ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
     if "sobol" in methods:

@@ -22,7 +22,7 @@ CHUNK = 8192  # positions at a time
 LINKS = ("crank", "coupler", "rocker")
 FORCE_OUTPUTS = OUTPUTS[:-1]  # without the number of iterations
 
-__all__ = ["dataset_side", "trunnion_side"]
+__all__ = ["compiled_side", "dataset_side", "trunnion_side"]
 
 
 def trunnion_side(job: Job) -> Side | None:
@@ -46,6 +46,39 @@ def trunnion_side(job: Job) -> Side | None:
     return Side("Trunnion", job, run, np.transpose, columns, note=version("trunnion"))
 
 
+def compiled_side(job: Job) -> Side | None:
+    """The same numbers by the compiled engine on one thread; None where it is not installed."""
+    if not version("trunnion") or not version("llvmlite"):
+        return None
+    from trunnion.solve.compiled import Lanes
+    from trunnion.solve.compiled_vectors import VectorKernel
+
+    mechanism = Mechanism.read(MODEL)
+    prepared = prepare(mechanism.with_friction("off") if job == "frictionless" else mechanism)
+    columns = MOTION_COLUMNS if job == "motion" else FORCE_OUTPUTS
+
+    def figure(k: int) -> Callable[[Any], Any]:
+        if job == "motion":
+            return lambda back: list(_rows_of_motion(back.walk))[k]
+        return lambda back: list(_rows_of_forces(back))[k]
+
+    kernel = VectorKernel(
+        prepared, {name: figure(k) for k, name in enumerate(columns)}, job != "motion", threads=1, described=job
+    )
+
+    def run(n: int) -> Array:
+        out = np.empty((len(columns), 1, n))
+        lanes = Lanes(dict(zip(columns, out, strict=True)), np.empty((1, n), np.int8), np.empty((1, n), bool))
+        times = prepared.cycle.times(n)
+        kernel.fill(prepared.values, times, lanes)
+        kernel.decide(prepared.values, times, lanes)
+        return out[:, 0]
+
+    return Side(
+        "Trunnion compiled", job, run, np.transpose, columns, note=f"llvmlite {version('llvmlite')}, one thread"
+    )
+
+
 def dataset_side(job: Job) -> Side | None:
     """The public `analyse`: also points, balance, diagnosis and efficiency, as a labelled Dataset."""
     if not version("trunnion"):
@@ -65,7 +98,10 @@ def dataset_side(job: Job) -> Side | None:
 
 def _motion_rows(prepared: Any, times: Array) -> Iterator[Any]:
     """The numbers of MOTION_COLUMNS for one chunk."""
-    walk = forward(prepared.system, prepared.values, prepared.chosen.assembly, times)
+    yield from _rows_of_motion(forward(prepared.system, prepared.values, prepared.chosen.assembly, times))
+
+
+def _rows_of_motion(walk: Any) -> Iterator[Any]:
     yield from _link_rows(walk)
     b, c = walk.point("crank", "B"), walk.point("rocker", "C")
     for at_b, at_c in zip(b, c, strict=True):  # position, velocity, acceleration
@@ -74,7 +110,10 @@ def _motion_rows(prepared: Any, times: Array) -> Iterator[Any]:
 
 def _force_rows(prepared: Any, times: Array) -> Iterator[Any]:
     """The numbers of FORCE_OUTPUTS for one chunk."""
-    back = prepared.solve(times)
+    yield from _rows_of_forces(prepared.solve(times))
+
+
+def _rows_of_forces(back: Any) -> Iterator[Any]:
     yield from _link_rows(back.walk)
     for joint in "ABCD":
         yield from back.reactions[joint][:2]

@@ -42,11 +42,13 @@ class Measured:
 CONTENDERS: dict[Job, dict[str, str]] = {
     "motion": {
         "Trunnion": "ours.trunnion_side",
+        "Trunnion compiled": "ours.compiled_side",
         "Numba loop": "reference_kernels.numba_side",
         "pylinkage": "peers.pylinkage_side",
     },
     "friction": {
         "Trunnion": "ours.trunnion_side",
+        "Trunnion compiled": "ours.compiled_side",
         "Trunnion analyse()": "ours.dataset_side",
         "Numba loop": "reference_kernels.numba_side",
         "stacked 9×9": "reference_kernels.stacked_side",
@@ -54,6 +56,7 @@ CONTENDERS: dict[Job, dict[str, str]] = {
     },
     "frictionless": {
         "Trunnion": "ours.trunnion_side",
+        "Trunnion compiled": "ours.compiled_side",
         "Numba loop": "reference_kernels.numba_side",
         "Pinocchio": "peers.pinocchio_side",
         "fourbarhinge": "peers.fourbarhinge_side",

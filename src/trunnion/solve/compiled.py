@@ -104,7 +104,7 @@ class CompiledKernel(ABC):
         curves = {name: np.empty(shape) for name in self.figures}
         found = Lanes(curves, np.empty(shape, np.int8), np.empty(shape, bool))
         self.fill(values, time, found)
-        self._again(values, time, found)
+        self.decide(values, time, found)
         return found.curves, found.status
 
     def walked(self, values: Values, time: Number) -> Lanes:
@@ -133,7 +133,7 @@ class CompiledKernel(ABC):
         with np.errstate(all="ignore"):
             return self._back(values, time)
 
-    def _again(self, values: Values, time: Array, found: Lanes) -> None:
+    def decide(self, values: Values, time: Array, found: Lanes) -> None:
         """Compute the doubtful lanes with NumPy, a chunk at a time."""
         rows, columns = np.nonzero(found.doubtful)
         self.again += len(rows)

@@ -293,7 +293,7 @@ _ENGINES = (
     ),
     Fault(
         "doubtful-lane-of-another-sample",
-        "studies/tolerance/compiled.py",
+        "solve/compiled.py",
         "return flat[rows] if len(flat) > 1",
         "return flat[0 * rows] if len(flat) > 1",
         ("tests/reference/test_compiled.py",),
@@ -304,6 +304,34 @@ _ENGINES = (
         "and not told.st_mode & (stat.S_IWGRP | stat.S_IWOTH)",
         "and bool(told.st_mode)",
         ("tests/reference/test_engines.py",),
+    ),
+    Fault(
+        "loop-ends-with-its-first-lane-at-rest",
+        "engines/lanes.py",
+        'return self.b.icmp_signed("!=", self.b.bitcast(found, whole), ir.Constant(whole, 0))',
+        "return self.b.extract_element(found, ir.Constant(INT, 0))",
+        ("tests/reference/test_engines.py", "tests/reference/test_compiled_cycle.py"),
+    ),
+    Fault(
+        "compiled-margin-of-astray-steps",
+        "solve/continuation.py",
+        "return x, judged(x, residual, error) & (calm > 0) & near &",
+        "return x, judged(x, residual, error) & (calm > 0) &",
+        ("tests/reference/test_compiled_cycle.py",),
+    ),
+    Fault(
+        "compiled-cycle-keeps-zero-slip",
+        "cycle/compiled.py",
+        "gravest=Status.SOLVED,",
+        "gravest=Status.LOCKED,",
+        ("tests/reference/test_compiled_cycle.py",),
+    ),
+    Fault(
+        "kept-code-of-other-figures",
+        "solve/compiled.py",
+        'self.described = described and f"{described} {list(self.figures)}"',
+        "self.described = described",
+        ("tests/reference/test_compiled_cycle.py",),
     ),
     Fault(
         "component-against-the-edges",

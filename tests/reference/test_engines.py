@@ -332,3 +332,14 @@ def test_a_folder_that_cannot_be_written(cache: Path) -> None:
     (cache / "trunnion").write_text("a file where the folder should be")
     assert run_once().compiled
     assert run_once().compiled
+
+
+def test_a_loop_goes_on_while_any_lane_changes() -> None:
+    """Lanes of one vector that come to rest after different numbers of rounds, the first of them at once."""
+    graph = Graph()
+    x = Recorded(graph, graph.input("x", POSITION))
+    (count,) = looped(lambda now: [np.minimum(now[0] + 1.0, x)], [0.0 * x], 50)
+    code = machine_code.MachineCode(program(graph, [number_of(graph, count)], 4))
+    found, rounds = np.empty((1, 8)), np.array([0.0, 3.0, 49.0, 7.0, 2.0, 60.0, 1.0, 0.0])
+    code.run({"x": rounds}, [found], (0, 1), (0, 8))
+    assert found[0].tolist() == np.minimum(rounds, 50.0).tolist()

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
+from scipy.stats import multivariate_normal
 
 import trunnion
 from trunnion import Mechanism, MechanismError
@@ -45,6 +47,12 @@ def findings(result: Any, severity: str) -> list[str]:
     return [
         f"{row['where']}: {row['what']}" for row in json.loads(result.attrs["findings"]) if row["severity"] == severity
     ]
+
+
+def one_finding(result: Any, code: str) -> Any:
+    """The figures of the one finding with a code."""
+    (found,) = [row["figures"] for row in json.loads(result.attrs["findings"]) if row["code"] == code]
+    return found
 
 
 def dimensions(result: Any, key: str = "tolerance") -> Any:
@@ -157,6 +165,62 @@ def test_yield() -> None:
     drawn = np.random.default_rng(4).standard_normal((20_000, 4)) * t / 3
     kept = np.mean(np.max(np.abs(drawn @ slopes(36).T), axis=1) <= LIMIT)
     assert kept == pytest.approx(0.95, abs=0.012)
+
+
+def test_failures_are_split_by_cost() -> None:
+    """Two limits near their least cost, and cheaper than one margin for both.
+
+    Both by scipy in the half widths, with the probability of both rows by its normal distribution.
+    """
+    places, halves, target = (300, 140), np.radians([0.1, 0.08]), 0.95
+    measures = {
+        f"at{place}": {"angle": "rocker", "at": f"{place} deg", "limit": f"±{np.degrees(half)} deg"}
+        for place, half in zip(places, halves, strict=True)
+    }
+    b = np.array([1, 0.6, 1, 0.8])
+    costs = {f"l{i + 1}": {"model": "power", "B": float(price), "k": 0.45, "unit": "mm", "most": "1 mm"}
+             for i, price in enumerate(b)}  # fmt: skip
+    result = trunnion.allocate(fourbar(measures=measures, costs=costs), criterion="yield", target=target, samples=0)
+    s = slopes(360)[list(places)]
+
+    def cost(t: Any) -> float:
+        return float(np.sum(b / t**0.45))
+
+    def kept(t: Any) -> float:
+        sigma = s * 1e-3 * t / 3 / halves[:, None]
+        both = multivariate_normal(np.zeros(2), sigma @ sigma.T)
+        return float(both.cdf(np.ones(2), lower_limit=-np.ones(2)))
+
+    def margins(t: Any) -> Any:
+        return halves / np.linalg.norm(s * 1e-3 * t / 3, axis=1)
+
+    def least(*constraints: Any) -> Any:
+        start = dimensions(result) * 0.9
+        return minimize(cost, start, constraints=constraints, bounds=[(1e-4, 1.0)] * 4, method="SLSQP", tol=1e-12)
+
+    found = dimensions(result)
+    assert kept(found) == pytest.approx(target, abs=3e-4)
+    within = {"type": "ineq", "fun": lambda t: kept(t) - kept(found)}
+    best = least(within)
+    equal = least(within, {"type": "ineq", "fun": lambda t: margins(t)[0] - margins(t)[1]},
+                  {"type": "ineq", "fun": lambda t: margins(t)[1] - margins(t)[0]})  # fmt: skip
+    assert best.success
+    assert cost(found) == pytest.approx(best.fun, rel=1e-3)  # the margins alone do not turn the rows
+    assert equal.fun > 1.015 * cost(found)
+    assert result["yield_margin"].values == pytest.approx(margins(found), rel=1e-6)
+    figures = one_finding(result, "allocation.split_margin")
+    assert figures["saved"] == pytest.approx(1 - best.fun / equal.fun, abs=1e-3)
+    assert cost(found) / (1 + figures["excess"]) <= best.fun
+
+
+def test_processes_have_one_margin_for_all_limits() -> None:
+    """Of processes the failures are not split by cost, and a finding says so."""
+    measures = {f"at{place}": {"angle": "rocker", "at": f"{place} deg", "limit": "±0.2 deg"} for place in (40, 140)}
+    model = Mechanism(**{**trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data(), "measures": measures})
+    result = trunnion.allocate(model, criterion="yield", target=0.95, steps=36, samples=0)
+    assert one_finding(result, "allocation.same_margin")["count"] == 2
+    margins = result["yield_margin"].values
+    assert margins[0] == margins[1]
 
 
 def test_written_and_read_again(tmp_path: Path) -> None:

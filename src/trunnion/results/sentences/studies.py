@@ -26,6 +26,10 @@ def _curve(points: int, lost: int, least: float | None) -> str:
     return f"limits of at least {least:.3g} times the stated ones are feasible" if least is not None else ""
 
 
+def _below(excess: float | None) -> str:
+    return "" if excess is None else f"; no tolerances can cost less than {1 / (1 + excess):.2%} of this"
+
+
 PLAY = {
     "play.measures_left_out": Sentence(
         NOTE,
@@ -223,14 +227,21 @@ TOLERANCE = {
 
 ALLOCATION = {
     "allocation.proven": Sentence(NOTE, "minimum cost to first order (relative optimality gap {gap:.0e})", quiet=True),
-    "allocation.proven_margin": Sentence(
-        NOTE, "minimum cost to first order, for the same relative margin at every limit"
-    ),
+    "allocation.proven_margin": Sentence(NOTE, "minimum cost to first order, for these margins of the limits"),
     "allocation.same_margin": Sentence(
         WARNING,
-        "the cost is an upper bound: all {count} limits get the same relative margin, and margins that differ may cost "
-        "less, above all where one limit is hard to meet",
+        lambda count, excess: (
+            f"all {count} limits get the same margin in standard deviations: processes are not "
+            f"chosen for margins that differ, which may cost less{_below(excess)}"
+        ),
         "compare with the cost without one of the limits",
+    ),
+    "allocation.split_margin": Sentence(
+        NOTE,
+        lambda count, saved, excess: (
+            f"the permitted failures are split over {count} limits by cost"
+            f"{f', which saves {saved:.2%} against the same margin for all' if saved > 0 else ''}{_below(excess)}"
+        ),
     ),
     "allocation.proven_roughly": Sentence(
         WARNING, "the optimality gap is {gap:.1e} of the cost of the tolerances", MAGNITUDES

@@ -51,9 +51,7 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         return
     if answer.proven and found.asked.criterion == "yield":
         yield finding_for("allocation.proven_margin")
-        limited = len(np.unique(found.rows.measure))
-        if limited > 1:
-            yield finding_for("allocation.same_margin", "measures", count=limited)
+        yield from _margins(found)
     elif answer.proven:
         yield finding_for("allocation.proven", gap=max(answer.gap, 0.0))
     yield from _plays(found)
@@ -71,6 +69,19 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     if len(kept) < len(found.offers):
         points, least = len(found.offers), min(kept, default=None)
         yield finding_for("allocation.curve_short", points=points, lost=points - len(kept), least=least)
+
+
+def _margins(found: Allocated) -> Iterator[Finding]:
+    """How the permitted failures are split over several limits."""
+    answer, count = found.answer, len(np.unique(found.rows.measure))
+    if count < 2:
+        return
+    above: dict[str, Any] = {"count": count, "excess": answer.excess if np.isfinite(answer.excess) else None}
+    if found.way == "discrete":
+        yield finding_for("allocation.same_margin", "measures", **above)
+    else:
+        saved = answer.saved if np.isfinite(answer.saved) else 0.0
+        yield finding_for("allocation.split_margin", "measures", saved=saved, **above)
 
 
 def _plays(found: Allocated) -> Iterator[Finding]:

@@ -139,12 +139,20 @@ class RowEffects:
 
 @dataclass(frozen=True)
 class AllocationProblem:
-    """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for."""
+    """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for.
+
+    ratios: what z is multiplied by for each row, (row,); all 1 if None.
+    """
 
     contributions: tuple[Contribution, ...]
     effects: RowEffects
     criterion: Criterion = "worst-case"
     z: float = 3.0
+    ratios: Array | None = None
+
+    def margins(self) -> Array:
+        """Standard deviations of room that `yield` asks of each row, (row,)."""
+        return self.z * (np.ones(len(self.effects.worst)) if self.ratios is None else self.ratios)
 
     def check(self) -> None:
         """Raise `MechanismError` with all that makes it no problem."""
@@ -177,7 +185,7 @@ class AllocationProblem:
         if self.criterion == "rss":
             return effects.middle(), _norm(effects.spread() * tolerances, effects.correlation)
         drift = effects.middle() + effects.drift() @ tolerances
-        return drift, self.z * _norm(effects.sigma() * tolerances, effects.correlation)
+        return drift, self.margins() * _norm(effects.sigma() * tolerances, effects.correlation)
 
     def used(self, tolerances: Array) -> Array:
         """Share of its room that each row takes, (row,): above 1 breaks a limit."""
@@ -216,7 +224,9 @@ class Answer:
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
     active: rows that limit; used: share of its room each row takes. rounds: of the solver.
     Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; trials: all that were sampled. There the
-    optimum is that of the same z in every row; other margins in some rows might cost a little less.
+    optimum is that of the margins of the problem, one for each measure. saved: share of the cost that their split
+    saves against one margin for all measures, NaN where nothing was split. floor: no half widths whose yield of normal
+    deviations meets the target cost less, linearly; excess: share of it by which the cost before sampling is above it.
     """
 
     problem: AllocationProblem
@@ -234,6 +244,9 @@ class Answer:
     expected: float = np.nan
     sampled: SampledYield | None = None
     trials: tuple[Trial, ...] = ()
+    saved: float = np.nan
+    floor: float = np.nan
+    excess: float = np.nan
 
     @property
     def found(self) -> bool:

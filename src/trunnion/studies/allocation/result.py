@@ -39,13 +39,14 @@ VARIABLES: dict[str, Variable] = {
     "option_cost": Variable(("parameter", "option"), "1", "cost of an option"),
     "used": Variable(M, "1", "largest share of its limits that the measure uses, by the criterion"),
     "used_curve": Variable(("measure", "position"), "1", "share of its limits that the measure uses, by the criterion"),
+    "yield_margin": Variable(M, "1", "margin of the limits that a required yield asks for, in standard deviations"),
     "saving": Variable(M, "1/", "cost saved by limits one unit wider at every position"),
     "cost_total": Variable((), "1", "cost of all tolerances found"),
     "cost_total_before": Variable((), "1", "cost of all tolerances as stated"),
     "cost_bound": Variable((), "1", "lower bound of the cost of feasible tolerances, to first order"),
     "gap": Variable((), "1", "optimality gap, relative to the part of the cost that depends on the tolerances"),
     "yield_expected": Variable((), "1", "yield of normal deviations, to first order"),
-    "trial_margin": Variable(T, "1", "margin in a trial, in standard deviations"),
+    "trial_margin": Variable(T, "1", "margin in a trial, in standard deviations; the mean over the measures"),
     "trial_cost": Variable(T, "1", "cost of a trial"),
     "trial_yield": Variable(T, "1", "share of the samples within all limits in a trial"),
     "trial_yield_low": Variable(T, "1", "yield of a trial, lower end of the 95 % interval"),
@@ -141,16 +142,20 @@ def _rows(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
     """How much of its room each measure takes, and what more of it would save."""
     count, positions = known.sizes["measure"], known.sizes["position"]
     used, curve, saving = np.full(count, np.nan), np.full((count, positions), np.nan), np.full(count, np.nan)
+    margin = np.full(count, np.nan)
     if found.answer.found:
         shares = found.answer.used[: len(found.rows.measure)]
         prices = found.answer.price[: len(found.rows.measure)]
+        margins = found.answer.problem.margins()
         for k in range(count):
             own = found.rows.measure == k
             if np.any(own):
                 used[k], saving[k] = float(np.max(shares[own])), float(np.sum(prices[own]))
+                margin[k] = margins[np.flatnonzero(own)[0]]
                 placed = own & (found.rows.position >= 0)
                 curve[k, found.rows.position[placed]] = shares[placed]
-    return {"used": used, "used_curve": curve, "saving": saving}
+    arrays = {"used": used, "used_curve": curve, "saving": saving}
+    return {**arrays, "yield_margin": margin} if found.asked.criterion == "yield" else arrays
 
 
 def _whole(found: Allocated) -> Mapping[str, Any]:

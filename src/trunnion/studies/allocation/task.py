@@ -82,7 +82,7 @@ def sides(problem: AllocationProblem) -> Sides:
     elif problem.criterion == "rss":
         spread = effects.spread()
     else:
-        spread, drift = problem.z * effects.sigma(), effects.drift()
+        spread, drift = problem.margins()[:, None] * effects.sigma(), effects.drift()
     one_sided = np.asarray(~np.any(drift, axis=1))
     keep = np.asarray(np.isfinite(room))
     keep &= ~(one_sided & (room > room[::-1]))

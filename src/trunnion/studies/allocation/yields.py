@@ -21,6 +21,7 @@ from scipy.special import chdtr, ndtr, ndtri
 from trunnion.results.sentences import finding_for
 from trunnion.statistics.streams import SobolStream, factor
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial
+from trunnion.studies.allocation.splits import split
 
 __all__ = ["Verify", "meet", "normal_yield"]
 
@@ -32,6 +33,8 @@ FAR = 6.0  # standard deviations: a row with more room than that never fails
 TRIALS = 12
 STEP = 1.0  # of z, at most, after one sampling
 CLOSE = 1e-3  # of z: two choices of processes that lie closer are neighbours
+NEAR = 1e-6  # of z: how close splits of the margins are settled
+AROUND = 0.1  # of z: how far a split of the margins moves their mean
 SURE = 1e-9  # of the target, in standard scores
 
 
@@ -40,13 +43,8 @@ def normal_yield(problem: AllocationProblem, tolerances: Array) -> float:
 
     The row that fails most is reckoned exactly, and the directions only say what the others add to it.
     """
-    effects = problem.effects
-    sigma = effects.sigma() * tolerances
-    if effects.correlation is not None:
-        sigma = sigma @ factor(effects.correlation)
-    middle = effects.middle() + effects.drift() @ tolerances
+    sigma, room = _spread_and_room(problem, tolerances)
     each = np.sqrt(np.sum(sigma**2, axis=1))
-    room = np.stack([effects.upper - middle, middle - effects.lower])
     still = each == 0
     if np.any(room[:, still] < 0):
         return 0.0
@@ -59,6 +57,23 @@ def normal_yield(problem: AllocationProblem, tolerances: Array) -> float:
     within = _within(sigma[np.ix_(rows, parts)], room[:, rows])
     alone = _within(sigma[np.ix_(rows[worst : worst + 1], parts)], room[:, rows[worst : worst + 1]])
     return float(np.clip(1 - fails[worst] + within - alone, 0.0, 1.0))
+
+
+def _spread_and_room(problem: AllocationProblem, tolerances: Array) -> tuple[Array, Array]:
+    """Deviation of each row by independent numbers (row, part), and its room to both sides (side, row)."""
+    effects = problem.effects
+    sigma = effects.sigma() * tolerances
+    if effects.correlation is not None:
+        sigma = sigma @ factor(effects.correlation)
+    middle = effects.middle() + effects.drift() @ tolerances
+    return sigma, np.stack([effects.upper - middle, middle - effects.lower])
+
+
+def _plain_yield(problem: AllocationProblem, tolerances: Array) -> float:
+    """The yield by the directions alone: less exact, but it changes steadily with the rooms."""
+    sigma, room = _spread_and_room(problem, tolerances)
+    parts = np.flatnonzero(np.any(sigma != 0, axis=0))
+    return _within(sigma[:, parts], room) if len(parts) else 1.0
 
 
 def _within(sigma: Array, room: Array) -> float:
@@ -99,14 +114,24 @@ def meet(
 
     solve: of a problem with z given; verify: half widths (contribution,) → yield, and its interval, low and high.
     """
-    answer = _expected(problem, target, solve)
-    if not answer.found or verify is None:
-        return answer
-    return _sampled(answer, target, solve, verify)
+    first = _expected(problem, target, solve)
+    if not first.found:
+        return first
+    best = first
+    if not first.findings:
+        best = split(first, lambda one: _expected(one, target, solve, AROUND), _plain_yield)
+    answer = best if verify is None else _sampled(best, target, solve, verify)
+    saved = 1 - best.cost / first.cost if best is not first else np.nan
+    return replace(answer, saved=saved, excess=best.cost / first.floor - 1 if first.floor > 0 else np.nan)
 
 
-def _expected(problem: AllocationProblem, target: float, solve: Callable[[AllocationProblem], Answer]) -> Answer:
-    """The cheapest allocation that meets the target for normal deviations."""
+def _expected(
+    problem: AllocationProblem, target: float, solve: Callable[[AllocationProblem], Answer], around: float = np.inf
+) -> Answer:
+    """The cheapest allocation that meets the target for normal deviations, the margins being in the stated ratios.
+
+    around: how far from the z of the problem it is looked for, before it is looked for everywhere.
+    """
     tried: list[Answer] = []
 
     def over(z: float) -> float:
@@ -117,15 +142,20 @@ def _expected(problem: AllocationProblem, target: float, solve: Callable[[Alloca
         tried.append(answer)
         return _score(answer.expected) - _score(target)
 
-    rows = len(problem.effects.worst)
-    low, high = max(float(ndtri(target)) - 1e-3, 1e-3), float(ndtri(1 - (1 - target) / (2 * rows))) + 1e-3
-    if over(low) < 0 and over(high) > 0:
-        brentq(over, low, high, xtol=1e-9, rtol=1e-12)
+    rows, ratios = len(problem.effects.worst), np.ones(1) if problem.ratios is None else problem.ratios
+    least, most = float(ndtri(target)) - 1e-3, float(ndtri(1 - (1 - target) / (2 * rows))) + 1e-3
+    ends = (max(least, 1e-3) / float(np.max(ratios)), most / float(np.min(ratios)))
+    near = (max(ends[0], problem.z - around), min(ends[1], problem.z + around))
+    for low, high in dict.fromkeys((near, ends)):
+        if over(low) < 0 and over(high) > 0:
+            brentq(over, low, high, xtol=1e-9 if around == np.inf else NEAR, rtol=1e-12)
+            break
     if not tried:
-        return solve(replace(problem, z=low))
+        return solve(replace(problem, z=ends[0]))
+    floor = tried[0].bound if problem.ratios is None and least > 0 else np.nan
     enough = [one for one in tried if _score(one.expected) >= _score(target) - SURE * 10]
     if enough:
-        return min(enough, key=lambda one: one.cost)
+        return replace(min(enough, key=lambda one: one.cost), floor=floor)
     best = max(tried, key=lambda one: one.expected)
     doubt = finding_for("yield.narrowest", "yield", share=best.expected, target=target)
     return replace(best, findings=(*best.findings, doubt))

@@ -105,7 +105,9 @@ def _without_empty(table: TextTable) -> TextTable:
 def room(result: xr.Dataset) -> TextTable:
     """Of each measure how much of its room is taken by the criterion, and found by search and samples."""
     rows = []
+    split = "yield_margin" in result and int(np.sum(np.isfinite(result["yield_margin"].values))) > 1
     for read in readings(result):
+        margin = f"{read.value('yield_margin'):.4g} σ" if split and read.limited else "—"
         lower, upper = (read.limits[0], read.room[1]) if read.is_size else read.room
         sides = ((read.value("searched_lower"), lower), (read.value("searched_upper"), upper))
         known = [(part, end) for part, end in sides if math.isfinite(part) and math.isfinite(end) and end != 0]
@@ -113,10 +115,11 @@ def room(result: xr.Dataset) -> TextTable:
         ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
         wider = 0.01 * read.value("saving") * min(ends) if ends else math.nan
         rows.append(
-            [read.name, read.told_limits, _share(read.value("used")), _share(max(found, default=math.nan)),
-             _share(read.value("yield")), "—" if math.isnan(wider) else f"{wider:.4g}"]
+            [read.name, read.told_limits, _share(read.value("used")), margin,
+             _share(max(found, default=math.nan)), _share(read.value("yield")),
+             "—" if math.isnan(wider) else f"{wider:.4g}"]
         )  # fmt: skip
-    head = ["measure", "limits", "used", "worst case found", "yield", "1\u00a0% wider saves"]
+    head = ["measure", "limits", "used", "margin", "worst case found", "yield", "1\u00a0% wider saves"]
     return _without_empty(TextTable("share of the limits that is used", head, rows))
 
 
@@ -131,7 +134,9 @@ def trials(result: xr.Dataset) -> TextTable:
         [f"{z:.5g} σ", _known(cost), *(_share(one) for one in shares)]
         for z, cost, *shares in zip(*(np.asarray(result[key].values, float).tolist() for key in keys), strict=True)
     ]
-    return TextTable("trials", ["margin of every limit", "cost", "yield", "at least", "at most"], rows)
+    several = int(np.sum(np.isfinite(result["yield_margin"].values))) > 1
+    margin = "mean margin of the limits" if several else "margin of every limit"
+    return TextTable("trials", [margin, "cost", "yield", "at least", "at most"], rows)
 
 
 def offers_table(result: xr.Dataset) -> TextTable:

@@ -91,6 +91,12 @@ COMPARE = {
         ),
         "{remedy}",
     ),
+    "compare.local": Sentence(
+        ERROR,
+        "does not agree within U over a part of the cycle {cases}{most}: from {place} the mean residual is {mean_told} "
+        "with a U of {wide_told}; it is {percent:.0f} % of the positions, of all {within_percent:.0f} % agree",
+        "check the model there (loads, friction, reversals, stops) and the readings of the channel",
+    ),
     "compare.bias": Sentence(
         NOTE,
         "agrees within U at {within_percent:.0f} % of the positions, but its bias is significant {cases}{most}: the "

@@ -10,12 +10,21 @@ positions are independent of each other, which the turns tell (`independent`).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import erf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Coded
+from trunnion.rig.comparison.stretches import Stretch, worst_stretch
+from trunnion.rig.comparison.uncertainty import (
+    Uncertainty,
+    at_positions,
+    expanded,
+    mean_expanded,
+    nearly_whole,
+    probability,
+    uncertainty_of,
+)
 from trunnion.rig.reading.measurement import Signal
 
 __all__ = [
@@ -39,42 +48,13 @@ class Verdict(Coded):
     NOTHING = 4, "no data"
 
 
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Standard uncertainty of a course, (position,), in its parts.
-
-    random: of the mean over the turns; local: what else each position has of its own, such as the resolution; shared:
-    (part, position), of the zero and of the gain, each the same at all positions; turns: deviations of the turns from
-    their mean, (turn, position).
-    """
-
-    random: Array
-    local: Array
-    shared: Array
-    count: NDArray[np.intp]
-    turns: Array
-
-    @property
-    def total(self) -> Array:
-        """All together, NaN with fewer than two turns."""
-        return np.asarray(np.sqrt(self.random**2 + self.local**2 + np.sum(self.shared**2, axis=0)))
-
-    @property
-    def freedom(self) -> Array:
-        """Effective degrees of freedom by Welch and Satterthwaite: ν u⁴/u_A⁴, infinite without scatter. GUM, G.4.1."""
-        with np.errstate(all="ignore"):
-            share = self.random**2 / np.where(self.total > 0, self.total, np.nan) ** 2
-            found = (self.count - 1) / np.where(share > 0, share, np.nan) ** 2
-        return np.where(np.isfinite(found), found, np.inf)
-
-
 @dataclass(frozen=True)
 class SignalAssessment:
     """Figures of a residual, measured less model, over the positions that can be compared; NaN where not known.
 
     largest: the residual of the largest size; place: its position, −1 if there is none; least: the share within ±U
     from which the course is taken to be within; bias_expanded: U of the bias; within_unbiased: the share within ±U once
-    the bias is taken off.
+    the bias is taken off; stretch: where the course misses although the share of its positions does not show it.
     """
 
     compared: int = 0
@@ -89,32 +69,16 @@ class SignalAssessment:
     correlation: float = np.nan
     verdict: Verdict = Verdict.NOTHING
     within_unbiased: float = np.nan
+    stretch: Stretch | None = None
 
 
-def probability(coverage: float) -> float:
-    """Share of a normal distribution within ± so many standard deviations: 0.9545 for 2."""
-    return erf(coverage / sqrt(2.0))
+def judge(
+    course: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0, closed: bool = False
+) -> SignalAssessment:
+    """Measured against the model at the positions that can be compared.
 
-
-def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
-    """U = k_p u, with k_p of Student's distribution; GUM, G.3.2."""
-    from scipy.special import stdtrit
-
-    factor = stdtrit(np.where(np.isinf(freedom), 1e12, freedom), 0.5 + probability(coverage) / 2)
-    return np.asarray(np.where(np.isinf(freedom), coverage, factor) * standard)
-
-
-def uncertainty_of(course: Signal) -> Uncertainty:
-    """The parts of a course's uncertainty."""
-    zero = np.full_like(course.mean, course.accuracy.zero)
-    shared = np.array([zero, course.accuracy.gain * course.mean])
-    random = course.scatter / np.sqrt(np.maximum(course.count, 1))
-    local = np.sqrt(np.maximum(course.uncertainty**2 - random**2 - np.sum(shared**2, axis=0), 0.0))
-    return Uncertainty(random, local, shared, course.count, course.turns - course.mean)
-
-
-def judge(course: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0) -> SignalAssessment:
-    """Measured against the model at the positions that can be compared."""
+    closed: whether the end of the cycle is next to its start.
+    """
     where = comparable & np.isfinite(course.mean) & np.isfinite(model)
     if not np.any(where):
         return SignalAssessment()
@@ -122,7 +86,7 @@ def judge(course: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
     residual = difference(measured, theirs)
     size = float(np.max(np.abs(np.append(measured, theirs))))
     bias = float(np.mean(residual))
-    of = _at(uncertainty_of(course), where)
+    of = at_positions(uncertainty_of(course), where)
     worst = int(np.argmax(np.abs(residual)))
     share, least = _share(residual, of, coverage, ROUNDING * size)
     # a constant is taken out: what is left is against the scatter and what the gain makes of the shape
@@ -136,11 +100,33 @@ def judge(course: Signal, model: Array, comparable: NDArray[np.bool_], coverage:
         verdict = Verdict.WITHIN
     elif share_0 >= least_0:
         verdict = Verdict.OFFSET
+    stretch = None
+    if verdict is not Verdict.UNKNOWN:
+        constant = bias if verdict is Verdict.OFFSET else 0.0
+        stretch = _stretch(course, model, where, constant, coverage, closed)
+        if verdict is Verdict.NOT and stretch is not None:  # one of many, or the only one
+            rest = where.copy()
+            rest[list(stretch.positions)] = False
+            elsewhere = _share(residual[rest[where]], at_positions(of, rest[where]), coverage, ROUNDING * size)
+            stretch = stretch if elsewhere[0] >= elsewhere[1] else None
+        verdict = verdict if stretch is None else Verdict.NOT
     return SignalAssessment(
         int(np.count_nonzero(where)), _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]),
-        bias, _bias_expanded(of, coverage), _rms(unbiased), share, least, _correlation(measured, theirs), verdict,
-        share_0,
+        bias, mean_expanded(of, coverage), _rms(unbiased), share, least, _correlation(measured, theirs), verdict,
+        share_0, stretch,
     )  # fmt: skip
+
+
+def _stretch(
+    course: Signal, model: Array, where: NDArray[np.bool_], constant: float, coverage: float, closed: bool
+) -> Stretch | None:
+    """Where a part of the cycle misses, once a constant is taken off."""
+    of, size = uncertainty_of(course), float(np.max(np.abs(np.append(course.mean[where], model[where]))))
+    if constant:
+        middle = np.mean(of.shared[:, where], axis=1, keepdims=True)
+        of = replace(of, shared=(of.shared - middle)[1:])
+    residual = np.where(where, course.mean - model - constant, np.nan)
+    return worst_stretch(residual, of, where, coverage, closed, ROUNDING * size)
 
 
 def difference(measured: Array, model: Array) -> Array:
@@ -154,10 +140,6 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _at(of: Uncertainty, where: NDArray[np.bool_]) -> Uncertainty:
-    return Uncertainty(of.random[where], of.local[where], of.shared[:, where], of.count[where], of.turns[:, where])
-
-
 def _share(residual: Array, of: Uncertainty, coverage: float, least: float) -> tuple[float, float]:
     """Share of the positions within ±U, and how small that of a true model may be; NaN if no uncertainty is known."""
     wide = expanded(of.total, of.freedom, coverage)
@@ -166,7 +148,7 @@ def _share(residual: Array, of: Uncertainty, coverage: float, least: float) -> t
         return np.nan, np.nan
     share = float(np.mean(np.abs(residual[told]) <= wide[told] + least))
     p = probability(coverage)
-    return share, p - SURE * float(np.sqrt(p * (1 - p) / independent(_at(of, told))))
+    return share, p - SURE * float(np.sqrt(p * (1 - p) / independent(at_positions(of, told))))
 
 
 def independent(of: Uncertainty) -> float:
@@ -178,7 +160,7 @@ def independent(of: Uncertainty) -> float:
     """
     total = of.total
     count = len(total)
-    turns = _nearly_whole(of.turns)
+    turns = nearly_whole(of.turns)
     if not np.any(total > 0) or not np.any(of.random > 0):
         return 1.0
     freedom = len(turns) - 1
@@ -195,30 +177,12 @@ def independent(of: Uncertainty) -> float:
     return float(np.clip(count**2 / max(both, count), 1.0, count))
 
 
-def _nearly_whole(turns: Array) -> Array:
-    """The turns of which at least half is there, with no deviation where a position is missing."""
-    there = np.mean(np.isfinite(turns), axis=1) >= 0.5
-    return np.asarray(np.nan_to_num(turns[there]))
-
-
-def _bias_expanded(of: Uncertainty, coverage: float) -> float:
-    """U of the mean residual: scatter of the means of the turns, zero and gain."""
-    means = np.mean(_nearly_whole(of.turns), axis=1)
-    if len(means) < 2:
-        return float("nan")
-    random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
-    local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
-    shared = np.mean(of.shared, axis=1, keepdims=True)
-    own = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
-    return float(expanded(own.total, own.freedom, coverage)[0])
-
-
 def going_on(course: Signal) -> tuple[float, int]:
     """Correlation of the mean error of a turn with that of the next, and of how many; (NaN, 0) of fewer than five.
 
     That of n independent turns is −1/n in the mean, which is taken off, and scatters by 1/√n.
     """
-    turns = _nearly_whole(course.turns - course.mean)
+    turns = nearly_whole(course.turns - course.mean)
     if len(turns) < FEWEST_TURNS:
         return float("nan"), 0
     means = np.mean(turns, axis=1) - np.mean(turns)

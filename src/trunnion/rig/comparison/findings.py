@@ -124,9 +124,11 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
     """One finding for each explanation, over all conditions."""
     cases, shifted = _cases(name, found), _agreed(found)
     by_cause: dict[str, list[tuple[Compared, ChannelComparison]]] = {}
+    local = [(one, pair) for one, pair in cases if pair.judged.stretch is not None and pair.cause is None]
+    yield from _local(name, local, len(cases))
     for one, pair in cases:
         verdict = pair.judged.verdict
-        if verdict in (Verdict.NOT, Verdict.OFFSET):
+        if (pair.judged.stretch is None or pair.cause is not None) and verdict in (Verdict.NOT, Verdict.OFFSET):
             kind = pair.cause.kind if pair.cause else ""
             if not (kind == "shift" and shifted):  # it is said once for all channels
                 by_cause.setdefault("zero" if verdict is Verdict.OFFSET and kind != "sign" else kind, []).append(
@@ -147,6 +149,40 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
         if names:
             phrases = {"cases": _in(names, len(cases)), "once": once}
             yield finding_for(code, f"channels.{name}", severity=None, phrases=phrases, **figures)
+
+
+def _local(name: str, cases: Sequence[tuple[Compared, ChannelComparison]], of: int) -> Iterator[Finding]:
+    """A channel that misses over a part of the cycle and agrees elsewhere, at the place where it misses most."""
+    if not cases:
+        return
+    one, pair = max(cases, key=lambda case: _beyond(case[1]))
+    stretch = pair.judged.stretch
+    assert stretch is not None
+    shown, size = pair.course.shown if pair.course.unit == "rad/s" else (pair.course.unit, 1.0)
+    start, end = (float(one.model.drive[k]) for k in (stretch.positions[0], stretch.positions[-1]))
+    phrases = {
+        "cases": _in([case.condition.name for case, _ in cases], of),
+        "most": f", the most in {one.condition.name}" if len(cases) > 1 else "",
+        "place": f"{said(start, one.model.unit)} to {said(end, one.model.unit)}",
+        "mean_told": said(stretch.mean / size, shown, True),
+        "wide_told": said(stretch.expanded / size, shown),
+    }
+    figures: dict[str, Any] = {
+        "start": start,
+        "end": end,
+        "mean": stretch.mean,
+        "expanded": stretch.expanded,
+        "count": len(cases),
+    }
+    yield finding_for(
+        "compare.local", f"channels.{name}", phrases=phrases, percent=100 * stretch.share,
+        within_percent=100 * pair.judged.within, **figures,
+    )  # fmt: skip
+
+
+def _beyond(pair: ChannelComparison) -> float:
+    stretch = pair.judged.stretch
+    return abs(stretch.mean) / max(stretch.expanded, 1e-300) if stretch is not None else 0.0
 
 
 def _biased(name: str, cases: Sequence[tuple[Compared, ChannelComparison]]) -> Iterator[Finding]:

@@ -103,7 +103,7 @@ def _channels(measurement: Measurement, wanted: Sequence[str] | None) -> dict[st
 def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) -> ChannelComparison:
     course, theirs = condition.courses[channel], model.courses[channel]
     comparable = model.comparable(channel)
-    judged = judge(course, theirs, comparable, coverage)
+    judged = judge(course, theirs, comparable, coverage, model.run.cycle.periodic)
     pair = ChannelComparison(course, theirs, comparable, judged, None)
     if judged.verdict not in (Verdict.NOT, Verdict.OFFSET):
         return pair

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
@@ -364,3 +366,34 @@ def test_cells_of_the_angle_that_fall_to_zero_are_named(clean: Columns, tmp_path
     assert "of 'deg' of 11,000" in one.what
     assert [item for item in found.findings if item is not one and "no number" not in item.what] == []
     assert off(found.conditions[0]) < 0.02
+
+
+def test_a_file_may_have_a_zero_of_its_own(clean: Columns, tmp_path: Path) -> None:
+    """The encoder was mounted 20° further in the second file; the first keeps the zero of `angle`."""
+    moved = {**clean, "deg": (clean["deg"] - 20) % 360}
+    for name, columns in (("first.csv", clean), ("second.csv", moved)):
+        pd.DataFrame(columns).to_csv(tmp_path / name, index=False)
+    stated = mapping({"angle": {"from": "column", "column": "deg", "unit": "deg"}})
+    files: list[dict[str, Any]] = [{"file": "first.csv"}, {"file": "second.csv", "angle": {"zero": "20 deg"}}]
+    path = tmp_path / "rig.json"
+    path.write_text(json.dumps({**stated, "files": files}), "utf-8")
+    found = read_measured(path)
+    assert len(found.conditions) == 2
+    for one in found.conditions:
+        assert off(one) < 4e-3
+    del files[1]["angle"]
+    path.write_text(json.dumps({**stated, "files": files}), "utf-8")
+    assert off(read_measured(path).conditions[1]) > 1.0
+    # other files in their place do not have it, and a note says so
+    files[1]["angle"] = {"zero": "20 deg"}
+    path.write_text(json.dumps({**stated, "files": files}), "utf-8")
+    (tmp_path / "third.csv").write_bytes((tmp_path / "first.csv").read_bytes())
+    (told,) = (one for one in read_measured(path, [tmp_path / "third.csv"]).findings if one.code == "data.files.less")
+    assert "`angle`" in told.what
+
+
+def test_a_zero_of_a_file_needs_an_angle(tmp_path: Path) -> None:
+    stated = mapping({"angle": None, "cycle": "0.1 s"})
+    with pytest.raises(MechanismError) as failure:
+        read_measured({**stated, "files": [{"file": "a.csv", "angle": {"zero": "20 deg"}}]})
+    assert [one.where for one in failure.value.findings] == ["files.0.angle"]

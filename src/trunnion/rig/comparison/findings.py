@@ -263,7 +263,7 @@ REMEDIES = {
     "sign": "state sign: -1 for the channel in the mapping, or remove it",
     "zero": "check the zero of the channel, and whether the model lacks a load",
     "gain": "check gain and unit of the channel, and friction and loads of the model",
-    "shift": "check the zero of the angle, and delays of the channel",
+    "shift": "check the zero of the angle, also of single files, and delays of the channel",
     "zero and gain": "check zero and gain of the channel",
 }
 MODEL = "it differs between conditions: check friction and loads of the model, not the sensor"

@@ -89,12 +89,19 @@ def _span(value: object) -> object:
 _PAIR = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2}
 
 
+class FileAngle(Part):
+    """The angle in one data file: its zero, in place of that of `angle`."""
+
+    zero: FixedAngle
+
+
 class File(Part):
-    """A data file, what was set while it was recorded, and the stretch of time that is used of it."""
+    """A data file, what was set while it was recorded, the stretch of time that is used, its zero of the angle."""
 
     file: str = Field(min_length=1)
     set: Mapping[str, Setting] = {}
     over: tuple[Number, Number] | None = None
+    angle: FileAngle | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> File:
@@ -261,6 +268,12 @@ class DataMapping(Part):
     positions: Annotated[int, Field(ge=2, le=100_000)] = 360
     drift: Literal["report", "remove"] = "report"
 
+    def of_file(self, entry: File) -> DataMapping:
+        """The same with what a file states of its own angle."""
+        if entry.angle is None or self.angle is None:
+            return self
+        return self.model_copy(update={"angle": self.angle.model_copy(update={"zero": entry.angle.zero})})
+
     @property
     def timed(self) -> bool:
         """Whether the cycle is a time."""
@@ -327,6 +340,10 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
     elif mapping.angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
         yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
+    for number, file in enumerate(mapping.files):
+        if file.angle is not None and mapping.angle is None:
+            what = "states a zero of the angle, but no column gives an angle"
+            yield Finding(what, f"files.{number}.angle", "add angle: {from: …}, or remove it")
     source = mapping.angle.channel if mapping.angle else None
     if source is not None and source not in channels:
         yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))

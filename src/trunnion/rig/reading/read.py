@@ -52,7 +52,7 @@ def read_measured(
         account = Account(str(path))
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
-                conditions += _File(mapped.mapping, path, entry, account).conditions()
+                conditions += _File(mapped.mapping.of_file(entry), path, entry, account).conditions()
         except MechanismError as error:
             account.findings += [one for one in error.findings if one not in account.findings]
             failed = True
@@ -135,7 +135,7 @@ def _files(
 
 def _says(*entries: File) -> str:
     """What entries state of their files."""
-    return " and ".join(f"`{key}`" for key in ("set", "over") if any(getattr(one, key) for one in entries))
+    return " and ".join(f"`{key}`" for key in ("set", "over", "angle") if any(getattr(one, key) for one in entries))
 
 
 def _some(paths: Sequence[Path]) -> str:

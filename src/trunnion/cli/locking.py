@@ -31,15 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["locking"]
 
 MOST_RANGES = 24  # rows of the table of ranges
-STATES = {
-    "RUNS": "loads do not push back",
-    "BACKDRIVABLE": "can be backdriven",
-    "SELF_LOCKING": "self-locking",
-    "LOCKED_BACKWARD": "locked backward",
-    "LOCKED": "locked",
-    "JAMMED": "jammed",
-    "UNSOLVED": "not solved",
-}
 
 
 def locking(
@@ -106,7 +97,7 @@ def _row(one: LockingRange, dial: Dial, near: float) -> list[str]:
     from trunnion.results.quantities import readable
     from trunnion.solve.friction_method import MARGIN
 
-    state = f"margin below {near:g}" if one.state is None else STATES[one.state.name]
+    state = f"margin below {near:g}" if one.state is None else one.state.short
     ends = [dial.at(one.first), dial.at(one.last)]
     if isnan(one.margin):
         return [state, *ends, "—", ""]

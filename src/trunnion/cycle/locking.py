@@ -50,6 +50,22 @@ class LockingState(Coded):
     JAMMED = 5, "jammed: locked forward and backward"
     UNSOLVED = 6, "not solved"
 
+    @property
+    def short(self) -> str:
+        """The state in a word or two, for tables and legends."""
+        return SHORT[self]
+
+
+SHORT = {
+    LockingState.RUNS: "loads do not push back",
+    LockingState.BACKDRIVABLE: "can be backdriven",
+    LockingState.SELF_LOCKING: "self-locking",
+    LockingState.LOCKED_BACKWARD: "locked backward",
+    LockingState.LOCKED: "locked",
+    LockingState.JAMMED: "jammed",
+    LockingState.UNSOLVED: "not solved",
+}
+
 
 class LockingRange(NamedTuple):
     """Consecutive positions in one state, or with a margin below the one that counts as near locking.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from trunnion.cycle.locking import LockingState
 from trunnion.errors import Finding, MechanismError
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
@@ -19,11 +20,11 @@ if TYPE_CHECKING:
 
 __all__ = ["has_friction", "locking"]
 
-# what is shaded: names of `locking_state`, the colour, and what the legend says
+# what is shaded: values of `locking_state`, the first of which the legend names, and the colour
 STATES = (
-    (("backdrivable",), "#dcefe7", "can be backdriven"),
-    (("self_locking",), "#fbe6cf", "self-locking"),
-    (("locked_backward", "jammed"), "#f3d0d8", "locked backward"),
+    ((LockingState.BACKDRIVABLE,), "#dcefe7"),
+    ((LockingState.SELF_LOCKING,), "#fbe6cf"),
+    ((LockingState.LOCKED_BACKWARD, LockingState.JAMMED), "#f3d0d8"),
 )
 LEAST_TOP = 2.0  # of the axis of the margin, so that 1 does not lie on its frame
 
@@ -112,13 +113,12 @@ def _states(axes: Axes, result: xr.Dataset, over: Abscissa, named: bool) -> None
     """The ranges of a result of `locking`, in their colours; named: for the legend."""
     if "locking_state" not in result:
         return
-    meanings = str(result["locking_state"].attrs["flag_meanings"]).split()
     state, x = result["locking_state"].values, over.values
     half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
-    for members, colour, text in STATES:
-        inside = np.isin(state, [meanings.index(member) for member in members])
+    for members, colour in STATES:
+        inside = np.isin(state, members)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
         for number, (start, stop) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
             low, high = sorted((float(x[start]), float(x[stop - 1])))
-            label = text if named and number == 0 else None
+            label = members[0].short if named and number == 0 else None
             axes.axvspan(low - half, high + half, color=colour, linewidth=0, zorder=0.4, label=label)

@@ -155,6 +155,8 @@ def test_names_of_the_file(run: Run) -> None:
     [
         (["--measure", "torque"], "none of the measures torque has a limit"),
         (["--yield", 1.5], "a yield of 1.5 is not possible"),
+        (["--criterion", "rss", "--yield", 0.99], "--yield: the criterion rss does not use a yield of 0.99"),
+        (["--criterion", "worst-case", "--yield", 0.99], "the criterion worst-case does not use a yield"),
         (["--curve", 1], "a curve of 1 points"),
         (["--kind", "pie"], "there is no figure 'pie'"),
         (["--out", "a.doc"], "cannot write a result as '.doc'"),

@@ -31,7 +31,7 @@ from trunnion.cli.result import Shown, check_files, check_model, show_tables
 from trunnion.cli.terminal import bar, console
 from trunnion.cli.tolerance import SECTIONS as OF_TOLERANCES
 from trunnion.cli.tolerance import STOPPED
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.results.attributes import findings_of
 
 if TYPE_CHECKING:
@@ -75,8 +75,9 @@ def allocate(
     file: File,
     measure: Measures = None,
     criterion: Annotated[
-        Criterion, typer.Option("--criterion", help="What must meet the limits: worst-case, rss or yield.")
-    ] = Criterion.WORST_CASE,
+        Criterion | None,
+        typer.Option("--criterion", help="What must meet the limits: worst-case, rss or yield. [default: worst-case]"),
+    ] = None,
     target: Annotated[
         float | None,
         typer.Option(
@@ -106,17 +107,16 @@ def allocate(
     The result is verified by samples; --curve gives cost over accuracy.
     """
     from trunnion.studies.allocation.allocate import allocate as run
-    from trunnion.studies.allocation.outcome import DEFAULT_YIELD
 
     check_files(out or [], report, of="allocation", kind=kind)
     check_model(write, file, force)
+    by = _criterion(criterion, target)
     mechanism = stated(file, set_, table, friction)
-    by = Criterion.YIELD if target is not None else criterion
     if jobs is None:
         jobs = 1 if samples * steps < FEW else os.cpu_count() or 1
     with lines_of(file), bar("samples", samples, least=1000) as progress:
         result = run(
-            mechanism, measure, by.value, DEFAULT_YIELD if target is None else target, choice.value, steps, at, samples,
+            mechanism, measure, by.value, target, choice.value, steps, at, samples,
             seed, curve, exact=exact, jobs=jobs, progress=progress,
         )  # fmt: skip
     draw = partial(_draw, result, kind)
@@ -128,6 +128,14 @@ def allocate(
         findings += lost
         shown.written += [] if lost else [write]
     shown.end(_named(findings, mechanism), STOPPED if result.attrs["stopped"] else None)
+
+
+def _criterion(stated: Criterion | None, target: float | None) -> Criterion:
+    """What is to keep the limits; MechanismError for a yield beside another criterion."""
+    if target is not None and stated not in (None, Criterion.YIELD):
+        what = f"the criterion {stated} does not use a yield of {target:g}"
+        raise MechanismError(Finding(what, "--yield", f"remove --yield, or remove --criterion {stated}"))
+    return Criterion.YIELD if target is not None else stated or Criterion.WORST_CASE
 
 
 def _write_model(

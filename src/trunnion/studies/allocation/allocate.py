@@ -79,7 +79,7 @@ def allocate(
     What is to be chosen are the tolerances and plays with a cost (`Mechanism.prices`); all others stay as they are.
     measures: those with limits that are to be kept; all of the model if not given. criterion: an entry of `CRITERIA`:
     worst-case, rss, or yield, of which target is the share of mechanisms within all limits, 0.9973 if
-    not given. choice: continuous,
+    not given; with another criterion it is an error. choice: continuous,
     discrete, or auto: discrete where any cost is a list of processes or options. steps: positions of a whole cycle; at:
     the place of measures that state none. samples, seed: of the samples that verify it, none if 0; jobs: processes for
     them. curve: how many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
@@ -91,6 +91,9 @@ def allocate(
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
     limits is a finding of the result.
     """
+    if target is not None and criterion in CRITERIA and criterion != "yield":
+        what = f"the criterion {criterion} does not use a yield of {target:g}"
+        raise MechanismError(Finding(what, "yield", "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
     asked = AllocationRequest(criterion, share, choice, steps, at, samples, seed, friction_method, jobs, curve, exact)
     _check(asked)

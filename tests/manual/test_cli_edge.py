@@ -109,3 +109,11 @@ def test_a_full_disk_is_a_finding(end: str, tmp_path: Path) -> None:
     assert "cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_figure_of_an_analysis_is_pointed_to_the_verb_that_draws_it(program: Run, tmp_path: Path) -> None:
+    model = EXAMPLES / "slider-crank.yaml"
+    code, _, err = program("analyse", model, "--out", "x.png")
+    assert code == 2
+    assert f"trunnion plot {model} --out x.png" in " ".join(err.split())
+    assert not list(tmp_path.iterdir())

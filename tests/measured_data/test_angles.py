@@ -295,11 +295,11 @@ def test_a_counter_that_is_set_back(clean: Columns, tmp_path: Path) -> None:
 def test_the_angle_beside_the_speed_of_its_driver(clean: Columns, tmp_path: Path) -> None:
     (one,) = read(clean, tmp_path, {"angle/per_turn": 30}).findings
     assert one.where == "channels.speed-in"
-    assert "the angle turns at 125.7 rad/s, 'speed-in' reads 62.83 rad/s, 2 times" in one.what
+    assert "the angle turns at 1200 rpm, 'speed-in' reads 600 rpm, 2 times" in one.what
     changes = {"angle/sign": -1, "channels/torque-in/zero": 0}
     found = read({**clean, "T1": clean["T1"] - 0.05}, tmp_path, changes).findings
-    assert [(item.where, item.what[:38]) for item in found] == [
-        ("channels.speed-in", "sign: the angle turns at -62.83 rad/s,")
+    assert [(item.where, item.what[:34]) for item in found] == [
+        ("channels.speed-in", "sign: the angle turns at -600 rpm,")
     ]
 
 

@@ -16,6 +16,7 @@ from trunnion.results.attributes import findings_of
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.views.allocation.allocation import prices
 from trunnion.views.allocation.cost import trade_off
+from trunnion.views.tolerance.readings import readings
 from trunnion.views.tolerance.report import report
 from trunnion.views.tolerance.tables import tables
 
@@ -104,6 +105,21 @@ def test_limits_are_told_in_units_that_fit() -> None:
     assert "at most 100 kN" in found.what
     assert "first order" in found.what
     assert not re.search(r"\de\+\d", str(found))
+
+
+def test_a_limit_and_the_tables_have_one_unit() -> None:
+    """A bound of 100 kN beside a scatter of some newtons: both in the unit of the table of the measure."""
+    mechanism = trunnion.read(EXAMPLES / "drawing-press.yaml")
+    for bound in ("100 kN", "1 N"):
+        data = mechanism.data() | {
+            "measures": {"force": {"reaction": "O", "at": "10 mm", "at_most": bound}},
+            "tolerances": {"L": "±0.001 mm"},
+        }
+        result = trunnion.tolerance(Mechanism(**data), methods=["linear"], steps=12)
+        (read,) = readings(result)
+        (found,) = coded(result, "limit.missed")
+        units = set(re.findall(r"[\d.]+ ([kM]?N)\b", found.what))
+        assert units == {read.label}
 
 
 def test_rss_is_a_figure_of_the_method_linear() -> None:

@@ -152,7 +152,7 @@ def analyse(
     engine: Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")] = "auto",
 ) -> None:
     """Analyse a cycle: motion, reactions, friction, effort, power."""
-    check_files(out or [], report, drawn=False)
+    check_files(out or [], report, drawn=False, instead=f"trunnion plot {file}")
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         result = _analysed(mechanism, steps, _method(method, criterion, iterations), engine)

@@ -29,16 +29,24 @@ MODELS = (".yaml", ".yml", ".json")
 
 
 def check_files(
-    out: Sequence[Path], report: Path | None = None, drawn: bool = True, of: str = "", kind: str | None = None
+    out: Sequence[Path],
+    report: Path | None = None,
+    drawn: bool = True,
+    of: str = "",
+    kind: str | None = None,
+    instead: str = "",
 ) -> None:
     """MechanismError for a file that cannot be written, or a kind of figure that a result of some kind (`of`) has not.
 
-    drawn: whether figures can be written.
+    drawn: whether figures can be written; instead: what writes them where they cannot.
     """
     from trunnion.results.export import check_format
 
     others = IMAGES if drawn else ()
     for path in out:
+        if instead and path.suffix.lower() in IMAGES:
+            what = f"cannot write a result as '{path.suffix.lower()}'"
+            raise MechanismError(Finding(what, "--out", f"figures: {instead} --out {path}"))
         if path.suffix.lower() not in others:
             check_format(path, others)
     check_page(report, "--report")

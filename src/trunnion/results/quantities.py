@@ -6,11 +6,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
-__all__ = ["between", "drawn_in", "number", "parts", "prefixed", "quantity", "readable", "signed"]
+__all__ = [
+    "between", "drawn_in", "number", "parts", "prefixed", "quantity", "readable", "scale_of", "scaled", "signed",
+]  # fmt: skip
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 SCALABLE = ("N m", "N", "W", "m", "s", "J", "Pa")
+SMALL = 1e-5  # m: lengths below are told in µm
 WORDS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "kg m^2": "kg m²"}
 
 
@@ -79,6 +83,21 @@ def readable(value: float, unit: str = "", digits: int = 4) -> str:
 def drawn_in(peak: float, unit: str) -> tuple[float, str]:
     """The factor and the unit of what has limits: lengths in mm as on a drawing, others as `prefixed` has them."""
     return (1e3, "mm") if unit == "m" else prefixed(peak, unit)
+
+
+def scaled(peak: float, unit: str) -> tuple[float, str]:
+    """Factor and unit for a size: degrees, millimetres (below 10 µm micrometres), others by a prefix that fits."""
+    return (1e3, "mm") if unit == "m" and (peak >= SMALL or not peak > 0) else prefixed(peak, unit)
+
+
+def scale_of(nominal: float, parts_of: Iterable[float], unit: str) -> tuple[float, str]:
+    """Factor and unit for all that is written of one figure: its nominal value, and its deviations and limits.
+
+    It is the unit of the largest deviation, or of the nominal value where that is larger, but not by 1000 times.
+    """
+    known = [abs(one) for one in parts_of if math.isfinite(one) and one != 0]
+    spread = max(known, default=abs(nominal))
+    return scaled(max(spread, min(abs(nominal), 1e3 * spread)), unit)
 
 
 def signed(value: float, factor: float, shown: str, sign: str = "+", digits: int = 4) -> str:

@@ -224,7 +224,8 @@ class _File:
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
             told = signs(mapping.channels, whole, turning, account)
-            speeds(mapping.channels, whole, turning, told, account)
+            units = {name: shown(own) for name, own in self.own.items()}
+            speeds(mapping.channels, whole, units, turning, told, account)
         return [self._condition(part, zeros, drifts, way) for part in parts]
 
     def _named(self, setting: Setting) -> str:

@@ -141,11 +141,17 @@ def signs(
 
 
 def speeds(
-    channels: Mapping[str, Channel], courses: Mapping[str, Array], turning: float, told: Sequence[str], account: Account
+    channels: Mapping[str, Channel],
+    courses: Mapping[str, Array],
+    units: Mapping[str, tuple[str, float]],
+    turning: float,
+    told: Sequence[str],
+    account: Account,
 ) -> None:
     """Tell where the angle turns at another mean speed than the channel of its driver reads, or the other way.
 
-    turning: mean speed by the angle, rad/s with its sign; told: channels whose sign is said to be wrong.
+    units: in which the figures of each channel are told, with their size in SI; turning: mean speed by the angle, rad/s
+    with its sign; told: channels whose sign is said to be wrong.
     """
     drivers = [one.measures.partition(":")[2] for one in channels.values() if one.measures.startswith("effort:")]
     names = [key for key, one in channels.items() if one.measures in {f"rate:{driver}" for driver in drivers}]
@@ -161,7 +167,9 @@ def speeds(
     ratio = turning / read if read else np.inf
     if abs(ratio - 1) <= APART:
         return
-    where, both = f"channels.{names[0]}", f"the angle turns at {turning:.4g} rad/s, '{names[0]}' reads {read:.4g} rad/s"
+    unit, size = units[names[0]]
+    where = f"channels.{names[0]}"
+    both = f"the angle turns at {turning / size:.4g} {unit}, '{names[0]}' reads {read / size:.4g} {unit}"
     if abs(ratio + 1) <= APART:
         account.warn(
             "data.rate.sign", where, f"sign: {both}", f"write sign: {-channels[names[0]].sign}, or turn angle.sign"

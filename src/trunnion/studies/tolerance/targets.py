@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
-from trunnion.results.quantities import drawn_in, signed
+from trunnion.results.quantities import scale_of, signed
 from trunnion.results.sentences import finding_for
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     for i, of in enumerate(outcome.study.linear.measures):
         if not limited(of.measure):
             continue
-        say = _Words(outcome, of)
+        say = _Words(outcome, of, counted, i)
         known, beyond = _worst(outcome, i, of)
         parts = [say.range(*known)] if beyond else []
         short = _short(counted, i, sure=bool(np.all(np.isfinite(known))) and not beyond)
@@ -95,7 +95,7 @@ def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator
     fine = True
     for i, of in enumerate(outcome.study.linear.measures):
         if limited(of.measure) and float(counted.arrays["yield_high"][i]) < target:
-            fine, say = False, _Words(outcome, of)
+            fine, say = False, _Words(outcome, of, counted, i)
             short = _short(counted, i, sure=True)[0]
             phrases = {"told": short, "limits": say.limits(), "remedy": _remedy(outcome, of, say)}
             figures = {"target_percent": 100 * target, **_sampled(counted, i)}
@@ -138,16 +138,20 @@ def _short(counted: Sampled | None, i: int, sure: bool) -> list[str]:
 
 
 class _Words:
-    """Deviations of a measure with their unit."""
+    """Deviations of a measure in the unit that the tables have them in."""
 
-    def __init__(self, outcome: Outcome, of: Of) -> None:
+    def __init__(self, outcome: Outcome, of: Of, counted: Sampled | None, i: int) -> None:
         self.worst = "worst case" if outcome.worst is not None else "worst case, first order,"
         run = outcome.study.run
         unit = of.measure.figure_unit(run.system, run.values)
         one = of.measure
-        stated = [end for end in (one.lower, one.upper, one.at_least, one.at_most) if end is not None]
+        known = [end for end in (one.lower, one.upper) if end is not None]
+        known += [float(part) for part in of.total[:3]]
+        if counted is not None:
+            known.append(3 * float(counted.arrays["deviation"][i]))
+        nominal = of.reference.figure
         self.of = of
-        self.factor, self.unit = drawn_in(max(map(abs, stated), default=0.0), unit)
+        self.factor, self.unit = scale_of(nominal if np.isfinite(nominal) else 0.0, known, unit)
 
     def say(self, value: float, sign: str = "+") -> str:
         return signed(value, self.factor, self.unit, sign)

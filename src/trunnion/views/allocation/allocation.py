@@ -9,13 +9,14 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
+from trunnion.results.quantities import scaled
 from trunnion.statistics.costs import Cost
 from trunnion.views.allocation.cost import Offer, PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.figure import KINDS as OF_TOLERANCES
 from trunnion.views.tolerance.figure import figure as tolerance_figure
-from trunnion.views.tolerance.readings import readings, scaled, share
+from trunnion.views.tolerance.readings import readings, share
 from trunnion.views.tolerance.report import Section
 from trunnion.views.tolerance.report import report as tolerance_report
 from trunnion.views.tolerance.tables import tables as tolerance_tables

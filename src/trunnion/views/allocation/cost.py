@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from trunnion.results.quantities import number
+from trunnion.results.quantities import number, scaled
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, dress, legend, new
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.readings import scaled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +70,7 @@ def trade_off(
     that limit, else its share of the stated ones. stepped: as with processes to choose from: what keeps a limit keeps
     any wider one too; None where only the costs can say so, as of which many are the same.
     """
-    drawn = new("Cost over accuracy", result)
+    drawn = new("Minimum cost of all tolerances over accuracy", result)
     axes = drawn.subplots()
     share, cost = (np.array([one[k] for one in sorted(offers)], float) for k in (0, 1))
     if limit is None:
@@ -116,7 +115,9 @@ def tolerance_cost(result: xr.Dataset, prices: Sequence[PriceCurve]) -> Figure:
     shown = order[:MOST_PRICES]
     columns = min(len(shown), 2 if len(shown) in (2, 4) else COLUMNS)
     rows = -(-len(shown) // columns)
-    drawn = new("Cost of the tolerances", result, 1.0 + rows * SIDE * (1.25 if columns < COLUMNS else 1.0))
+    drawn = new(
+        "Cost of each tolerance over its half width", result, 1.0 + rows * SIDE * (1.25 if columns < COLUMNS else 1.0)
+    )
     grid = drawn.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[len(shown) :]:
         axes.set_visible(False)
@@ -167,9 +168,8 @@ def _end(name: str) -> str:
 
 
 def _headed(price: PriceCurve) -> str:
-    """Name of a tolerance, with its group: the end of a long one."""
-    name = f"{price.name} ({price.group})" if price.group else price.name
-    return _end(name)
+    """Name of a tolerance, with its group: the end of a long one, so that those of one group differ."""
+    return f"{_end(price.name)} ({_end(price.group)})" if price.group else _end(price.name)
 
 
 def _across(axes: Axes, known: list[float]) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import number, prefixed
+from trunnion.results.quantities import number, scale_of, scaled
 from trunnion.views.common.cycle import Abscissa, Array, names
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ __all__ = [
     "limits_text",
     "methods",
     "readings",
-    "scaled",
     "share",
     "share_interval",
     "share_parts",
@@ -38,7 +37,6 @@ __all__ = [
 
 APART = 5e-4  # two shares that differ by more are told each
 OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
-SMALL = 1e-5  # m: lengths below are told in µm
 DEGREE = ("°", "deg")
 
 
@@ -135,7 +133,7 @@ class MeasureReading:
     @cached_property
     def scale(self) -> tuple[float, str]:
         """Factor and unit for all numbers of the measure."""
-        return scaled(max(self.spread, min(abs(self.nominal), 1e3 * self.spread)), self.unit)
+        return scale_of(self.nominal, [self.spread], self.unit)
 
     @property
     def factor(self) -> float:
@@ -300,13 +298,6 @@ def _without_section(paths: Sequence[str]) -> list[str]:
     """`links.crank.length` as `crank.length`, unless another number is called so too."""
     ends = [path.partition(".")[2] or path for path in paths]
     return [end if ends.count(end) == 1 else path for path, end in zip(paths, ends, strict=True)]
-
-
-def scaled(peak: float, unit: str) -> tuple[float, str]:
-    """Factor and unit for a size: degrees, millimetres (below 10 µm micrometres), others by a prefix that fits."""
-    if unit == "m" and (peak >= SMALL or not peak > 0):
-        return 1e3, "mm"
-    return prefixed(peak, unit)
 
 
 def fixed(value: float, decimals: int) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.quantities import number
+from trunnion.results.quantities import number, scaled
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.plots import outer, rss_label
@@ -18,7 +18,6 @@ from trunnion.views.tolerance.readings import (
     failures,
     fixed,
     readings,
-    scaled,
     share,
     share_interval,
     share_parts,

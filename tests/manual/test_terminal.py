@@ -39,6 +39,18 @@ def test_a_table_too_wide_for_whole_words_is_shown_in_parts(
     assert all(word in told for word in words)
 
 
+def test_a_table_that_narrower_gaps_make_fit_stays_whole(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Six columns of 10 take 77 with gaps of 3, 71 with 2, and 65 with 1."""
+    for columns, whole in ((77, True), (71, True), (65, True), (64, False)):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        show_rows("title", [f"{k:010d}" for k in range(6)], [["x" * 10] * 6])
+        told = capsys.readouterr().out
+        assert max(cell_len(line.rstrip()) for line in told.splitlines()) <= columns
+        assert (told.count("xxxxxxxxxx") == 6) is whole
+
+
 def test_rows_that_two_columns_tell_apart_keep_both(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

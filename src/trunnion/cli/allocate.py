@@ -18,7 +18,7 @@ from trunnion.cli.options import (
     FrictionLaw,
     Jobs,
     Measures,
-    Out,
+    OutAllocation,
     Report,
     Seed,
     Set,
@@ -98,7 +98,7 @@ def allocate(
     write: Write = None,
     force: Force = False,
     kind: Figures = None,
-    out: Out = None,
+    out: OutAllocation = None,
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:

@@ -27,6 +27,8 @@ __all__ = [
     "Measures",
     "Method",
     "Out",
+    "OutAllocation",
+    "OutTolerance",
     "Report",
     "Rounds",
     "Seats",
@@ -105,6 +107,24 @@ Out = Annotated[
     list[Path] | None,
     typer.Option(
         "--out", help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
+    ),
+]
+TABLES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
+OutTolerance = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--out",
+        help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable. "
+        f"The name says which table: x.csv has the measures, x.parameters.csv the contributions, {TABLES}.",
+    ),
+]
+OutAllocation = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--out",
+        help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable. "
+        "The name says which table: x.csv has the tolerances, x.measures.csv the measures, x.offers.csv the cost over "
+        f"accuracy, {TABLES}.",
     ),
 ]
 Data = Annotated[

@@ -50,8 +50,9 @@ def show_figures(title: str, figures: Sequence[Figure]) -> None:
 def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
     """Rows of texts under their heads, broken between words where they are too wide, but not before a unit.
 
-    A table whose words do not fit the terminal is shown in parts, one below the other, each with the columns that name
-    its rows. Where no terminal sets a width, it is as wide as its words need: no number is broken.
+    A table whose words do not fit the terminal has narrower gaps between its columns; if that does not help, it is
+    shown in parts, one below the other, each with the columns that name its rows. Where no terminal sets a width, it is
+    as wide as its words need: no number is broken.
     """
     from rich.cells import cell_len
     from rich.table import Table
@@ -62,12 +63,13 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
         columns = zip(head, *rows, strict=True)
         least = (max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns)
         out.width = max(out.width, sum(least) + _frame(head))
-    for number, columns_shown in enumerate(_parts([head, *rows], out.width)):
+    gap = next((gap for gap in GAPS if len(_parts([head, *rows], out.width, gap)) == 1), GAPS[0])
+    for number, columns_shown in enumerate(_parts([head, *rows], out.width, gap)):
         if number:
             out.print()
         part = [[row[k] for k in columns_shown] for row in [head, *rows]]
-        cells = _fitted(part, out.width - _frame(part[0]))
-        table = Table(show_edge=False)
+        cells = _fitted(part, out.width - _frame(part[0], gap))
+        table = Table(show_edge=False, padding=PADDING[gap])
         for name in cells[0]:
             table.add_column(name, justify="right", overflow="fold", no_wrap=cells[0] is not part[0])
         for row in cells[1:]:
@@ -75,12 +77,16 @@ def show_rows(title: str, head: list[str], rows: list[list[str]]) -> None:
         out.print(table, markup=False, highlight=False)
 
 
-def _frame(columns: Sequence[Any]) -> int:
+PADDING = {3: (0, 1, 0, 1), 2: (0, 0, 0, 1), 1: (0, 0, 0, 0)}  # of a cell, by how much a column takes beside its text
+GAPS = tuple(PADDING)
+
+
+def _frame(columns: Sequence[Any], gap: int = 3) -> int:
     """How much of a line the lines and gaps between so many columns take."""
-    return 3 * len(columns) - 1
+    return gap * len(columns) - 1
 
 
-def _parts(rows: list[list[str]], width: int) -> list[list[int]]:
+def _parts(rows: list[list[str]], width: int, gap: int = 3) -> list[list[int]]:
     """Columns of each table that a table is shown as: all in one if their words fit the width.
 
     Otherwise each begins with the columns in which every row differs from the others.
@@ -89,7 +95,7 @@ def _parts(rows: list[list[str]], width: int) -> list[list[int]]:
 
     columns = list(zip(*rows, strict=True))
     least = [max(cell_len(word) for cell in column for word in cell.split(" ")) for column in columns]
-    if sum(least) + _frame(columns) <= width:
+    if sum(least) + _frame(columns, gap) <= width:
         return [list(range(len(columns)))]
     wanted = [max(low, min(WIDE, max(map(cell_len, column)))) for low, column in zip(least, columns, strict=True)]
     telling = (k for k in range(1, min(4, len(columns))) if len({tuple(row[:k]) for row in rows}) == len(rows))

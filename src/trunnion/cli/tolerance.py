@@ -15,7 +15,7 @@ from trunnion.cli.options import (
     FrictionLaw,
     Jobs,
     Measures,
-    Out,
+    OutTolerance,
     Report,
     Seed,
     Set,
@@ -88,7 +88,7 @@ def tolerance(
     friction: FrictionLaw = None,
     sample: Samples = None,
     kind: Kind = None,
-    out: Out = None,
+    out: OutTolerance = None,
     report: Report = None,
     units_row: UnitsRow = False,
 ) -> None:

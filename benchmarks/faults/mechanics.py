@@ -317,7 +317,7 @@ _ENGINES = (
         "solve/continuation.py",
         "return x, judged(x, residual, error) & (calm > 0) & near &",
         "return x, judged(x, residual, error) & (calm > 0) &",
-        ("tests/reference/test_compiled_cycle.py",),
+        ("tests/invariants/test_continuation.py",),
     ),
     Fault(
         "compiled-cycle-keeps-zero-slip",

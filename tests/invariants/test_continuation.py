@@ -11,27 +11,34 @@ from trunnion.algebra import linalg
 from trunnion.solve import continuation
 
 
+def _pins(x, share, start, gain, signs):
+    """Residual and Jacobian of pins in a loop of influence: φ_k = f_k |R_k0 + Σ G_kl φ_l|."""
+    reactions = [[start[k][i] + sum(gain[k][j][i] * x[j] for j in range(3)) for i in range(2)] for k in range(3)]
+    sizes = [np.hypot(*r) for r in reactions]
+    residual = [x[k] - share * signs[k] * sizes[k] for k in range(3)]
+    jacobian = [
+        [
+            (1.0 if k == j else 0.0)
+            - share * signs[k] * sum(a * b for a, b in zip(reactions[k], gain[k][j], strict=True)) / sizes[k]
+            for j in range(3)
+        ]
+        for k in range(3)
+    ]
+    return residual, jacobian
+
+
+def _drawn(rng: np.random.Generator, lanes: int):
+    """Random pins with strong friction: reactions without it, influences, senses, lane last."""
+    start, gain = rng.normal(size=(3, 2, lanes)), rng.normal(size=(3, 3, 2, lanes)) * 0.6
+    return start, gain, rng.choice([-1.0, 1.0], size=(3, lanes))
+
+
 def _scattered(rng: np.random.Generator, lanes: int):
-    """Random pins in a loop of influence: φ_k = f_k |R_k0 + Σ G_kl φ_l| with strong friction; some of the lanes."""
-    all_start = rng.normal(size=(3, 2, lanes))
-    all_gain = rng.normal(size=(3, 3, 2, lanes)) * 0.6
-    all_signs = rng.choice([-1.0, 1.0], size=(3, lanes))
+    """Such pins as a family; some of the lanes."""
+    drawn = _drawn(rng, lanes)
 
     def family(picked):
-        return lambda x, share: system(x, share, all_start[..., picked], all_gain[..., picked], all_signs[..., picked])
-
-    def system(x, share, start, gain, signs):
-        reactions = [start[k] + sum(gain[k, j] * x[j] for j in range(3)) for k in range(3)]
-        sizes = [np.hypot(*r) for r in reactions]
-        residual = [x[k] - share * signs[k] * sizes[k] for k in range(3)]
-        jacobian = [
-            [
-                (1.0 if k == j else 0.0) - share * signs[k] * (reactions[k] * gain[k, j]).sum(axis=0) / sizes[k]
-                for j in range(3)
-            ]
-            for k in range(3)
-        ]
-        return residual, jacobian
+        return lambda x, share: _pins(x, share, *(numbers[..., picked] for numbers in drawn))
 
     return family
 
@@ -72,6 +79,39 @@ def test_continuation_never_claims_a_solution_beyond_the_fold(seed: int) -> None
     assert np.count_nonzero(true & ~claimed) <= 2  # near a fold the finer walk may survive where the coarse one doubts
     both = ~true & ~claimed
     assert np.median(np.abs(share[both] - fine[both])) < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_compiled_steps_lead_as_far(seed: int) -> None:
+    """The same way, recorded and compiled: a lane stops at the same fold, or goes on where the other does."""
+    pytest.importorskip("llvmlite")
+    from trunnion.engines.graph import POSITION, Graph
+    from trunnion.engines.machine_code import MachineCode, vector_width
+    from trunnion.engines.program import program
+    from trunnion.engines.recorded import Recorded, number_of
+
+    lanes, rng = 800, np.random.default_rng(seed)
+    drawn = _drawn(rng, lanes)
+    _, expected = continuation.follow(
+        lambda picked: lambda x, share: _pins(x, share, *(numbers[..., picked] for numbers in drawn)),
+        [np.zeros(lanes)] * 3,
+    )
+    graph, inputs = Graph(), {}
+    recorded = []
+    for name, numbers in zip(("start", "gain", "signs"), drawn, strict=True):
+        cells = np.empty(numbers.shape[:-1], object)
+        for place in np.ndindex(cells.shape):
+            inputs[f"{name}{place}"] = np.ascontiguousarray(numbers[place])
+            cells[place] = Recorded(graph, graph.input(f"{name}{place}", POSITION))
+        recorded.append(cells.tolist())
+    share = continuation.followed(lambda x, s: _pins(x, s, *recorded), [0.0] * 3, True, 1.0)
+    found = np.empty((1, lanes))
+    MachineCode(program(graph, [number_of(graph, share)], vector_width())).run(inputs, [found], (0, 1), (0, lanes))
+    away = np.abs(found[0] - expected)
+    assert 100 < np.count_nonzero(expected < 1.0) < lanes - 100
+    # Newton's method may cease to converge a little before a fold, where rounding decides
+    assert np.count_nonzero(away > 1e-6) <= 4, np.sort(away)[-8:]
+    assert np.count_nonzero((found[0] >= 1.0) != (expected >= 1.0)) <= 2
 
 
 @pytest.mark.slow

@@ -109,9 +109,8 @@ def test_compiled_steps_lead_as_far(seed: int) -> None:
     MachineCode(program(graph, [number_of(graph, share)], vector_width())).run(inputs, [found], (0, 1), (0, lanes))
     away = np.abs(found[0] - expected)
     assert 100 < np.count_nonzero(expected < 1.0) < lanes - 100
-    # Newton's method may cease to converge a little before a fold, where rounding decides
-    assert np.count_nonzero(away > 1e-6) <= 4, np.sort(away)[-8:]
-    assert np.count_nonzero((found[0] >= 1.0) != (expected >= 1.0)) <= 2
+    # where Newton's method ceases to converge, just before a fold, rounding decides
+    assert np.max(away) < 1e-6
 
 
 @pytest.mark.slow

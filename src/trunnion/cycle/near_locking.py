@@ -220,7 +220,7 @@ def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[flo
         there = reverse(run, run.walk(time.ravel()), FrictionMethod(), useful)
         return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
 
-    found = integrals(powers, [run.edges])
+    found = run.once(("back", *useful), lambda: integrals(powers, [run.edges]))
     delivered, given = (
         0.0 if abs(value) <= max(error, CANCELLED * size) else value / run.cycle.duration
         for value, error, size in zip(found.value[:, 0], found.error[:, 0], found.size[:, 0], strict=True)
@@ -301,16 +301,24 @@ def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: S
     times = run.cycle.times(min(len(time), LOOKED))
     plain = replace(method, name="newton", margin_up_to=0.0)
     if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
-        walk, locked, more = run.walk(times), np.ones(len(times), bool), np.zeros(len(times))
+        locked, more = np.ones(len(times), bool), np.zeros(len(times))
+        behind = reverse(run, run.walk(times), plain, useful)
     else:
-        back = run.solve(times, method=plain)
-        walk, locked, more = back.walk, _locks(back), others(back)
+        locked, more, behind = run.once(("both ways", len(times), plain), lambda: _both_ways(run, times, plain, useful))
     first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
     critical: dict[str, float] = {}
     if first is not None:
         at = critical_multiples(run.solve(time[[first]], method=plain), method.margin_up_to)
         critical = {joint: float(multiple[0]) for joint, multiple in at.items()}
-    return Locking(times, locked, first, critical, more, reverse(run, walk, plain, useful))
+    return Locking(times, locked, first, critical, more, behind)
+
+
+def _both_ways(
+    run: Run, times: Array, method: FrictionMethod, useful: Sequence[str]
+) -> tuple[NDArray[np.bool_], Array, Reverse]:
+    """Where it locks, other solutions, and the way back."""
+    back = run.solve(times, method=method)
+    return _locks(back), others(back), reverse(run, back.walk, method, useful)
 
 
 def findings(near: Locking, dial: Dial) -> Iterator[Finding]:

@@ -110,9 +110,14 @@ def positions(
 
 def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
     """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
-    of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
     if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return still(arrays)
+    return run.once(("means", method, ideal), lambda: _averaged(run, method, ideal))
+
+
+def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
+    """Means over the cycle, which do not depend on the positions that are asked for."""
+    of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
     if ideal or not run.seats:
         look = run.ideal if ideal else run.solve
         between = None if ideal else [run.edges]

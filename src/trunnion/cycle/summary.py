@@ -77,32 +77,34 @@ def result_of(run: Run, found_positions: Positions) -> Result:
     method = found_positions.method
     found, near = findings(run, found_positions)
     measured = watched(run, time, method)
-    attributes: dict[str, Any] = {
-        **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
-        "method": method.name,
-        **cited(references(mechanism)),
-        "driver_units": effort_units(run.system),
-        "spring_units": spring_units(run.system),
-        "findings": finding_rows([*found, *measured.findings]),
-        "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
-        "inputs": inputs(mechanism),
-        "scene": scene_of(run),
-        "periodic": int(run.cycle.periodic),
-    }
+    drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
+    attributes = encoded(
+        {
+            **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
+            "method": method.name,
+            **cited(references(mechanism)),
+            "driver_units": effort_units(run.system),
+            "spring_units": spring_units(run.system),
+            "findings": finding_rows([*found, *measured.findings]),
+            "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
+            **drawn,
+            "periodic": int(run.cycle.periodic),
+        }
+    )
 
     def build() -> xr.Dataset:
         along = driven(time, *run.system.dial(run.values, time))
         means, ideal = found_positions.means, found_positions.ideal
         return measured.joined(results.dataset(arrays, found_positions.labels, along, means, attributes, ideal))
 
-    return Result(encoded(attributes), build)
+    return Result(attributes, build)
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
     """What is to be known of a mechanism at some positions of its cycle, and how near to locking it is."""
     near = _near_locking(run, at.arrays, at.time, at.method)
     return [
-        *model_notes(run.system.mechanism, run.system),
+        *run.once("notes", lambda: model_notes(run.system.mechanism, run.system)),
         *run.chosen.findings,
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at.arrays, at.causes, at.time, near),

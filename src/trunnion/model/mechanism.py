@@ -133,6 +133,11 @@ class Mechanism(Numbers):
         return self.parameter_set.ideal(overrides)
 
     @cached_property
+    def worked_out(self) -> WorkedOut:
+        """What others have worked out from it, by name, and keep as long as it lives: no part of its content."""
+        return WorkedOut()
+
+    @cached_property
     def seated(self) -> Mapping[str, Literal["loaded"] | Seat]:
         """How the pin lies in its hole, of every joint that has a play and a seat other than free."""
         return {
@@ -381,7 +386,7 @@ class Mechanism(Numbers):
         """What a notebook shows: drawing, structural formula, mobility, findings. Never raises."""
         return str(_notebook().mechanism_html(self))
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Hash of the content, 16 hexadecimal digits: equal mechanisms have equal digests."""
         data = self.model_dump(mode="json", by_alias=True)
@@ -398,6 +403,16 @@ HASHED = (
     *("dead_centre", "rate", "effort", "load", "reaction", "efficiency", "locking_margin"),
     *("at", "as", "over", "limit", "at_least", "at_most"),
 )
+
+
+class WorkedOut(dict[str, Any]):
+    """What is worked out from a mechanism; a copy of that begins without, in this process or another."""
+
+    def __deepcopy__(self, memo: Any) -> WorkedOut:
+        return WorkedOut()
+
+    def __reduce__(self) -> tuple[type[WorkedOut], tuple[()]]:
+        return WorkedOut, ()
 
 
 def _notebook() -> Any:

@@ -20,6 +20,12 @@ ANGLES = {"rad": "deg"}  # where no angle is stated; nobody reads radians
 
 def stated_units(mechanism: Mechanism) -> dict[str, str]:
     """The unit that the model states most often, for each unit of SI: {"m": "mm", "rad": "deg"}."""
+    if "stated_units" not in mechanism.worked_out:
+        mechanism.worked_out["stated_units"] = _stated_units(mechanism)
+    return dict(mechanism.worked_out["stated_units"])
+
+
+def _stated_units(mechanism: Mechanism) -> dict[str, str]:
     counts: Counter[tuple[str, str]] = Counter()
     for entry in mechanism.parameter_set.entries.values():
         text = str(entry.quantity.source)

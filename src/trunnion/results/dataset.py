@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,7 @@ class Variable:
     part: str = ""
     space: str = ""
 
+    @functools.cache  # noqa: B019 - of a few constants
     def over(self, *dims: str) -> Variable:
         """The same with more dimensions, last."""
         return replace(self, dims=(*self.dims, *dims))
@@ -69,6 +71,19 @@ def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> 
     return described({"time": time, "drive": np.asarray(values, float)}, {"time": TIME, "drive": drive})
 
 
+@functools.lru_cache(maxsize=64)
+def _index(dim: str, members: tuple[str, ...]) -> xr.indexes.PandasIndex:
+    """The names along a dimension.
+
+    An index of pandas: of an array, xarray would load pint and dask to see whether it is one of theirs.
+    """
+    import pandas as pd
+    import xarray as xr
+
+    text = np.asarray(members, dtype=str)
+    return xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
+
+
 def dataset_of(
     kind: str,
     variables: Mapping[str, xr.Variable],
@@ -81,20 +96,21 @@ def dataset_of(
     labels: names along its dimensions; attributes: lists and dicts become JSON; along: other coordinates, as xarray
     takes them.
     """
-    import pandas as pd
     import xarray as xr
 
     names: dict[str, Any] = {}
     indexes: dict[str, xr.indexes.PandasIndex] = {}
     for dim, members in labels.items():
-        text = np.asarray(members, dtype=str)
-        # An index of pandas: of an array, xarray would load pint and dask to see whether it is one of theirs.
-        indexes[dim] = xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
+        indexes[dim] = _index(dim, tuple(members))
         names |= indexes[dim].create_variables()
     drive = (along or {}).get("drive")
     if drive is not None and drive.dims == ("position",):
         # xarray draws over the coordinate that bears the dimension's name. It has no index: two results are combined
         # position by position, not by angles that may differ in their last digit
         names["position"] = drive
-    found = xr.Dataset(variables, xr.Coordinates(names, indexes), {"kind": kind, **encoded(attributes)})
-    return found.assign_coords(along or {})
+    # those without an index go in at once: to add them afterwards takes as long as all else
+    plain = {name: one for name, one in (along or {}).items() if isinstance(one, xr.Variable) and name not in one.dims}
+    coordinates = xr.Coordinates(names | plain, indexes)
+    found = xr.Dataset(variables, coordinates, {"kind": kind, **encoded(attributes)})
+    indexed = {name: one for name, one in (along or {}).items() if name not in plain}
+    return found.assign_coords(indexed) if indexed else found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -55,7 +55,7 @@ class Figure:
 
     def row(self) -> dict[str, Any]:
         """The figure for JSON."""
-        own = asdict(self)
+        own = dict(vars(self))
         row = {"label": self.label, "value": own.pop("value"), "unit": own.pop("unit")}
         return row | {key: text for key, text in own.items() if text}
 

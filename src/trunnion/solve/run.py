@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ __all__ = ["Run", "prepare"]
 
 
 TURN_STEPS = 720
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,17 @@ class Run:
         return self._solve(time, self.ideal_values, self._ideal_past, method)
 
     @functools.cached_property
+    def _found(self) -> dict[Hashable, Any]:
+        return {}
+
+    def once(self, what: Hashable, find: Callable[[], Found]) -> Found:
+        """What `find` finds, found once: for what is the same however often and at whatever positions it is run."""
+        if what not in self._found:
+            self._found[what] = find()
+        found: Found = self._found[what]
+        return found
+
+    @functools.cached_property
     def seats(self) -> list[GivenSeat]:
         """Joints whose pins lie in seats that are given or follow the load."""
         return seats(self.system, self.values)
@@ -139,7 +151,17 @@ class Run:
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def prepare(mechanism: Mechanism) -> Run:
-    """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined."""
+    """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined.
+
+    Done once for each mechanism, which does not change.
+    """
+    known: Run | None = mechanism.worked_out.get("run")
+    if known is None or known.system.mechanism is not mechanism:  # of one that this is a copy of
+        known = mechanism.worked_out["run"] = _prepared(mechanism)
+    return known
+
+
+def _prepared(mechanism: Mechanism) -> Run:
     keep_pages()
     system = build(mechanism)
     values = mechanism.parameters()

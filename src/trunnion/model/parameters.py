@@ -140,6 +140,8 @@ def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
         case BaseModel():
             extra = value.parameters.items() if isinstance(value, Friction) else ()
             for key, item in (*((key, getattr(value, key)) for key in type(value).model_fields), *extra):
+                if item is None or isinstance(item, str):
+                    continue  # most of what could be stated is not
                 below = path if isinstance(value, Point) and key == "at" else f"{path}.{key}"
                 yield from _walk(item, below, (*location, key))
         case Mapping():

@@ -12,6 +12,7 @@ doi:10.1016/S0965-9978(96)00051-8.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -119,8 +120,9 @@ def _parted(times: Array, cycle: Cycle) -> Array:
     kept[0] = 0.0
     widest = cycle.duration / min(PANELS * max(1.0, np.ceil(cycle.turns - 1e-9)), MOST_EDGES)
     counts = np.ceil(np.diff(kept) / widest * (1 - 1e-9)).astype(int)
-    parts = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(kept[:-1], kept[1:], counts, strict=True)]
-    return np.concatenate([*parts, kept[-1:]])
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    parts = within * np.repeat(np.diff(kept) / counts, counts) + np.repeat(kept[:-1], counts)
+    return np.append(parts, kept[-1])
 
 
 def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
@@ -219,6 +221,9 @@ def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float]]:
     courses = np.where(np.abs(courses) <= noise, 0.0, courses)
     found: list[tuple[float, ...]] = []
     for k, (switch, course) in enumerate(zip(switches, courses, strict=True)):
+        if len(switch.levels) == 1 and switch.period is None:
+            found += _passed_once(course, of.row(switch.levels[0]), time, k)
+            continue
         for row in range(len(duration)):
             levels = _levels(of, switch, row, course[row])
             found += [(row, k, *one) for one in _passed(course[row], levels, time[row])]
@@ -241,6 +246,15 @@ def _levels(of: Mechanisms, switch: Switch, row: int, course: Array) -> Array:
         levels = levels[(levels >= np.min(known)) & (levels <= np.max(known))]
     most = min(MOST_LEVELS * max(1.0, np.ceil(of.cycles[row].turns - 1e-9)), MOST_SCANNED)
     return levels[:: max(1, int(np.ceil(len(levels) / most)))]
+
+
+def _passed_once(course: Array, level: Array, time: Array, function: int) -> Iterator[tuple[float, ...]]:
+    """What a `_Crossing` holds, wherever a function passes its only level, (mechanism,), between two places."""
+    above, there = course >= level[:, None], np.isfinite(course)
+    rows, low = np.nonzero((above[:, 1:] != above[:, :-1]) & there[:, 1:] & there[:, :-1])
+    high = low + 1
+    columns = level[rows], time[rows, low], time[rows, high], course[rows, low], course[rows, high]
+    return zip(rows, itertools.repeat(function), *columns, strict=False)
 
 
 def _passed(course: Array, levels: Array, time: Array) -> Iterator[tuple[float, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -30,12 +30,50 @@ Values = Mapping[str, Number]
 INERTIA_SLACK = 1e-3
 
 
-def check_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
-    """Findings about the nominal values; a nan in them stands for what is reported already and passes every check."""
+def check_values(
+    mechanism: Numbers, numbers: ParameterSet, changed: Collection[str] | None = None
+) -> Iterator[Finding]:
+    """Findings about the nominal values; a nan in them stands for what is reported already and passes every check.
+
+    changed: paths of those that differ from the numbers of a sound mechanism, all if not given: errors that follow from
+    no other number are found, and of warnings some.
+    """
     values = numbers.nominal
-    for path, entry in numbers.entries.items():
+    yield from _each(numbers, numbers.entries if changed is None else changed)
+    parts = None if changed is None else {tuple(path.split(".", 2)[:2]) for path in changed}
+
+    def among(section: str, names: Iterable[str]) -> Iterator[str]:
+        return (name for name in names if parts is None or (section, name) in parts)
+
+    for name in among("links", mechanism.links):
+        yield from _inertia(mechanism, mechanism.links[name], values, f"links.{name}")
+    for name in among("joints", mechanism.effective_joints):
+        yield from _joint(mechanism, name, numbers)
+        yield from play_values(mechanism, name, numbers)
+    for name in among("drivers", mechanism.drivers):
+        yield from _driver(mechanism, name, values)
+    sections = None if parts is None else {section for section, _ in parts}
+    if sections is None or "errors" in sections:
+        yield from error_sizes(numbers)
+    yield from gear_values(mechanism, values)
+    if sections is None or not sections.isdisjoint(("tables", "drivers")):
+        yield from table_values(mechanism, values)
+    yield from spring_values(mechanism, values)
+    if sections is None or "joints" in sections:
+        yield from pitch_values(mechanism, values)
+    if sections is None or "links" in sections:
+        yield from _directions(mechanism, values)
+        yield from direction_values(mechanism, values)
+        yield from _sides(mechanism, values)
+
+
+def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:
+    """What can be said of a number by itself."""
+    values = numbers.nominal
+    for path in paths:
         if path not in values:  # an expression of the motion
             continue
+        entry = numbers.entries[path]
         broken = any(np.isnan(values[one]) for one in entry.depends if one in values)
         if entry.quantity.names and not broken and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
             yield Finding(
@@ -49,21 +87,6 @@ def check_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]
             continue  # a deviation has a sign
         if entry.path.rpartition(".")[2] in NOT_NEGATIVE and not entry.alias and values[path] < 0:
             yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
-    for name, link in mechanism.links.items():
-        yield from _inertia(mechanism, link, values, f"links.{name}")
-    for name in mechanism.effective_joints:
-        yield from _joint(mechanism, name, numbers)
-        yield from play_values(mechanism, name, numbers)
-    for name in mechanism.drivers:
-        yield from _driver(mechanism, name, values)
-    yield from error_sizes(numbers)
-    yield from gear_values(mechanism, values)
-    yield from table_values(mechanism, values)
-    yield from spring_values(mechanism, values)
-    yield from pitch_values(mechanism, values)
-    yield from _directions(mechanism, values)
-    yield from direction_values(mechanism, values)
-    yield from _sides(mechanism, values)
 
 
 NOT_NEGATIVE = frozenset(

@@ -166,7 +166,9 @@ class Points:
         own, meant = run.values, self._values([index])
         if own.keys() != meant.keys() or run.system.plan.formula != self.run.system.plan.formula:
             return False
-        same = all(np.array_equal(own[path], np.ravel(value)[0], equal_nan=True) for path, value in meant.items())
+        same = all(
+            own[path] == value or np.array_equal(own[path], np.ravel(value)[0], True) for path, value in meant.items()
+        )
         left_open = [[(one.where, one.what) for one in each.determinacy.findings()] if each.determinacy else []
                      for each in (run, self.run)]  # fmt: skip
         if not same or left_open[0] != left_open[1]:
@@ -238,10 +240,14 @@ class Points:
         """MechanismError where the numbers of a point are none that a mechanism can have."""
         mechanism = self.run.system.mechanism
         numbers: ParameterSet = copy.copy(mechanism.parameter_set)
+        # the first point is a mechanism, and so sound
+        changed = {path: value for path, value in values.items() if value is not self.run.values.get(path)}
+        numbers.nominal = {path: _nth(value, 0) for path, value in values.items()}
         for k, index in enumerate(points):
-            numbers.nominal = {path: _nth(value, k) for path, value in values.items()}
+            numbers.nominal.update((path, _nth(value, k)) for path, value in changed.items())
             with named(self.swept, index), np.errstate(all="ignore"):
-                wrong = [one for one in check_values(mechanism, numbers) if one.severity is Severity.ERROR]
+                found = check_values(mechanism, numbers, changed)
+                wrong = [one for one in found if one.severity is Severity.ERROR]
                 if wrong:
                     raise MechanismError(wrong)
 

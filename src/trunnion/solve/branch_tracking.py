@@ -50,6 +50,9 @@ SEED = 20060704  # of the guesses: the same assemblies every time
 TURN_JUMP = 0.35  # rad between neighbours of the grid: more is another branch
 SLIDE_JUMP = 0.25  # of the group's size, likewise
 BLOCK = 32  # grid points tried at a time
+STRIDE = 24  # grid points from one to the next that is followed first
+WIDE = 6  # of these at a time
+LONGEST = 1440  # grid points solved at once
 NEAR_LIMIT = 24  # more rounds of Newton from a guess nearby: halving a step brings it to 1e-7 where branches meet
 HALVINGS = 5  # of the way between two grid points, where Newton strays
 
@@ -67,6 +70,22 @@ def _gap_backward(rows: Array) -> list[int]:
     if np.all(np.isfinite(rows[0])) or not np.isfinite(rows[0, -1]):
         return []
     return list(range(rows.shape[1] - 1, -1, -1))
+
+
+def _unknown(rows: Array, order: Sequence[int], place: int) -> Sequence[int]:
+    """The grid points along `order` from a known one on to the last before one that is known, or of LONGEST."""
+    piece = order[place : place + LONGEST]
+    there = np.flatnonzero(np.isfinite(rows[0, piece[1:]]))
+    return piece[: 1 + there[0]] if len(there) else piece
+
+
+def _through(known: Array, places: Array) -> Array:
+    """Between columns of numbers, at places counted in columns: cubic, with the slopes of the neighbours."""
+    slopes = np.gradient(known, axis=1)
+    low = np.minimum(places.astype(np.intp), known.shape[1] - 2)
+    s = places - low
+    ends = known[:, low] * (1 + 2 * s) * (1 - s) ** 2 + known[:, low + 1] * s**2 * (3 - 2 * s)
+    return np.asarray(ends + slopes[:, low] * s * (1 - s) ** 2 + slopes[:, low + 1] * s**2 * (s - 1))
 
 
 def _probes(gaps: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -166,27 +185,32 @@ class Follower:
         Several grid points are tried at a time, all lanes in parallel, and kept as far as they follow smoothly.
         """
         slope = np.zeros(len(rows))
-        block, place = 1, 0
+        block, place, leaps = 1, 0, False
         while place + 1 < len(order):
             here, ahead = order[place], list(order[place + 1 : place + 1 + block])
             if np.isfinite(rows[0, ahead[0]]):
                 slope = rows[:, ahead[0]] - rows[:, here]
                 place += 1
                 continue
-            if len(ahead) == 1:
+            if leaps and len(piece := _unknown(rows, order, place)) > 2 * STRIDE:
+                ahead = list(piece[1:])
+                found = self._leap(rows[:, here], slope, piece)
+                leaps = found.shape[1] == len(ahead)
+            elif len(ahead) == 1:
                 alone = self._advance(rows[:, here], slope, here, ahead[0], 0, 1 << HALVINGS)
                 if alone is None:
                     return
-                found = alone[:, None]
+                found, leaps = alone[:, None], place == 0
             else:
-                found = self._block(rows[:, here], slope, ahead)
+                guess = rows[:, here, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
+                found = self._followed(rows[:, here], np.asarray(ahead), guess)
             kept = found.shape[1]
             if kept:
                 rows[:, ahead[:kept]] = found
                 before = rows[:, ahead[kept - 2]] if kept > 1 else rows[:, here]
                 slope = found[:, -1] - before
             place += kept
-            block = min(2 * block, BLOCK) if kept == len(ahead) else max(1, kept)
+            block = min(2 * block, BLOCK) if kept == len(ahead) else max(1, min(kept, BLOCK))
 
     def both_ways(self, rows: Array, begin: int, periodic: bool) -> None:
         """Follow from one grid point forward and back, and over the end of a periodic cycle."""
@@ -263,23 +287,47 @@ class Follower:
         size = np.where(kinds == "slide", extent(self.group, self.elements), 1.0)
         return np.asarray(np.sum(np.where(kinds == "turn", turned, change / size) ** 2, axis=0))
 
-    def _block(self, q: Array, slope: Array, ahead: Sequence[int]) -> Array:
-        """Coordinates (free, k) at the first k points of `ahead`, k as far as they follow q smoothly.
+    def _leap(self, q: Array, slope: Array, piece: Sequence[int]) -> Array:
+        """Coordinates (free, k) at the first k points of a piece after its first, where they are q and change by slope.
+
+        Some far apart are followed first, then all are solved at once from what lies between these. They are kept by
+        the same test as those of a block: where the wide steps went astray, narrow ones find the way.
+        """
+        wide = np.asarray(piece[::STRIDE])
+        found, change = q[:, None], STRIDE * slope[:, None]
+        while found.shape[1] < len(wide):
+            ahead = wide[found.shape[1] : found.shape[1] + WIDE]
+            more, good, _ = self._at(ahead, found[:, -1:] + change * np.arange(1, len(ahead) + 1))
+            kept = len(ahead) if good.all() else int(np.argmin(good))
+            if not kept:
+                break
+            found = np.append(found, more[:, :kept], axis=1)
+            change = found[:, -1:] - found[:, -2:-1]
+        if found.shape[1] < 3:
+            return found[:, :0]
+        inside = np.asarray(piece[1 : 1 + STRIDE * (found.shape[1] - 1)])
+        return self._followed(q, inside, _through(found, np.arange(1, len(inside) + 1) / STRIDE))
+
+    def _followed(self, q: Array, ahead: NDArray[np.intp], guess: Array) -> Array:
+        """Coordinates (free, k) at the first k of some grid points, k as far as they follow q smoothly."""
+        found, good, size = self._at(ahead, guess)
+        change = np.diff(found, axis=1, prepend=q[:, None])
+        bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
+        limits = self._limits(size)[:, None]
+        good = good & np.all((np.abs(change) <= limits) & (bend <= limits / 4), axis=0)
+        return found[:, : len(ahead) if good.all() else int(np.argmin(good))]
+
+    def _at(self, places: NDArray[np.intp], guess: Array) -> tuple[Array, NDArray[np.bool_], float]:
+        """Coordinates (free, place) at some grid points, where they are of the right sense, and the size there.
 
         Points that a few rounds do not settle are left to a shorter block, in the end to `_advance`: past the end of a
         branch Newton wanders as long as it is let.
         """
-        guess = q[:, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
-        indices = np.asarray(ahead)
-        elements = at(self.elements, indices)
-        pose = self.group.position(elements, list(guess), self._drive_at(indices), late=0)
-        found = np.array([np.broadcast_to(pose.q[i], indices.shape) for i in self.group.kept])
-        change = np.diff(found, axis=1, prepend=q[:, None])
-        bend = np.abs(np.diff(change, axis=1, prepend=change[:, :1]))
-        limits = self._limits(extent(self.group, elements))[:, None]
-        good = np.all((np.abs(change) <= limits) & (bend <= limits / 4), axis=0)
-        good = good & (np.broadcast_to(pose.orientation, indices.shape) == self.orientation)
-        return found[:, : len(ahead) if good.all() else int(np.argmin(good))]
+        elements = at(self.elements, places)
+        pose = self.group.position(elements, list(guess), self._drive_at(places), late=0)
+        found = np.array([np.broadcast_to(pose.q[i], places.shape) for i in self.group.kept])
+        good = np.broadcast_to(pose.orientation, places.shape) == self.orientation
+        return found, good, extent(self.group, elements)
 
     def _limits(self, size: float) -> Array:
         """Largest change of each free coordinate between neighbours of the grid, rad or m."""

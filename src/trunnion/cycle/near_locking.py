@@ -308,9 +308,16 @@ def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: S
     first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
     critical: dict[str, float] = {}
     if first is not None:
-        at = critical_multiples(run.solve(time[[first]], method=plain), method.margin_up_to)
-        critical = {joint: float(multiple[0]) for joint, multiple in at.items()}
+        worst, most = time[[first]], method.margin_up_to
+        key = "critical", float(worst[0]), plain, most
+        critical = run.once(key, lambda: _critical(run, worst, plain, most))
     return Locking(times, locked, first, critical, more, behind)
+
+
+def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dict[str, float]:
+    """The critical multiples of the joints at one time."""
+    at = critical_multiples(run.solve(time, method=method), most)
+    return {joint: float(multiple[0]) for joint, multiple in at.items()}
 
 
 def _both_ways(

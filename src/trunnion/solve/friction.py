@@ -423,7 +423,7 @@ def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
 
 def _depth(problem: FrictionProblem) -> int:
     """Levels of ε among the inputs: each costs one Newton step at the solution."""
-    return max((n.depth for n in problem.numbers() if isinstance(n, Dual)), default=0)
+    return max((n.depth for n in problem.numbers if isinstance(n, Dual)), default=0)
 
 
 def _primal(problem: FrictionProblem) -> FrictionProblem:

@@ -100,6 +100,7 @@ class FrictionProblem:
         contacts = [contact.mapped(change) for contact in self.contacts]
         return FrictionProblem(contacts, each(self.start), [each(column) for column in self.influence])
 
+    @cached_property
     def numbers(self) -> list[Number]:
         """All numbers of the problem."""
         found: list[Number] = []
@@ -113,14 +114,14 @@ class FrictionProblem:
 
     def picked(self, lanes: Number) -> tuple[FrictionProblem, NDArray[np.bool_]]:
         """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""
-        shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers()))
+        shape = np.broadcast_shapes(np.shape(lanes), *(np.shape(number) for number in self.numbers))
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
     @cached_property
     def compiled(self) -> bool:
         """Whether its numbers have no values yet."""
-        return compiled(self.numbers())
+        return compiled(self.numbers)
 
     @cached_property
     def felt(self) -> list[Felt]:

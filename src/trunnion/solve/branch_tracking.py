@@ -172,12 +172,13 @@ class Ways(NamedTuple):
 
 @dataclass(frozen=True)
 class Follower:
-    """Follows one assembly of a general group from grid point to grid point."""
+    """Follows one assembly of a general group from grid point to grid point. leaps: whether wide steps are tried."""
 
     group: Followed
     elements: Elements
     drive: Sequence[Number]
     orientation: float
+    leaps: bool = True
 
     def run(self, rows: Array, order: Sequence[int]) -> None:
         """Fill `rows` (free, grid) along `order`, whose first column is known, up to where the branch ends.
@@ -200,7 +201,7 @@ class Follower:
                 alone = self._advance(rows[:, here], slope, here, ahead[0], 0, 1 << HALVINGS)
                 if alone is None:
                     return
-                found, leaps = alone[:, None], place == 0
+                found, leaps = alone[:, None], self.leaps and place == 0
             else:
                 guess = rows[:, here, None] + slope[:, None] * np.arange(1, len(ahead) + 1)
                 found = self._followed(rows[:, here], np.asarray(ahead), guess)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -339,6 +339,11 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     rows[:, begin] = [found.q[i][best] for i in group.kept]
     follower = Follower(group, elements, drive, orientation)
     follower.both_ways(rows, begin, periodic)
+    if getattr(group, "spinning", ()) and not np.all(np.isfinite(rows)):
+        # what such a link has spun up to where it is first assembled hangs on the steps back to there: they stay narrow
+        follower = replace(follower, leaps=False)
+        rows[:, np.arange(grid) != begin] = np.nan
+        follower.both_ways(rows, begin, periodic)
     again = follower.revisit(rows, periodic)
     if isinstance(group, SpatialGroup):
         rows = unspun(group, elements, rows, drive)

@@ -190,7 +190,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             if isinstance(assembly, Track) and len(assembly.again):
                 findings.append(_anew(module, system.dial(values, times), assembly.again))
             pose = pose_of(walk, number, assembly, times)
-            walk.take(number, pose, times)
+            walk.stand(number, pose)  # an assembly is a matter of places
             if module.rank > 1 and group.BRANCHES:
                 meeting = change_points.find(walk, number, assembly, times, pose)
                 findings += [change_points.finding(system, values, module, meeting)] if meeting else []

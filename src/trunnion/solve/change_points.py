@@ -51,7 +51,7 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
     def margin_at(moment: float) -> float:
         trial = start(walk.system, walk.values)
         for earlier in range(number):
-            trial.take(earlier, pose_of(trial, earlier, walk.assembly[earlier], moment), moment)
+            trial.stand(earlier, pose_of(trial, earlier, walk.assembly[earlier], moment))
         found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
         return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
 

@@ -217,6 +217,13 @@ class Forward(ABC):
             self.motions[link] = Motion(frame, twist, second)
         self.poses.append(pose)
 
+    def stand(self, number: int, pose: Any) -> None:
+        """Add the places of one module, whose pose is known, and leave its links at rest."""
+        ground = self.motions[self.system.mechanism.fixed_link]
+        for link, frame in zip(self.system.plan.modules[number].links, pose.frames, strict=True):
+            self.motions[link] = ground._replace(frame=frame)
+        self.poses.append(pose)
+
     # ---- what the plane and space say of a joint, a module, a link ---------------------------------------------
 
     @abstractmethod
@@ -337,13 +344,9 @@ def posed(system: System, values: Values, assembly: Assembly, time: Number) -> F
     """The walk of `forward` for what the places alone decide: every link is left at rest."""
     walk = start(system, values)
     walk.time = time
-    ground = walk.motions[system.mechanism.fixed_link]
     with np.errstate(all="ignore"):
-        for number, module in enumerate(system.plan.modules):
-            pose = pose_of(walk, number, assembly[number], time)
-            for link, frame in zip(module.links, pose.frames, strict=True):
-                walk.motions[link] = ground._replace(frame=frame)
-            walk.poses.append(pose)
+        for number in range(len(system.plan.modules)):
+            walk.stand(number, pose_of(walk, number, assembly[number], time))
     return walk
 
 

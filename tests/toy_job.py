@@ -88,6 +88,8 @@ class ToyJob:
     def prepare(self) -> ToyPrepared:
         if self.fault == "prepare":
             raise MechanismError(Finding("no such link", "links.x", "name one"))
+        if self.fault == "deaf":  # as a process that is told to end before it has begun
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
         return ToyPrepared(self)
 
 

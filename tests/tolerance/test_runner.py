@@ -17,6 +17,7 @@ from toy_job import ToyJob
 from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import MechanismError
 from trunnion.errors import Finding, Severity
+from trunnion.studies.tolerance import processes
 from trunnion.studies.tolerance.checkpoint import Checkpoint
 from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count, gaps, union
 from trunnion.studies.tolerance.runner import run
@@ -43,6 +44,13 @@ def test_same_bits_for_any_workers_and_portions(jobs: int, chunk: int | None) ->
 def test_a_killed_worker_costs_time_only(tmp_path: Path) -> None:
     done = run(ToyJob(fatal=17, folder=tmp_path), jobs=2, chunk=1500)
     assert (tmp_path / "perished").exists()
+    assert done.tally.bits() == run(ToyJob()).tally.bits()
+
+
+@POSIX
+def test_a_worker_that_outlives_its_pool_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "GRACE", 0.2)
+    done = run(ToyJob(fatal=17, folder=tmp_path, fault="deaf"), jobs=2, chunk=1500)
     assert done.tally.bits() == run(ToyJob()).tally.bits()
 
 

@@ -28,6 +28,7 @@ __all__ = ["DEATHS", "PAUSE", "Interruption", "Processes", "deadly", "unheard"]
 
 A = TypeVar("A")
 DEATHS = 3  # so often a range may end its worker before it is blamed
+GRACE = 5.0  # s; a pool that is broken terminates its workers, but one that has hardly begun may not hear it
 PAUSE = 0.5  # s; Windows hears Ctrl-C only between two waits
 _given: list[bytes] = []  # in a worker: the job
 
@@ -115,9 +116,14 @@ class Processes(Generic[T]):
 
     def _replace(self, lost: Sequence[Blocks]) -> None:
         """Another pool for one whose worker died; the blocks that it had are remembered and done again."""
-        self._pool.shutdown()
         self._under_way.clear()
+        for one in self._processes:
+            one.join(GRACE)
         how = self._end()
+        for one in self._processes:
+            if one.is_alive():
+                one.kill()  # else the pool would wait for it without end
+        self._pool.shutdown()
         if self._born.exception() is not None:
             self._stillborn += 1
             if self._stillborn >= DEATHS:

@@ -171,3 +171,32 @@ def test_samples_are_the_same_by_any_number_of_threads() -> None:
     assert {"engine", "mean", "histogram"} <= {*one.attrs, *one.data_vars}
     for name, variable in one.data_vars.items():
         np.testing.assert_array_equal(variable.values, other[name].values, err_msg=str(name))
+
+
+@pytest.mark.parametrize(
+    ("example", "over", "margin"),
+    [
+        (
+            "durango-fourbar",
+            {"AB": ("0.9 m", "1.1 m", 3), "joint_defaults.friction.coefficient": ("0.05", "0.2", 2)},
+            False,
+        ),
+        ("slider-crank", {"joint_defaults.friction.coefficient": ("0.05", "0.3", 4)}, True),
+        pytest.param("pezzuti-cardan", {"misalignment": ("10 deg", "30 deg", 3)}, True, marks=pytest.mark.slow),
+        pytest.param("fourbar-by-grades", {"l1": ("99 mm", "101 mm", 3)}, False, marks=pytest.mark.slow),
+    ],
+)
+def test_a_sweep_has_the_figures_of_numpy(example: str, over: dict[str, Any], margin: bool) -> None:
+    mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
+    one, other = (
+        trunnion.sweep(mechanism, over, steps=90, margin=margin, engine=engine) for engine in ("numpy", "compiled")
+    )
+    for name, variable in one.data_vars.items():
+        a, b = variable.values, other[name].values
+        if a.dtype.kind != "f" or name == "efficiency_error":  # what rounding does to an integral
+            continue
+        np.testing.assert_array_equal(np.isfinite(a), np.isfinite(b), err_msg=str(name))
+        known = np.isfinite(a)
+        most = (MARGINS if name == "locking_margin" else AGREE) * np.max(np.abs(a[known]), initial=0.0)
+        assert np.all(np.abs(a[known] - b[known]) <= most), name
+    np.testing.assert_array_equal(one["status"], other["status"])

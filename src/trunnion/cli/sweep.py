@@ -66,6 +66,7 @@ Family = Annotated[
 ]
 Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two swept values.")]
 Margin = Annotated[bool, typer.Option("--margin", help="Compute the locking margin too; takes many times as long.")]
+Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
 Picture = Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of figures.")]
 
 
@@ -87,6 +88,7 @@ def sweep(
     units_row: UnitsRow = False,
     units: Units = TableUnits.si,
     uncut: Uncut = False,
+    engine: Engine = "auto",
 ) -> None:
     """Results over a range of model values: tables, curves, maps.
 
@@ -103,7 +105,7 @@ def sweep(
     own = check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
         margin = margin or "locking_margin" in measures
-        result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own)
+        result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own, engine=engine)
     folders = {path.parent for path in files if path not in (out or [])}
     for one in sorted(folders):
         folder(one)

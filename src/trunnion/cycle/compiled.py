@@ -56,7 +56,7 @@ class CycleKernel:
     """
 
     def __init__(self, run: Run, values: Values, arrays: Arrays, write: Write, method: FrictionMethod) -> None:
-        self._write, self._arrays, self._values = write, arrays, values
+        self._write, self._arrays = write, arrays
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
             numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
@@ -72,17 +72,24 @@ class CycleKernel:
         )
         self._kernel.check(values)
 
-    def fill(self, arrays: Arrays, time: NDArray[np.float64]) -> NDArray[np.intp]:
-        """Fill arrays at these times, s; returns the positions that NumPy has to decide."""
-        doubtful, curves = np.empty((1, len(time)), bool), {}
+    def fill(
+        self, arrays: Arrays, values: Values, time: NDArray[np.float64]
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Fill arrays, (…, position) or (…, mechanism, position), at these times, s.
+
+        Returns the mechanisms and positions that NumPy has to decide.
+        """
+        shape = arrays["status"].shape if arrays["status"].ndim == 2 else (1, *arrays["status"].shape)
+        doubtful, curves = np.empty(shape, bool), {}
         for name, (variable, place) in self._names.items():
             whole = arrays[variable].dtype != float
-            curves[name] = np.empty((1, len(time))) if whole else arrays[variable][place][None, :]
-        self._kernel.fill(self._values, time, Lanes(curves, arrays["status"][None, :], doubtful))
+            curves[name] = np.empty(shape) if whole else arrays[variable][place].reshape(shape)
+        self._kernel.fill(values, time, Lanes(curves, arrays["status"].reshape(shape), doubtful))
         for name, (variable, place) in self._names.items():
             if arrays[variable].dtype != float:
-                arrays[variable][place] = curves[name][0]
-        return np.flatnonzero(doubtful[0])
+                arrays[variable][place] = curves[name].reshape(arrays["status"].shape)
+        rows, columns = np.nonzero(doubtful)
+        return rows, columns
 
     def _wanted(self, cell: Cell, number: Number) -> bool:
         """Whether a cell is read, and not 0 whatever the values are, as the arrays are before."""

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.namespace import Number
 from trunnion.algebra.quadrature import Effort
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
-from trunnion.cycle.fill import Into, fill_power
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.unanswered import blank
+from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers, write
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
@@ -26,20 +24,17 @@ from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.seating import settle
 from trunnion.solve.switches import Mechanisms
-from trunnion.solve.system import System
 
 if TYPE_CHECKING:
     pass
 from trunnion.cycle.variables import fill_of
 from trunnion.solve.run import Run
-from trunnion.solve.status import status_of
 
-__all__ = ["Arrays", "Positions", "filled", "positions"]
+__all__ = ["IDEAL", "Arrays", "Positions", "positions"]
 
 
 MOST_STEPS = 100_000_000
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
-Arrays = dict[str, NDArray[np.float64]]
 
 
 def check_steps(steps: int) -> None:
@@ -95,7 +90,7 @@ def positions(
         if run.erring:
             _fill_as_built(arrays, ideal, run, time, window, method, causes)
         else:
-            _fill(arrays, run.solve(time[window], method=method), time[window], window, causes)
+            fill_chunk(arrays, run.solve(time[window], method=method), time[window], window, causes)
         if progress:
             progress(window.stop)
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
@@ -138,8 +133,11 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
 
 def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:
     """What means are made of, (…, lane, node), from a walk at all these times in a row."""
-    arrays, _ = filled(back, None, time.ravel(), (1, time.size), AVERAGED)
-    return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
+    system = back.walk.system
+    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
+    arrays = results.allocate(labels, time.size, absent, wanted={*AVERAGED, "status"})
+    fill_chunk(arrays, back, time.ravel(), slice(None))
+    return {name: arrays[name].reshape(*arrays[name].shape[:-1], *time.shape) for name in AVERAGED}
 
 
 def _refuse_seats(run: Run) -> None:
@@ -173,7 +171,7 @@ def _fill_as_built(
         labels, len(seen.times), fill_of(run.system).absent(run.system), wanted={*IDEAL, *COMPARED}
     )
     meant = run.ideal(seen.times, quick)
-    _fill(scratch, meant, seen.times, slice(0, len(seen.times)))
+    fill_chunk(scratch, meant, seen.times, slice(0, len(seen.times)))
     own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
     scratch = {name: array[..., own] for name, array in scratch.items()}
     for name, array in ideal.items():
@@ -181,69 +179,14 @@ def _fill_as_built(
     if run.seats:
         seated = settle(run, seen, method, meant)
         causes.note_seats(seated.offsets, seated.sticks, window.start)
-        _fill(arrays, seated.back, part, window, causes)
+        fill_chunk(arrays, seated.back, part, window, causes)
         fill_seats(arrays, run.seats, seated, window)
         status = arrays["status"][window]
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     else:
-        _fill(arrays, run.solve(part, method=method), part, window, causes)
-    fill_errors(arrays, scratch, _link_numbers(run.system), window)
+        fill_chunk(arrays, run.solve(part, method=method), part, window, causes)
+    fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
-
-
-def filled(
-    back: Backward,
-    meant: Backward | None,
-    time: NDArray[np.float64],
-    shape: tuple[int, int],
-    wanted: Collection[str],
-) -> tuple[Arrays, Arrays]:
-    """Variables of `results` by name, (…, mechanism, position), of one walk over many mechanisms; the same of `meant`.
-
-    meant: the walk of the mechanisms without errors, if any has some; the first arrays then hold the differences too.
-    time: (mechanism, position) or (position,), s; wanted: what will be read, of the rest there is nothing.
-    """
-    system, everything = back.walk.system, slice(None)
-    if meant is None:
-        arrays = _of_many(system, shape, {*wanted, "status"}, [])
-        _fill(arrays, back, time, everything)
-        return arrays, {}
-    arrays, ideal = (_of_many(system, shape, {*wanted, *IDEAL, *COMPARED}, ["errors"]) for _ in range(2))
-    _fill(arrays, back, time, everything)
-    _fill(ideal, meant, time, everything)
-    fill_errors(arrays, ideal, _link_numbers(system), everything)
-    blank(arrays, arrays["status"].astype(np.int8), everything)
-    return arrays, ideal
-
-
-def _of_many(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
-    """Arrays to be filled, (…, mechanism, position)."""
-    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-    flat = results.allocate(labels, shape[0] * shape[1], absent, parts, wanted)
-    return {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
-
-
-def _link_numbers(system: System) -> list[tuple[int, int]]:
-    """Numbers of the links of every joint."""
-    links = fill_of(system).labels(system)["link"]
-    return [(links.index(first), links.index(second)) for _, (first, second) in system.joints.values()]
-
-
-def _fill(
-    arrays: Arrays,
-    back: Backward,
-    time: NDArray[np.float64],
-    window: slice,
-    causes: diagnosis.Causes | None = None,
-) -> None:
-    """Write one chunk into the result; what a status rules out becomes NaN."""
-    status = status_of(back, arrays["status"][window].shape)
-    arrays["status"][window] = status
-    if causes:
-        causes.note(back, status, np.arange(window.start, window.stop))
-    with np.errstate(all="ignore"):
-        _write(arrays, back, time, window)
-    blank(arrays, status, window)
 
 
 def _fill_compiled(
@@ -257,20 +200,20 @@ def _fill_compiled(
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
     try:
-        own = CycleKernel(run, run.values, arrays, _write, method)
+        own = CycleKernel(run, run.values, arrays, write, method)
     except MechanismError:
         if or_not:
             return False
         raise
-    _fill_rest(arrays, own.fill(arrays, time), run.solve, time, method, causes)
+    _fill_rest(arrays, own.fill(arrays, run.values, time)[1], run.solve, time, method, causes)
     if run.erring:
         quick, system = replace(method, margin_up_to=0.0), run.system
         labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
         meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
-        other = CycleKernel(run, run.ideal_values, meant, _write, quick)
-        _fill_rest(meant, other.fill(meant, time), run.ideal, time, quick)
+        other = CycleKernel(run, run.ideal_values, meant, write, quick)
+        _fill_rest(meant, other.fill(meant, run.ideal_values, time)[1], run.ideal, time, quick)
         ideal |= {name: meant[name] for name in ideal}
-        fill_errors(arrays, meant, _link_numbers(system), slice(None))
+        fill_errors(arrays, meant, link_numbers(system), slice(None))
         blank(arrays, arrays["status"].astype(np.int8), slice(None))
     return True
 
@@ -286,41 +229,4 @@ def _fill_rest(
     """Those positions that the compiled engine leaves to NumPy."""
     for low in range(0, len(left), CHUNK):
         lanes = left[low : low + CHUNK]
-        _fill_lanes(arrays, solve(time[lanes], method=method), time[lanes], lanes, causes)
-
-
-def _fill_lanes(
-    arrays: Arrays, back: Backward, time: NDArray[np.float64], lanes: NDArray[np.intp], causes: diagnosis.Causes | None
-) -> None:
-    """The same of some positions, wherever they are."""
-    there = {name: array for name, array in arrays.items() if array.flags.writeable and array.strides[-1]}
-    some = {name: array[..., lanes] for name, array in arrays.items()}
-    some |= {name: some[other] for name, other in results.SAME_AS.items()}
-    _fill(some, back, time, slice(0, len(lanes)))
-    if causes:
-        causes.note(back, some["status"].astype(np.int8), lanes)
-    for name, array in there.items():
-        array[..., lanes] = some[name]
-
-
-def _write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
-    """Every variable but the status, of one walk."""
-    fill = fill_of(back.walk.system)
-    fill.motion(arrays, back, window)
-    fill.forces(arrays, back, window)
-    _fill_settled(arrays, back, window)
-    fill_power(arrays, back, time, window)
-
-
-def _fill_settled(arrays: Into, back: Backward, window: slice) -> None:
-    """Figures of the friction iteration."""
-    settled = back.settled
-    for key, field in (
-        ("friction_iterations", "iterations"),
-        ("friction_change", "change"),
-        ("friction_residual", "residual"),
-        ("friction_contraction", "contraction"),
-    ):
-        worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
-        arrays[key][window] = worst
-    arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)
+        fill_lanes(arrays, solve(time[lanes], method=method), time[lanes], (lanes,), causes)

@@ -34,7 +34,7 @@ from trunnion.solve.status import (
 )
 from trunnion.solve.system import Values, law_of, rubbing
 
-__all__ = ["Array", "CompiledKernel", "Figure", "Lanes"]
+__all__ = ["Array", "CompiledKernel", "Figure", "Lanes", "lanes_of"]
 
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
@@ -139,7 +139,7 @@ class CompiledKernel(ABC):
         self.again += len(rows)
         for low in range(0, len(rows), CHUNK):
             row, column = rows[low : low + CHUNK], columns[low : low + CHUNK]
-            part = {path: _lanes(value, row) for path, value in values.items()}
+            part = {path: lanes_of(value, row) for path, value in values.items()}
             times = time[column] if time.ndim == 1 else time[row, column]
             back = self.by_numpy(part, times)
             with np.errstate(all="ignore"):
@@ -149,7 +149,7 @@ class CompiledKernel(ABC):
                     found.curves[name][row, column] = figure(back)
 
 
-def _lanes(value: Number, rows: NDArray[np.intp]) -> Number:
+def lanes_of(value: Number, rows: NDArray[np.intp]) -> Number:
     """The number in some samples, one after the other."""
     if not np.ndim(value):
         return value

@@ -20,22 +20,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.cycle.many import Many
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
-from trunnion.cycle.positions import check_steps, filled, positions
+from trunnion.cycle.positions import check_steps, positions
 from trunnion.cycle.summary import model_notes
+from trunnion.cycle.written import CONDITIONS
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import figures_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
 from trunnion.solve import change_points
-from trunnion.solve.backward import Backward
 from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.hints import distance, hints, named_way
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms
-from trunnion.solve.system import Cycle, law_of, rubbing
+from trunnion.solve.system import Cycle, System, law_of, rubbing
 from trunnion.studies.sweep.figures import Reduced, reduced
 from trunnion.studies.sweep.grid import Swept, named
 from trunnion.studies.sweep.measures import measures_of
@@ -43,6 +44,9 @@ from trunnion.studies.sweep.measures import measures_of
 __all__ = ["Points"]
 
 AT_ONCE = 10_000  # numbers in an array, which then stays in cache
+COMPILED_AT_ONCE = 1 << 18
+OF_MEANS = 1000  # positions of each point that its means take, about
+OF_MARGIN = 20  # times as long a position takes with the locking margin
 FEWEST = 24  # positions on which a change point between them shows
 PROBES = 24  # values of a name at which a mechanism of its own is looked at
 PROBES_FOLLOWED = 5  # the same with groups that are followed, which takes long
@@ -65,6 +69,7 @@ class Points:
     steps: int
     method: FrictionMethod
     margin: bool = False
+    engine: str = "auto"
 
     def __post_init__(self) -> None:
         check_steps(self.steps)
@@ -72,6 +77,8 @@ class Points:
         self.looked: set[Index] = set()
         self.erring = False
         self.run = self._prepared(tuple(0 for _ in self.swept))
+        each = (self.steps + OF_MEANS) * (OF_MARGIN if self.margin else 1)
+        self._many = Many(self.run, self.engine, int(np.prod(self.shape)) * each)
 
     @property
     def shape(self) -> Index:
@@ -81,7 +88,8 @@ class Points:
         """Figures of every point, in any order."""
         left = list(np.ndindex(self.shape))
         if self._similar:
-            size, later = max(1, AT_ONCE // self.steps), []
+            most = COMPILED_AT_ONCE if self._many.compiled else AT_ONCE
+            size, later = max(1, most // self.steps), []
             for low in range(0, len(left), size):
                 part = left[low : low + size]
                 for index, found in zip(part, self._together(part), strict=True):
@@ -202,10 +210,9 @@ class Points:
         self.erring = self.erring or bool(errs.any())
         with np.errstate(all="ignore"):
             ours = _as_chosen(run, values, len(points))
-            back = run.solve(time, values, method)
-            meant = run.solve(time, ideal_values, self.method) if errs.any() else None
-            arrays, ideal = filled(back, meant, time, shape, WANTED)
-            ours &= ~_may_change(back, shape, run.cycle.periodic)
+            meant = ideal_values if errs.any() else None
+            arrays, ideal = self._many.filled(values, meant, time, shape, WANTED, method, self.method)
+            ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
             means = self._means(values, cycles, ours & _answered(arrays))
@@ -229,9 +236,8 @@ class Points:
 
         def powers(lanes: NDArray[np.intp], time: Array) -> dict[str, Array]:
             with np.errstate(all="ignore"):
-                back = run.solve(of.lanes(time), of.picked(lanes), self.method)
                 shape = (1, time.size) if len(rows) == 1 else time.shape
-                arrays, _ = filled(back, None, of.lanes(time), shape, AVERAGED)
+                arrays = self._many.arrays(of.picked(lanes), of.lanes(time), shape, AVERAGED, self.method)
             return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
 
         return dict(zip(rows.tolist(), means_of(of, powers), strict=True))
@@ -328,13 +334,12 @@ def _every(number: Number) -> Any:
     return number
 
 
-def _may_change(back: Backward, shape: tuple[int, int], periodic: bool) -> NDArray[np.bool_]:
+def _may_change(system: System, conditions: Array, periodic: bool) -> NDArray[np.bool_]:
     """Which mechanisms of a batch may pass a change point: see `change_points.suspects`."""
-    walk = back.walk
-    found = np.zeros(shape[0], bool)
-    for module, group, pose in zip(walk.system.plan.modules, walk.system.groups, walk.poses, strict=True):
+    found = np.zeros(conditions.shape[1], bool)
+    for module, group, condition in zip(system.plan.modules, system.groups, conditions, strict=True):
         if module.rank > 1 and group.BRANCHES:
-            margin = np.broadcast_to(1 / group.condition(pose), shape)
+            margin = 1 / condition
             around = np.concatenate([margin[:, -1:], margin, margin[:, :1]], axis=1) if periodic else margin
             found |= np.any(change_points.suspects(around), axis=-1)
     return found

@@ -44,6 +44,7 @@ def sweep(
     progress: Callable[[int], None] | None = None,
     margin: bool = False,
     measures: Sequence[str] | None = None,
+    engine: str = "auto",
 ) -> xr.Dataset:
     """Figures of the cycle over a grid of some numbers of the mechanism.
 
@@ -54,6 +55,7 @@ def sweep(
     margin: whether the locking margin is looked for as well, which takes many times as long as all else.
     measures: names of the model's, or written as for `play`, each with one figure a cycle: variables of these names;
     none if not given.
+    engine: numpy, compiled (an extra), or auto: compiled where it is installed, pays and can do the mechanism.
     Returns a Dataset with a dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where
     any position of the cycle has no answer they are NaN, but for the locking margin of positions that lock: `status`
     and `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary: positions with a relative
@@ -62,7 +64,7 @@ def sweep(
     Raises MechanismError for a name that is unknown or stands for several numbers, values that the model refuses (at
     any point), none or more than MOST_POINTS of them, or a structure that does not determine the motion.
     """
-    points = Points(mechanism, grid(mechanism, over), steps, friction_method or FrictionMethod(), margin)
+    points = Points(mechanism, grid(mechanism, over), steps, friction_method or FrictionMethod(), margin, engine)
     labels: dict[str, list[str]] = {
         "driver": list(mechanism.drivers),
         "joint": list(mechanism.effective_joints),

@@ -200,3 +200,14 @@ def test_a_sweep_has_the_figures_of_numpy(example: str, over: dict[str, Any], ma
         most = (MARGINS if name == "locking_margin" else AGREE) * np.max(np.abs(a[known]), initial=0.0)
         assert np.all(np.abs(a[known] - b[known]) <= most), name
     np.testing.assert_array_equal(one["status"], other["status"])
+
+
+def test_variance_based_indices_are_those_of_numpy() -> None:
+    mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    one, other = (
+        trunnion.tolerance(mechanism, methods=["sobol"], samples=640, steps=12, engine=engine)
+        for engine in ("numpy", "compiled")
+    )
+    for name in ("first_order", "total_order"):
+        assert np.nanmax(one[name].values) > 0.1
+        np.testing.assert_allclose(one[name], other[name], atol=1e-8)

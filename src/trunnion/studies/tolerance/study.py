@@ -74,7 +74,7 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
-    methods, notes = _known(methods)
+    (methods, notes), stated = _known(methods), engine
     _check(methods, samples, seed, engine, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
@@ -92,7 +92,7 @@ def tolerance(
         tally, stopped = ran.tally, ran.stopped
         notes += [*chosen, *ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
     if "sobol" in methods:
-        own = found.sampling("quasi-monte-carlo", samples, seed)
+        own = found.sampling("quasi-monte-carlo", samples, seed, _engine(found, stated, samples, cluster=None)[0])
         own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
         shares = indices(found.sampler(own), samples, seed)
     return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])

@@ -211,3 +211,42 @@ def test_variance_based_indices_are_those_of_numpy() -> None:
     for name in ("first_order", "total_order"):
         assert np.nanmax(one[name].values) > 0.1
         np.testing.assert_allclose(one[name], other[name], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        trunnion.FrictionMethod("successive-approximation"),
+        trunnion.FrictionMethod(criterion=1e-3),
+        trunnion.FrictionMethod(limit=1),
+    ],
+)
+def test_friction_settled_otherwise_is_left_to_numpy(
+    method: trunnion.FrictionMethod, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A compiled program has its own fixed rounds of Newton's method: it would say converged where NumPy does not."""
+    mechanism = trunnion.read(DURANGO)
+    with pytest.raises(MechanismError) as caught:
+        trunnion.analyse(mechanism, 12, method, engine="compiled")
+    assert caught.value.findings[0].where == "engine"
+    monkeypatch.setattr("trunnion.cycle.compiled.WORTH_COMPILING", 1)
+    found, expected = (
+        positions(prepare(mechanism), 12, method, averaged=False, engine=engine) for engine in ("auto", "numpy")
+    )
+    assert np.array_equal(found.arrays["status"], expected.arrays["status"])
+    assert np.array_equal(found.arrays["friction_change"], expected.arrays["friction_change"], equal_nan=True)
+
+
+def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("trunnion.cycle.compiled.WORTH_COMPILING", 1)
+    mechanism = trunnion.read(EXAMPLES / "bennett.yaml")  # over-constrained
+    one, other = (trunnion.analyse(mechanism, 8, engine=engine) for engine in ("auto", "numpy"))
+    assert np.array_equal(one["reaction_force"], other["reaction_force"], equal_nan=True)
+    path = next(path for path in mechanism.parameters() if path.endswith("speed"))
+    swept = [trunnion.sweep(mechanism, {path: [1.0, 2.0]}, steps=8, engine=engine) for engine in ("auto", "numpy")]
+    assert np.array_equal(swept[0]["drive_effort_max"], swept[1]["drive_effort_max"], equal_nan=True)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 5])
+def test_few_positions(steps: int) -> None:
+    agree(*both(trunnion.read(DURANGO), steps))

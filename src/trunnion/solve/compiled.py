@@ -21,6 +21,7 @@ from trunnion.algebra.traced import UntraceableError
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import forward
+from trunnion.solve.friction import STUBBORN
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
@@ -79,7 +80,7 @@ class CompiledKernel(ABC):
         self.described = described and f"{described} {list(self.figures)}"
         self.again = 0  # lanes that NumPy computed again, so far
         self.prepare()
-        _check(run)
+        _check(run, self.method)
 
     @abstractmethod
     def prepare(self) -> None:
@@ -157,9 +158,12 @@ def lanes_of(value: Number, rows: NDArray[np.intp]) -> Number:
     return flat[rows] if len(flat) > 1 else float(flat[0])
 
 
-def _check(run: Run) -> None:
+def _check(run: Run, method: FrictionMethod) -> None:
     """MechanismError for what only NumPy does."""
     remedy = "use the engine numpy"
+    if method.name != "newton" or method.criterion is not None or method.limit < STUBBORN:
+        what = "friction by successive approximation, or with a criterion or limit of its own, is not compiled"
+        raise MechanismError(Finding(what, "engine", remedy))
     for module in run.system.plan.modules:
         if module.redundant:
             what = f"the links {', '.join(module.links)} are over-constrained, which is solved by least squares"

@@ -250,3 +250,16 @@ def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pyte
 @pytest.mark.parametrize("steps", [1, 2, 5])
 def test_few_positions(steps: int) -> None:
     agree(*both(trunnion.read(DURANGO), steps))
+
+
+def test_mechanisms_with_errors_and_without_go_by_programs_of_their_own() -> None:
+    """Errors that are 0 in the ideal mechanism are none that its program could have left out of the other's."""
+    mechanism = trunnion.read(EXAMPLES / "pezzuti-cardan-as-built.yaml").with_values({"joint_defaults.seat": "free"})
+    agree(*both(mechanism, 40))
+    one, other = (
+        trunnion.sweep(mechanism, {"misalignment": ["10 deg", "20 deg"]}, steps=24, engine=engine)
+        for engine in ("numpy", "compiled")
+    )
+    assert np.nanmax(one["transmission_error_max"].values) > 1e-5
+    for name in ("transmission_error_max", "drive_effort_max", "efficiency", "efficiency_ideal"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)

@@ -17,6 +17,7 @@ from trunnion.cycle.written import CONDITIONS, Arrays, fill_chunk, fill_lanes, l
 from trunnion.errors import MechanismError
 from trunnion.results import variables as results
 from trunnion.solve.compiled import lanes_of
+from trunnion.solve.compiled_vectors import literals
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
@@ -77,7 +78,8 @@ class Many:
     ) -> Arrays:
         """Variables by name, and the condition of every module."""
         arrays = _allocated(self.run.system, shape, {*wanted, "status"}, parts)
-        kernel = self._kernel(arrays, values, method, (frozenset(wanted), tuple(parts), method))
+        known = frozenset(literals(values).items())  # what is 0 with these is left out
+        kernel = self._kernel(arrays, values, method, (frozenset(wanted), tuple(parts), method, known))
         if kernel is None:
             fill_chunk(arrays, self.run.solve(time, values, method), time, slice(None))
             return arrays

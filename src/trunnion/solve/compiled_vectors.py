@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from trunnion.engines.graph import Graph
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = ["VectorKernel"]
+__all__ = ["VectorKernel", "literals"]
 
 PROBE = 4096  # lanes by which one judges whether the rest is worth while
 HOPELESS = 0.5  # share of doubtful lanes from which the rest is left to NumPy
@@ -167,17 +167,26 @@ def _of_lanes(value: Any, samples: NDArray[np.intp]) -> Any:
     return flat[samples][None, :] if len(flat) > 1 else float(flat[0])
 
 
+def literals(values: Values) -> dict[str, Any]:
+    """What is compiled in, by path: texts, and numbers by which kernels save work."""
+    return {
+        path: value
+        for path, value in values.items()
+        if isinstance(value, str) or (not np.ndim(value) and float(value) in STRUCTURAL)
+    }
+
+
 def _inputs(values: Values, time: Array) -> _Inputs:
     """What a program is given."""
     from trunnion.engines.graph import BOTH, POSITION, SAMPLE
 
+    literal = literals(values)
     numbers: dict[str, Array] = {}
-    literal: dict[str, Any] = {}
     differs: dict[str, int] = {}
     for path, value in values.items():
-        if isinstance(value, str) or (not np.ndim(value) and float(value) in STRUCTURAL):
-            literal[path] = value
-        elif np.ndim(value) == 2 and np.shape(value)[1] > 1:
+        if path in literal:
+            continue
+        if np.ndim(value) == 2 and np.shape(value)[1] > 1:
             numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), POSITION
         elif np.size(value) > 1:
             numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), SAMPLE

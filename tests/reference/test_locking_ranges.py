@@ -12,6 +12,7 @@ from mechanisms import eccentric_press
 from mechanisms_parts import Data, revolute
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, ranges
+from trunnion.results.attributes import attribute
 
 ARM, RADIUS, FRICTION = 0.02, 0.012, 0.5
 
@@ -61,6 +62,46 @@ def test_without_friction_every_load_drives_back() -> None:
     assert set(states(found)) <= {LockingState.BACKDRIVABLE, LockingState.RUNS}
     pushed = states(found) == LockingState.BACKDRIVABLE
     np.testing.assert_allclose(found["efficiency_reverse_instant"].values[pushed], 1.0, rtol=1e-9)
+
+
+def spring_hoist(**spring: object) -> Mechanism:
+    """The crank of the hoist, pulled by a spring below its pin instead of the weight."""
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["links"]["ground"]["points"]["Q"] = [0, -0.1]
+    data |= {"loads": {}, "springs": {"s": {"between": ["ground.Q", "crank.P"], **spring}}}
+    return Mechanism(**data)
+
+
+def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
+    """Of a constant pull along the line to Q with the arm d about the pin: backward d − f r of d arrives."""
+    found = locking(spring_hoist(preload=100.0, useful=True), 401)
+    angle = np.radians(found["drive"].values)
+    tip = ARM * np.array([np.cos(angle), np.sin(angle)])
+    pull = np.array([0.0, -0.1])[:, None] - tip
+    arm = -(tip[0] * pull[1] - tip[1] * pull[0]) / np.hypot(*pull)
+    inside = np.where(arm > 0, LockingState.SELF_LOCKING, LockingState.RUNS)
+    np.testing.assert_array_equal(states(found), np.where(arm > FRICTION * RADIUS, LockingState.BACKDRIVABLE, inside))
+    pushed = states(found) != LockingState.RUNS
+    efficiency = found["efficiency_reverse_instant"].values
+    np.testing.assert_allclose(efficiency[pushed], 1 - FRICTION * RADIUS / arm[pushed], rtol=1e-9)
+    np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("spring", "said"),
+    [
+        ({"preload": 100.0}, True),
+        ({"stiffness": 1e4, "free_length": 0.1}, True),
+        ({"stiffness": 1e4, "free_length": 0.1, "useful": True}, False),
+        ({"damping": 50.0}, False),  # it stores nothing
+    ],
+)
+def test_springs_that_store_energy_and_are_not_marked_useful_are_told(spring: dict[str, float], said: bool) -> None:
+    found = locking(spring_hoist(**spring), 40)
+    codes = [row["code"] for row in attribute(found, "findings")]
+    assert ("locking.springs_not_useful" in codes) == said
+    if said:
+        assert set(states(found)) == {LockingState.RUNS}
 
 
 @pytest.mark.parametrize("load", [-40.0, 40.0])

@@ -14,6 +14,7 @@ from trunnion import Mechanism
 from trunnion.algebra.quadrature import Effort, integrals
 from trunnion.cycle.summary import balance
 from trunnion.errors import Status
+from trunnion.measures.measures import named
 from trunnion.results.attributes import summary_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.loads import useful_loads
@@ -264,6 +265,29 @@ def test_useful_work_is_that_of_the_loads_marked_so() -> None:
         np.testing.assert_allclose(result["efficiency_instant"], share, rtol=1e-12)
         np.testing.assert_allclose(result["useful_power"], 40.0 * share, rtol=1e-12)
         np.testing.assert_allclose(result["drive_effort"], 8.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("load", "spring", "share"), [(False, False, 0.6), (True, True, 1.0), (False, True, 0.4),
+                                                       (True, False, 0.6)])  # fmt: skip
+def test_useful_work_of_a_spring_marked_so(load: bool, spring: bool, share: float) -> None:
+    """A shaft against a brake of 6 N m winds up a spring of 4 N m: all loads count only if nothing is marked."""
+    points = {"points": {"A": [0, 0]}}
+    shaft = Mechanism(
+        trunnion=1,
+        links={"ground": points, "shaft": points},
+        joints={"A": {"type": "revolute", "links": ["ground", "shaft"]}},
+        drivers={"A": {"speed": 5.0, "range": [0.0, 1.0]}},
+        loads={"brake": {"joint": "A", "resisting_torque": 6.0, "useful": load}},
+        springs={"spring": {"joint": "A", "preload": 4.0, "useful": spring}},
+    )
+    result = trunnion.analyse(shaft, 12)
+    np.testing.assert_allclose(result["useful_power"], 50.0 * share, rtol=1e-12)
+    np.testing.assert_allclose(result["drive_power"], 50.0, rtol=1e-12)
+    assert float(result["efficiency"]) == pytest.approx(share, rel=1e-12)
+    run = prepare(shaft)
+    (measure,) = named(shaft, ["efficiency:cycle"], run.values)
+    useful, driven = measure.curve(run.solve(np.zeros(1)))
+    np.testing.assert_allclose(useful / driven, share, rtol=1e-12)
 
 
 def test_power_residual_is_told_of_the_peak_power() -> None:

@@ -12,7 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
-from trunnion.solve.loads import useful_loads
+from trunnion.solve.loads import useful_powers
 from trunnion.solve.system import System, Values
 
 __all__ = [
@@ -147,8 +147,8 @@ def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> Non
         arrays["drive_power"][i, window] = power
         driven = driven + power
     useful: Number = 0.0
-    for name in useful_loads(walk.system.mechanism):
-        useful = useful - back.load_powers[name]
+    for power in useful_powers(walk.system.mechanism, back.load_powers, back.springs):
+        useful = useful - power
     arrays["useful_power"][window] = useful
     arrays["efficiency_instant"][window] = useful / np.where(np.greater(driven, 0), driven, np.nan)
     arrays["power_residual"][window] = total + driven

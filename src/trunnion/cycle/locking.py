@@ -25,7 +25,7 @@ from trunnion.results.dataset import Variable, described
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.loads import useful_loads
+from trunnion.solve.loads import useful_springs
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import Dial, rubbing
 
@@ -125,7 +125,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     with np.errstate(all="ignore"):
         multiples = critical_multiples(back, MARGIN)
         more = np.where(status <= Status.LOCKED, others(back), np.nan)
-        other = reverse(run, back.walk, FrictionMethod(), useful_loads(mechanism))
+        other = reverse(run, back.walk, FrictionMethod())
     known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     nothing = np.full(len(time), np.nan)
     efforts = [np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]
@@ -142,10 +142,25 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     }
     found = result.assign(described(arrays, VARIABLES))
     found["locking_state"].attrs.update(codes("flag", LockingState))
-    if not run.seats:
-        return found
-    seated = finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats])
-    return found.assign_attrs(encoded({"findings": [*attribute(found, "findings"), *finding_rows([seated])]}))
+    said = finding_rows(_notes(run, result))
+    return found.assign_attrs(encoded({"findings": [*attribute(found, "findings"), *said]})) if said else found
+
+
+def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
+    """What the states leave out: seats of pins, and springs that store energy and are not marked useful."""
+    notes = []
+    if run.seats:
+        notes.append(finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats]))
+    mechanism = run.system.mechanism
+    if rubbing(run.system) and mechanism.drivers and mechanism.springs and not useful_springs(mechanism):
+        power, lost = result["spring_power"].values, result["damping_power"].values  # without what a damper takes
+        taken = -(power + lost)
+        highest = np.nanmax(np.abs([*power, *result["drive_power"].values]), initial=0.0)
+        storing = np.any(taken > ROUNDING * highest, axis=1)
+        names = [str(name) for name, stores in zip(result["spring"].values, storing, strict=True) if stores]
+        if names:
+            notes.append(finding_for("locking.springs_not_useful", "springs", springs=names, count=len(names)))
+    return notes
 
 
 def _efficiency_reverse(back: Reverse) -> NDArray[np.float64]:
@@ -211,7 +226,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     if np.any(more > 0):
         subject = f"other solutions of the friction equations, {dial.intervals(np.flatnonzero(more > 0))}"
         figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="maximum"))
-    backward = reverse_figure(run, _reverse(found), useful_loads(run.system.mechanism))
+    backward = reverse_figure(run, _reverse(found))
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
 

@@ -24,6 +24,7 @@ from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction import FrictionProblem, frictionless, identity_minus, scaled
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.loads import useful_powers
 from trunnion.solve.system import Dial, law_of
 
 if TYPE_CHECKING:
@@ -187,15 +188,15 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
     return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, place=place)
 
 
-def reverse_figure(run: Run, back: Reverse, useful: Sequence[str]) -> Figure | None:
-    """Power that reaches the drivers over that which the useful loads give, backward; None if these do not drive.
+def reverse_figure(run: Run, back: Reverse) -> Figure | None:
+    """Power that reaches the drivers over that of the useful loads and springs, backward; None if these do not drive.
 
     It locks, or is 0 or less: then it holds itself.
     """
     name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads"
     if run.seats:  # the way back is that of the mechanism without play
         subject += ", pins centred"
-    delivered, given = _reversed_means(run, back, useful)
+    delivered, given = _reversed_means(run, back)
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
@@ -209,7 +210,7 @@ def reverse_figure(run: Run, back: Reverse, useful: Sequence[str]) -> Figure | N
     return Figure(name, subject, value, note="" if value > 0 else "self-locking")
 
 
-def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[float, float]:
+def _reversed_means(run: Run, back: Reverse) -> tuple[float, float]:
     """Mean powers, W, delivered and given, backward, 0 where they cancel; that of the loads is known where it locks."""
     if run.cycle.duration <= 0:
         return float(back.delivered[0]), float(back.given[0])
@@ -217,10 +218,10 @@ def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[flo
         return float("nan"), float(np.mean(back.given))
 
     def powers(rows: NDArray[np.intp], time: Array) -> Array:
-        there = reverse(run, run.walk(time.ravel()), FrictionMethod(), useful)
+        there = reverse(run, run.walk(time.ravel()), FrictionMethod())
         return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
 
-    found = run.once(("back", *useful), lambda: integrals(powers, [run.edges]))
+    found = run.once("back", lambda: integrals(powers, [run.edges]))
     delivered, given = (
         0.0 if abs(value) <= max(error, CANCELLED * size) else value / run.cycle.duration
         for value, error, size in zip(found.value[:, 0], found.error[:, 0], found.size[:, 0], strict=True)
@@ -231,7 +232,7 @@ def _reversed_means(run: Run, back: Reverse, useful: Sequence[str]) -> tuple[flo
 class Reverse(NamedTuple):
     """The same positions passed backward: effort of every driver, where it locks, and what flows where.
 
-    delivered: power that the drivers take out, W; given: power that the useful loads put in, W.
+    delivered: power that the drivers take out, W; given: power that the useful loads and springs put in, W.
     """
 
     efforts: dict[str, Array]
@@ -240,7 +241,7 @@ class Reverse(NamedTuple):
     given: Array
 
 
-def reverse(run: Run, ahead: Forward, method: FrictionMethod, useful: Sequence[str]) -> Reverse:
+def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Reverse:
     """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
     with them; inertia stays, for accelerations do."""
     walk = ahead.backward()
@@ -252,7 +253,8 @@ def reverse(run: Run, ahead: Forward, method: FrictionMethod, useful: Sequence[s
     shape = time.shape
     efforts = {name: np.broadcast_to(effort, shape) for name, effort in other.efforts.items()}
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
-    given = sum((np.broadcast_to(other.load_powers[name], shape) for name in useful), np.zeros(shape))
+    powers = useful_powers(run.system.mechanism, other.load_powers, other.springs)
+    given = sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape))
     return Reverse(efforts, _locks(other), delivered, given)
 
 
@@ -296,15 +298,15 @@ class Locking:
         return [critical_figure(run, *decides, f"at {dial.at(self.first)}")]
 
 
-def look(run: Run, time: Array, margin: Array, method: FrictionMethod, useful: Sequence[str]) -> Locking:
+def look(run: Run, time: Array, margin: Array, method: FrictionMethod) -> Locking:
     """Look at no more than LOOKED times of a cycle. margin: of every position analysed, NaN where unknown."""
     times = run.cycle.times(min(len(time), LOOKED))
     plain = replace(method, name="newton", margin_up_to=0.0)
     if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
         locked, more = np.ones(len(times), bool), np.zeros(len(times))
-        behind = reverse(run, run.walk(times), plain, useful)
+        behind = reverse(run, run.walk(times), plain)
     else:
-        locked, more, behind = run.once(("both ways", len(times), plain), lambda: _both_ways(run, times, plain, useful))
+        locked, more, behind = run.once(("both ways", len(times), plain), lambda: _both_ways(run, times, plain))
     first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
     critical: dict[str, float] = {}
     if first is not None:
@@ -320,12 +322,10 @@ def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dic
     return {joint: float(multiple[0]) for joint, multiple in at.items()}
 
 
-def _both_ways(
-    run: Run, times: Array, method: FrictionMethod, useful: Sequence[str]
-) -> tuple[NDArray[np.bool_], Array, Reverse]:
+def _both_ways(run: Run, times: Array, method: FrictionMethod) -> tuple[NDArray[np.bool_], Array, Reverse]:
     """Where it locks, other solutions, and the way back."""
     back = run.solve(times, method=method)
-    return _locks(back), others(back), reverse(run, back.walk, method, useful)
+    return _locks(back), others(back), reverse(run, back.walk, method)
 
 
 def findings(near: Locking, dial: Dial) -> Iterator[Finding]:

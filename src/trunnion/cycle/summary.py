@@ -252,7 +252,7 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> I
         if found.ideal is not None:
             yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
             yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST)
-        if near and (back := near_locking.reverse_figure(run, near.back, useful_loads(run.system.mechanism))):
+        if near and (back := near_locking.reverse_figure(run, near.back)):
             yield back
         residual = balance(arrays) if np.any(counted) else None
         yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
@@ -329,7 +329,7 @@ def _near_locking(
     if not rubbing(run.system) or not run.system.mechanism.drivers:
         return None
     with np.errstate(all="ignore"):
-        return near_locking.look(run, time, arrays["locking_margin"], method, useful_loads(run.system.mechanism))
+        return near_locking.look(run, time, arrays["locking_margin"], method)
 
 
 def _why(means: Means, arrays: Arrays) -> str:

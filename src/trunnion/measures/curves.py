@@ -20,7 +20,7 @@ from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
-from trunnion.solve.loads import useful_loads
+from trunnion.solve.loads import useful_powers
 from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["CURVES", "Course"]
@@ -160,8 +160,8 @@ def efficiency(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     walk = back.walk
     useful: Number = 0.0
     driven: Number = 0.0
-    for name in useful_loads(walk.system.mechanism):
-        useful = useful - back.load_powers[name]
+    for power_in in useful_powers(walk.system.mechanism, back.load_powers, back.springs):
+        useful = useful - power_in
     for name in walk.system.mechanism.drivers:
         driven = driven + back.efforts[name] * walk.rate(name)
     if measure.subject == "cycle":

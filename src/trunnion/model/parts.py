@@ -269,6 +269,7 @@ class Spring(Part):
     damping: Damping | None = None
     preload: ForceOrMoment | None = None
     only: Literal["pull", "push"] | None = None
+    useful: bool = False
 
 
 class Gear(Part):

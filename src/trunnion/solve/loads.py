@@ -28,6 +28,8 @@ __all__ = [
     "springs",
     "stated_loads",
     "useful_loads",
+    "useful_powers",
+    "useful_springs",
 ]
 
 
@@ -264,6 +266,19 @@ def spring_state(walk: Forward, path: str, elongation: Number, rate: Number, onl
 
 
 def useful_loads(mechanism: Mechanism) -> list[str]:
-    """Loads whose power is the purpose: those marked useful, or all if none is."""
+    """Loads whose power is the purpose: those marked useful, or all if neither a load nor a spring is."""
     marked = [name for name, load in mechanism.loads.items() if load.useful]
-    return marked or list(mechanism.loads)
+    return marked if marked or useful_springs(mechanism) else list(mechanism.loads)
+
+
+def useful_springs(mechanism: Mechanism) -> list[str]:
+    """Springs whose power is the purpose: those marked useful."""
+    return [name for name, spring in mechanism.springs.items() if spring.useful]
+
+
+def useful_powers(
+    mechanism: Mechanism, loads: Mapping[str, Number], springs_: Mapping[str, SpringState]
+) -> Iterator[Number]:
+    """What each useful load and spring gives the mechanism, W. loads: powers by name; springs_: states by name."""
+    yield from (loads[name] for name in useful_loads(mechanism))
+    yield from (springs_[name].power for name in useful_springs(mechanism))

@@ -144,6 +144,12 @@ CYCLE: dict[str, Sentence] = {
         "the locking margin is that with the seats of {joints}; critical multiples of single joints and the motion "
         "backward are those of pins in the middle of their play",
     ),
+    "locking.springs_not_useful": Sentence(
+        NOTE,
+        "{springs} {count:#stores/store} energy, but {count:#is/are} not among what drives the mechanism backward: "
+        "the states are those of the useful loads alone",
+        "mark a spring that stands for the work, such as an elastic workpiece, with useful: true",
+    ),
     "contact.lost": Sentence(
         WARNING,
         "the {part} loses contact {at}: its load falls to {least:~N} (peak {peak:~N}) and reverses, and the pin would "

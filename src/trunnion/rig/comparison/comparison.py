@@ -13,7 +13,7 @@ from trunnion.rig.comparison.assessment import SignalAssessment, Verdict
 from trunnion.rig.comparison.error_sources import Cause
 from trunnion.rig.modelled import Modelled
 from trunnion.rig.reading.measurement import Condition, Signal
-from trunnion.solve.loads import useful_loads
+from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = ["ChannelComparison", "Compared", "Efficient", "unmeasured"]
 
@@ -56,7 +56,7 @@ class Efficient:
 class Compared:
     """A condition with its model and its channels.
 
-    unmeasured: drivers and useful loads whose power no channel tells, where others do: there is no efficiency then.
+    unmeasured: drivers, useful loads and springs whose power no channel tells, where others do: no efficiency then.
     """
 
     condition: Condition
@@ -67,7 +67,8 @@ class Compared:
 
 
 def unmeasured(mechanism: Mechanism, condition: Condition) -> tuple[str, ...]:
-    """Drivers and useful loads that no channel tells the effort of, by their entries in the model."""
+    """Drivers, useful loads and springs that no channel tells the effort of, by their entries in the model."""
     told = {course.measures for course in condition.courses.values()}
     drivers = (f"drivers.{name}" for name in mechanism.drivers if f"effort:{name}" not in told)
-    return (*drivers, *(f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in told))
+    loads = (f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in told)
+    return (*drivers, *loads, *(f"springs.{name}" for name in useful_springs(mechanism)))

@@ -64,6 +64,27 @@ def test_without_friction_every_load_drives_back() -> None:
     np.testing.assert_allclose(found["efficiency_reverse_instant"].values[pushed], 1.0, rtol=1e-9)
 
 
+@pytest.mark.parametrize("steps", [90, 360, 720])
+def test_an_analysis_has_the_ranges_of_the_positions_that_it_looks_at(steps: int) -> None:
+    """At most 360 positions; the report shows them."""
+    run = trunnion.analyse(hoist(), steps)
+    known, told = ranges(locking(hoist(), min(steps, 360)), 0.0), attribute(run, "locking_ranges")
+    assert told["positions"] == min(steps, 360)
+    found = [(row["state"], row["first"], row["count"]) for row in told["rows"]]
+    assert found == [(one.state.name.lower(), one.first, one.last - one.first + 1) for one in known]
+    page = run.trunnion.report()
+    assert 'id="locking"' in page
+    assert all(f'<rect class="{state}"' in page for state, _, _ in found)
+
+
+def test_an_analysis_without_friction_or_without_loads_has_no_ranges() -> None:
+    idle = hoist().model_dump(by_alias=True, exclude_unset=True) | {"loads": {}}
+    for model in (hoist().with_friction("off"), Mechanism(**idle)):
+        run = trunnion.analyse(model, 12)
+        assert "locking_ranges" not in run.attrs
+        assert 'id="locking"' not in run.trunnion.report()
+
+
 def spring_hoist(**spring: object) -> Mechanism:
     """The crank of the hoist, pulled by a spring below its pin instead of the weight."""
     data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)

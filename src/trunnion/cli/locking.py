@@ -84,22 +84,9 @@ def locking(
 
 def _show_ranges(found: list[LockingRange], dial: Dial, near: float) -> None:
     """The ranges as a table, in the order of the cycle; those near locking last."""
-    head = ["state", "from", "to", "smallest margin", "at"]
-    rows = [_row(one, dial, near) for one in found[:MOST_RANGES]]
-    show_rows(f"ranges of {dial.of}" if dial.of else "ranges", head, rows)
+    from trunnion.cycle.locking_states import HEAD, cells
+
+    rows = [cells(one, dial, near) for one in found[:MOST_RANGES]]
+    show_rows(f"ranges of {dial.of}" if dial.of else "ranges", list(HEAD), rows)
     if len(found) > MOST_RANGES:
         console().print(f"{len(found) - MOST_RANGES} more ranges; --out has every position", markup=False)
-
-
-def _row(one: LockingRange, dial: Dial, near: float) -> list[str]:
-    from math import isfinite, isnan
-
-    from trunnion.results.quantities import readable
-    from trunnion.solve.friction_method import MARGIN
-
-    state = f"margin below {near:g}" if one.state is None else one.state.short
-    ends = [dial.at(one.first), dial.at(one.last)]
-    if isnan(one.margin):
-        return [state, *ends, "—", ""]
-    margin = readable(one.margin) if isfinite(one.margin) else f"more than {MARGIN:g}"
-    return [state, *ends, margin, dial.at(one.at) if isfinite(one.margin) else ""]

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.analyse import analyse_run
+from trunnion.cycle.locking_states import (
+    NEAR,
+    ROUNDING,
+    LockingRange,
+    LockingState,
+    pushed,
+    ranges_of,
+    states,
+)
 from trunnion.cycle.near_locking import (
     Reverse,
     critical_figure,
@@ -18,7 +27,7 @@ from trunnion.cycle.near_locking import (
     reverse,
     reverse_figure,
 )
-from trunnion.errors import Coded, Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described
@@ -35,51 +44,6 @@ if TYPE_CHECKING:
 __all__ = ["MOST_STEPS", "NEAR", "LockingRange", "LockingState", "locking", "look", "ranges", "report_figures"]
 
 MOST_STEPS = 8192
-ROUNDING = 1e-9  # of the largest power: what is less is no power
-NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
-
-
-class LockingState(Coded):
-    """What friction does at a position: forward, and when all speeds are reversed."""
-
-    RUNS = 0, "runs; the useful loads do not push it backward"
-    BACKDRIVABLE = 1, "can be backdriven by the useful loads"
-    SELF_LOCKING = 2, "self-locking: the useful loads push it backward, but do not overcome friction"
-    LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward"
-    LOCKED = 4, "locked: no drive effort can move it forward"
-    JAMMED = 5, "jammed: locked forward and backward"
-    UNSOLVED = 6, "not solved"
-
-    @property
-    def short(self) -> str:
-        """The state in a word or two, for tables and legends."""
-        return SHORT[self]
-
-
-SHORT = {
-    LockingState.RUNS: "loads do not push back",
-    LockingState.BACKDRIVABLE: "can be backdriven",
-    LockingState.SELF_LOCKING: "self-locking",
-    LockingState.LOCKED_BACKWARD: "locked backward",
-    LockingState.LOCKED: "locked",
-    LockingState.JAMMED: "jammed",
-    LockingState.UNSOLVED: "not solved",
-}
-
-
-class LockingRange(NamedTuple):
-    """Consecutive positions in one state, or with a margin below the one that counts as near locking.
-
-    state: None of the latter; first, last: numbers of positions; margin: the smallest locking margin in it, NaN if it
-    is not known; at: its position.
-    """
-
-    state: LockingState | None
-    first: int
-    last: int
-    margin: float
-    at: int
-
 
 VARIABLES = {
     "critical_multiple": Variable(
@@ -138,7 +102,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
         "power_given_reverse": other.given,
         "efficiency_reverse_instant": _efficiency_reverse(other),
-        "locking_state": _states(status, other, known),
+        "locking_state": states(status == Status.LOCKED, other, known),
     }
     found = result.assign(described(arrays, VARIABLES))
     found["locking_state"].attrs.update(codes("flag", LockingState))
@@ -166,51 +130,13 @@ def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
 def _efficiency_reverse(back: Reverse) -> NDArray[np.float64]:
     """Of every position; NaN where the useful loads supply no power backward, or where that motion locks."""
     with np.errstate(all="ignore"):
-        return np.where(_pushed(back) & ~back.locked, back.delivered / back.given, np.nan)
-
-
-def _pushed(back: Reverse) -> NDArray[np.bool_]:
-    """Where the useful loads supply power backward, and no rounding of none."""
-    found: NDArray[np.bool_] = back.given > ROUNDING * np.nanmax(np.abs(back.given), initial=0.0)
-    return found
-
-
-def _states(status: NDArray[Any], back: Reverse, known: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """The code of `LockingState` of every position. known: where the forces or the cause of locking are known."""
-    ahead, behind = status == Status.LOCKED, back.locked
-    pushed = _pushed(back) & ~behind
-    cases = [
-        (~known, LockingState.UNSOLVED),
-        (ahead & behind, LockingState.JAMMED),
-        (ahead, LockingState.LOCKED),
-        (behind, LockingState.LOCKED_BACKWARD),
-        (pushed & (back.delivered > 0), LockingState.BACKDRIVABLE),
-        (pushed, LockingState.SELF_LOCKING),
-    ]
-    return np.select([of for of, _ in cases], [int(state) for _, state in cases], int(LockingState.RUNS)).astype(
-        np.int8
-    )
+        return np.where(pushed(back) & ~back.locked, back.delivered / back.given, np.nan)
 
 
 def ranges(found: xr.Dataset, near: float = NEAR) -> list[LockingRange]:
     """The intervals of a result of `locking` in which its state stays the same, in the order of the cycle; after them
     those that run, but with a margin below `near`."""
-    state, margin = found["locking_state"].values, found["locking_margin"].values
-    runs = [LockingRange(list(LockingState)[int(state[run[0]])], *_worst(run, margin)) for run in _runs(state)]
-    close = (margin < near) & (state < LockingState.LOCKED)
-    return [*runs, *(LockingRange(None, *_worst(run, margin)) for run in _runs(close) if close[run[0]])]
-
-
-def _runs(values: NDArray[Any]) -> Iterator[NDArray[np.intp]]:
-    """Numbers of consecutive positions of one value."""
-    yield from np.split(np.arange(len(values)), np.flatnonzero(np.diff(values)) + 1)
-
-
-def _worst(run: NDArray[np.intp], margin: NDArray[np.float64]) -> tuple[int, int, float, int]:
-    """First and last of some positions, their smallest margin and where it is."""
-    own = margin[run]
-    at = int(run[np.nanargmin(own)]) if np.any(np.isfinite(own)) else int(run[0])
-    return int(run[0]), int(run[-1]), float(margin[at]), at
+    return ranges_of(found["locking_state"].values, found["locking_margin"].values, near)
 
 
 def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
+from trunnion.cycle.locking_states import cells, ranges_of, states
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, Status
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 
 from trunnion.cycle.model_measures import watched
 from trunnion.cycle.variables import fill_of
-from trunnion.solve.loads import useful_loads
+from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
     "effort_units",
@@ -87,6 +88,7 @@ def result_of(run: Run, found_positions: Positions) -> Result:
             "spring_units": spring_units(run.system),
             "findings": finding_rows([*found, *measured.findings]),
             "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
+            **_ranges(run, found_positions, near),
             **drawn,
             "periodic": int(run.cycle.periodic),
         }
@@ -330,6 +332,26 @@ def _near_locking(
         return None
     with np.errstate(all="ignore"):
         return near_locking.look(run, time, arrays["locking_margin"], method)
+
+
+def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> dict[str, Any]:
+    """Where it holds itself, for the report: the ranges of `locking` with their share of the positions looked at."""
+    mechanism = run.system.mechanism
+    if near is None or not (useful_loads(mechanism) or useful_springs(mechanism)):
+        return {}
+    known, margin = np.isfinite(near.back.given), found.arrays["locking_margin"]
+    if len(near.times) == len(found.time):
+        status = found.arrays["status"]
+        known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
+    else:  # of more positions: the smallest margin from each to the next
+        margin = np.minimum.reduceat(margin, np.searchsorted(found.time, near.times * (1 - 1e-12)))
+    dial = run.system.dial(run.values, near.times)
+    rows = [
+        {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),
+         "first": one.first, "count": one.last - one.first + 1}
+        for one in ranges_of(states(near.locked, near.back, known), margin)
+    ]  # fmt: skip
+    return {"locking_ranges": {"of": dial.of, "positions": len(near.times), "rows": rows}}
 
 
 def _why(means: Means, arrays: Arrays) -> str:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.cycle.locking_states import HEAD
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import number, quantity
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["embedded", "hashed", "inputs_of", "report", "said"]
 
+MOST_RANGES = 24  # rows of the table of states
 # Variable, label, unit, what a reader may make of it.
 BALANCE = (
     ("closure_residual", "Closure of the loops", "m", "distance between the pins of a joint after assembly"),
@@ -57,7 +59,7 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": _summary(result),
-        "errors": error_rows(result), "losses": loss_rows(result),
+        "holding": _holding(result), "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(shown["built"] and shown["built"]["seats"]),
         "balance": _balance(result), "inputs": inputs_of(result),
         **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
@@ -121,6 +123,16 @@ def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     for subject, members in groupby(headline, key=lambda one: one.subject):
         found.append((subject, [(_value(one), one.remark) for one in members]))
     return found
+
+
+def _holding(result: xr.Dataset) -> dict[str, Any] | None:
+    """The ranges of the states of locking as a table and a strip; None where the result has none."""
+    found = attribute(result, "locking_ranges", "{}")
+    if not found:
+        return None
+    rows = found["rows"]
+    strip = [row for row in rows if row["state"]]
+    return {**found, "head": HEAD, "strip": strip, "rows": rows[:MOST_RANGES], "more": max(0, len(rows) - MOST_RANGES)}
 
 
 def _value(one: Figure) -> str:

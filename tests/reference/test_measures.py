@@ -38,6 +38,7 @@ NEAR = Measure("near", "dead_centre", "C", statistic="place-of-minimum")
 def crank() -> Run:
     data = slider_crank(R, L, E)
     data["loads"]["press"] = {"joint": "C", "resisting_force": "30 N"}
+    data["springs"] = {"coil": {"joint": "P", "stiffness": "20 N m/rad", "free_angle": 0}}
     return prepare(build(data))
 
 
@@ -446,6 +447,26 @@ def test_speeds_and_what_loads_take(model: str, joints: list[str]) -> None:
         assert [one.unit(run.system) for one in measures] == ["rad/s"] * len(joints) + ["N m"] * len(loads)
 
 
+def test_force_and_elongation_of_springs() -> None:
+    """Between two points, N and m, and in a pin, N m and rad, as the result of an analysis has them."""
+    data = slider_crank(R, L, E)
+    data["springs"] = {
+        "line": {"between": ["ground.A", "rod.P"], "stiffness": "1 kN/m", "free_length": "0.2 m", "damping": "3 N s/m"},
+        "coil": {"joint": "P", "stiffness": "2 N m/rad", "free_angle": "10 deg"},
+    }
+    run = prepare(build(data))
+    found = trunnion.analyse(run.system.mechanism, 24)
+    names = [f"{kind}:{one}" for one in data["springs"] for kind in ("spring_force", "spring_elongation")]
+    measures = named(run.system.mechanism, names, run.values)
+    assert [one.unit(run.system) for one in measures] == ["N", "m", "N m", "rad"]
+    back = run.solve(run.cycle.times(24))
+    for one in measures:
+        expected = found[one.kind].sel(spring=one.subject)
+        np.testing.assert_allclose(np.broadcast_to(one.curve(back)[0], 24), expected, rtol=1e-12, err_msg=one.name)
+    with pytest.raises(MechanismError, match="there is no spring 'C'"):
+        named(run.system.mechanism, ["spring_force:C"], run.values)
+
+
 def test_no_load_where_the_joint_rests(crank: Run) -> None:
     """A crank at a dead centre: the slide rests, and what the load takes there has no value."""
     measure = Measure("press", "load", "press")
@@ -459,6 +480,7 @@ SUBJECTS = {
     "point": ("piston.P", "x"), "path_error": ("piston.P", ""), "straightness": ("rod.P", ""), "angle": ("rod", ""),
     "rotation": ("P", ""), "slide": ("C", ""), "transmission_error": ("C", ""), "stroke": ("C", ""),
     "dead_centre": ("C", ""), "rate": ("P", ""), "joint_acceleration": ("C", ""), "load": ("press", ""),
+    "spring_force": ("coil", ""), "spring_elongation": ("coil", ""),
     "velocity": ("rod.P", "y"), "acceleration": ("rod.P", ""), "angular_velocity": ("rod", ""),
     "angular_acceleration": ("rod", ""), "transmission_angle": ("P", ""), "pressure_angle": ("C", ""),
     "power": ("press", ""), "friction_power": ("C", ""), "friction_energy": ("C", ""),

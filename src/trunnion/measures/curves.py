@@ -20,7 +20,7 @@ from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
-from trunnion.solve.loads import useful_powers
+from trunnion.solve.loads import springs, useful_powers
 from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["CURVES", "Course"]
@@ -128,6 +128,16 @@ def load(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     return (-back.load_powers[measure.subject] / xp.where(moving, speed, np.nan),)
 
 
+def spring_force(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
+    """Pull of a spring and its damper, N, or torque, N m."""
+    return (back.springs[measure.subject].force,)
+
+
+def spring_elongation(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
+    """Length or angle of a spring beyond its free one, m or rad."""
+    return (next(state for name, _, state in springs(walk) if name == measure.subject).elongation,)
+
+
 def reaction(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Force in a joint without friction and drive effort, N."""
     found: Any = back.reactions[measure.subject]
@@ -200,6 +210,8 @@ CURVES: dict[str, Course] = {
     "pressure_angle": pressure_angle,
     "effort": effort,
     "load": load,
+    "spring_force": spring_force,
+    "spring_elongation": spring_elongation,
     "reaction": reaction,
     "power": power,
     "friction_power": friction_power,

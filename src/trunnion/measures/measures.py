@@ -37,7 +37,7 @@ __all__ = ["Measure", "coordinate_unit", "named", "outputs"]
 class Measure:
     """One number to watch, its figure and its limits; SI.
 
-    kind: an entry of MEASURES; subject: link.point, link, joint, driver or load, or a word such as "cycle"; axis,
+    kind: an entry of MEASURES; subject: link.point, link, joint, driver, load, spring or a word such as "cycle"; axis,
     along: which component, by a global axis or a direction; of an angle in space the axis that the link turns about.
     lower, upper: allowed signed deviations of the figure from that of the nominal mechanism; at_least, at_most: bounds
     of the figure itself.
@@ -117,6 +117,9 @@ class Measure:
     def _turns(self, system: System) -> bool:
         if self.of.of == "load on a joint":
             return system.mechanism.loads[self.subject].resisting_torque is not None
+        if self.of.of == "spring":
+            joint = system.mechanism.springs[self.subject].joint
+            return joint is not None and system.turns(joint)
         return system.turns(self.subject)
 
     def figure_unit(self, system: System, values: Values) -> str:

@@ -50,11 +50,17 @@ def course_kind(mechanism: Fields, measure: Measure) -> Kind:
 
 
 def slides(mechanism: Fields, measure: Measure) -> bool:
-    """Whether the joint, driver or load that a measure is of slides and does not turn."""
+    """Whether the joint, driver, load or spring that a measure is of slides and does not turn."""
     load = mechanism.loads.get(measure.subject)
     if MEASURES[measure.kind].of == "load on a joint":
         return load is None or load.resisting_torque is None
-    joint = mechanism.effective_joints.get(measure.subject)
+    name: str | None = measure.subject
+    if MEASURES[measure.kind].of == "spring":
+        spring = mechanism.springs.get(measure.subject)
+        name = spring.joint if spring else None
+        if name is None:  # between two points
+            return True
+    joint = mechanism.effective_joints.get(name or "")
     return joint is not None and "rotation" not in freedoms(joint.type)
 
 

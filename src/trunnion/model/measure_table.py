@@ -19,8 +19,8 @@ class MeasureKind:
     """One kind of measure.
 
     text: of its key in the file; long_name: for tables; quantity: what the course is, or both that it may be, where
-    the joint, driver or load turns and where it slides. of: what the key names (see `checks.measures`), or the words
-    that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is solved.
+    the joint, driver, load or spring turns and where it slides. of: what the key names (see `checks.measures`), or the
+    words that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is solved.
     rule: what makes the figure of the course if no statistic is stated, an entry of `measures.figures.RULES`;
     reduced: it is one number of a whole range already. against: whether the course is taken less that of the nominal
     mechanism, position by position. vector: whether `axis` or `along` picks one component: it `must` or `may`; in
@@ -51,7 +51,7 @@ class MeasureKind:
     @property
     def at_rest(self) -> bool:
         """Whether it is zero in an idle machine: a force or a rate, no place and no ratio."""
-        return self.needs != "places" and self.quantity is not NUMBER
+        return self.needs != "places" and self.quantity is not NUMBER and self.quantity is not MOTION
 
     def vector_in(self, space: str) -> str:
         """Whether a component must or may be picked in a space; empty if there is none."""
@@ -142,6 +142,13 @@ MEASURES: dict[str, MeasureKind] = {
     "load": MeasureKind(
         "load on a joint, whose torque or force against the joint's positive sense is watched",
         "torque or force of a load on a joint", EFFORT, "load on a joint", "forces",
+    ),
+    "spring_force": MeasureKind(
+        "spring whose pull is watched, negative where it pushes; in a joint that turns its torque",
+        "force or torque of a spring", EFFORT, "spring", "forces",
+    ),
+    "spring_elongation": MeasureKind(
+        "spring, how far it is beyond its free length or angle", "elongation of a spring", MOTION, "spring", "motion",
     ),
     "reaction": MeasureKind(
         "joint whose reaction is watched, its magnitude or, with `axis` or `along`, a component",

@@ -393,6 +393,9 @@ class Mechanism(Numbers):
         for measure in data["measures"].values():
             for key in [key for key, value in measure.items() if value is None and key not in HASHED]:
                 del measure[key]
+        for spring in data["springs"].values():  # the hash of a spring is older than what may make it useful
+            if not spring["useful"]:
+                del spring["useful"]
         text = json.dumps(_canonical(data), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -35,6 +35,7 @@ def subjects(mechanism: Numbers, of: str | tuple[str, ...]) -> list[str]:
         "any joint": list(mechanism.effective_joints),
         "driver": list(mechanism.drivers),
         "load on a joint": loads,
+        "spring": list(mechanism.springs),
         "driver or load": list(dict.fromkeys([*mechanism.drivers, *mechanism.loads])),
     }[of]
 

@@ -11,8 +11,10 @@ import trunnion
 from mechanisms import eccentric_press
 from mechanisms_parts import Data, revolute
 from trunnion import Mechanism, Status
-from trunnion.cycle.locking import LockingState, locking, ranges
+from trunnion.cycle.locking import LockingState, locking, look, ranges
+from trunnion.cycle.locking_ends import ends
 from trunnion.results.attributes import attribute
+from trunnion.solve.run import prepare
 
 ARM, RADIUS, FRICTION = 0.02, 0.012, 0.5
 
@@ -83,6 +85,27 @@ def test_an_analysis_without_friction_or_without_loads_has_no_ranges() -> None:
         run = trunnion.analyse(model, 12)
         assert "locking_ranges" not in run.attrs
         assert 'id="locking"' not in run.trunnion.report()
+
+
+@pytest.mark.parametrize("steps", [12, 141, 401])
+def test_ends_of_ranges_are_those_of_the_friction_circle(steps: int) -> None:
+    """To 0.01°, however many positions there are."""
+    run = prepare(hoist())
+    found = look(run, steps)
+    told = ends(run, found, ranges(found), 1.5)
+    limit = f"{np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
+    assert told == [("0°", limit), (limit, "90°"), ("90°", "143.2°")]
+
+
+def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
+    """Linear between positions: they hardly depend on the step, and the margin passes 7 at no position."""
+    run, places = prepare(eccentric_press()), []
+    for steps in (180, 360):
+        found = look(run, steps)
+        assert np.nanmin(np.abs(found["locking_margin"].values - 7.0)) > 1e-3
+        of = [one for one in ranges(found, 7.0) if one.state is None]
+        places.append([[float(end.strip("°")) for end in pair] for pair in ends(run, found, of, 7.0)])
+    np.testing.assert_allclose(places[0], places[1], atol=0.05)
 
 
 def spring_hoist(**spring: object) -> Mechanism:

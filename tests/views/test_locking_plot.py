@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from trunnion.cycle.locking import LockingState
 from trunnion.results.attributes import summary_of
 from trunnion.views.common.joined import joined
 from trunnion.views.common.markup import with_code
@@ -45,6 +46,14 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
     assert labels(lower)[0] == "forward"
     ahead = np.asarray(lower.lines[1].get_ydata(), float)
     assert ahead == pytest.approx(100 * found["efficiency_instant"].values)
+
+
+def test_the_ranges_in_which_loads_do_not_push_back_are_named(press):
+    found = trunnion.locking(press, STEPS)
+    codes = set(found["locking_state"].values.tolist())
+    named = labels(plots.figure(found, "locking").axes[0])
+    for state in (LockingState.RUNS, LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING):
+        assert named.count(state.short) == (int(state) in codes)
 
 
 def test_locked_ranges_are_shaded(press):

@@ -54,6 +54,7 @@ def locking(
     the ranges of the drive in which the mechanism locks, is near locking, is self-locking or can be backdriven.
     """
     from trunnion.cycle.locking import look, ranges, report_figures
+    from trunnion.cycle.locking_ends import ends
     from trunnion.solve.run import prepare
     from trunnion.solve.system import rubbing
 
@@ -64,12 +65,15 @@ def locking(
         with bar("positions", steps, least=200_000) as progress:
             found = look(run, steps, progress)
     figures = report_figures(run, found)
+    every = ranges(found, near)
+    states, more = every[:MOST_RANGES], max(0, len(every) - MOST_RANGES)
+    places = ends(run, found, states, near)
 
     def show() -> None:
         show_figures(mechanism.name or str(file), figures)
         if rubbing(run.system) and mechanism.drivers:
             console().print()
-            _show_ranges(ranges(found, near), run.system.dial(run.values, found["time"].values), near)
+            _show_ranges(states, places, run.system.dial(run.values, found["time"].values), near, more)
 
     def draw(path: Path) -> Any:
         from trunnion.views.cycle.locking_plot import locking as figure
@@ -82,11 +86,11 @@ def locking(
     ).finish()  # fmt: skip
 
 
-def _show_ranges(found: list[LockingRange], dial: Dial, near: float) -> None:
-    """The ranges as a table, in the order of the cycle; those near locking last."""
+def _show_ranges(found: list[LockingRange], ends: list[tuple[str, str]], dial: Dial, near: float, more: int) -> None:
+    """The ranges as a table, in the order of the cycle; those near locking last. more: how many there are besides."""
     from trunnion.cycle.locking_states import HEAD, cells
 
-    rows = [cells(one, dial, near) for one in found[:MOST_RANGES]]
+    rows = [cells(one, dial, near, places) for one, places in zip(found, ends, strict=True)]
     show_rows(f"ranges of {dial.of}" if dial.of else "ranges", list(HEAD), rows)
-    if len(found) > MOST_RANGES:
-        console().print(f"{len(found) - MOST_RANGES} more ranges; --out has every position", markup=False)
+    if more:
+        console().print(f"{more} more ranges; --out has every position", markup=False)

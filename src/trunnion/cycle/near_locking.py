@@ -37,6 +37,7 @@ __all__ = [
     "critical_multiples",
     "findings",
     "least_margin",
+    "locks",
     "look",
     "others",
     "reverse",
@@ -255,7 +256,7 @@ def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Reverse:
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
     powers = useful_powers(run.system.mechanism, other.load_powers, other.springs)
     given = sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape))
-    return Reverse(efforts, _locks(other), delivered, given)
+    return Reverse(efforts, locks(other), delivered, given)
 
 
 # ---- over a cycle ---------------------------------------------------------------------------------------------
@@ -325,7 +326,7 @@ def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dic
 def _both_ways(run: Run, times: Array, method: FrictionMethod) -> tuple[NDArray[np.bool_], Array, Reverse]:
     """Where it locks, other solutions, and the way back."""
     back = run.solve(times, method=method)
-    return _locks(back), others(back), reverse(run, back.walk, method)
+    return locks(back), others(back), reverse(run, back.walk, method)
 
 
 def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
@@ -336,7 +337,7 @@ def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
         yield finding_for("friction.other_solutions", "joints", count=count, at=dial.intervals(more))
 
 
-def _locks(back: Backward) -> NDArray[np.bool_]:
+def locks(back: Backward) -> NDArray[np.bool_]:
     """Where a module locks."""
     shape = np.shape(back.walk.time)
     locked = np.zeros(shape, bool)

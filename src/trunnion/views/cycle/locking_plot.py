@@ -114,6 +114,8 @@ def _states(axes: Axes, result: xr.Dataset, over: Abscissa, named: bool) -> None
     if "locking_state" not in result:
         return
     state, x = result["locking_state"].values, over.values
+    if named and np.any(state == LockingState.RUNS):  # white, so that it has an edge in the legend
+        axes.fill_between([], [], facecolor="white", edgecolor=INK, linewidth=0.5, label=LockingState.RUNS.short)
     half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
     for members, colour in STATES:
         inside = np.isin(state, members)

@@ -10,6 +10,7 @@ import pytest
 from test_report import Page
 
 from trunnion import Mechanism, analyse
+from trunnion.results.attributes import summary_of
 from trunnion.views.cycle.plots import PLOTS, READY, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
@@ -83,3 +84,33 @@ def test_input_data_are_told_as_they_were_written(slider_crank):
     texts = [row["text"] for row in json.loads(slider_crank.attrs["inputs"])]
     assert "1500 rpm" in texts
     assert "1500 rpm" in words
+
+
+def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():
+    """A ram between two pins: its guide bears nothing, however the ram lies."""
+    pin = {"type": "revolute"}
+    ram = Mechanism(
+        trunnion=1,
+        links={
+            "ground": {"points": {"D": [0, 0], "H": [-0.7, 0.15]}},
+            "lever": {"points": {"D": [0, 0], "G": [0.03, 0.15]}},
+            "barrel": {"points": {"H": [0, 0], "Z": {"at": [0, 0], "axis": [1, 0]}}},
+            "rod": {"points": {"Z": {"at": [0, 0], "axis": [1, 0]}, "G": [0, 0]}},
+        },
+        joints={
+            "D": {**pin, "links": ["ground", "lever"]},
+            "H": {**pin, "links": ["ground", "barrel"]},
+            "Z": {"type": "prismatic", "links": ["barrel", "rod"]},
+            "G": {**pin, "links": ["rod", "lever"]},
+        },
+        drivers={"Z": {"range": [0.65, 0.75], "speed": 0.05}},
+        loads={"work": {"joint": "D", "resisting_torque": 60.0}},
+        assembly={"G": [0, 0.15]},
+    )
+    result = analyse(ram, 24)
+    assert 0 < float(np.abs(result["reaction_force"].sel(joint="Z")).max()) < 1e-9
+    (figure,) = [one for one in summary_of(result) if one.name == "Z.reaction_max"]
+    assert (figure.value, figure.place) == (0.0, "")
+    shown = {joint["name"]: joint["reaction"] for joint in scene(result)["joints"]}
+    assert not np.any([shown["Z"]["x"], shown["Z"]["y"]])
+    np.testing.assert_allclose(shown["G"]["x"], result["reaction_force"].sel(joint="G", axis="x"), rtol=1e-6)

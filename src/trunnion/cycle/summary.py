@@ -310,9 +310,11 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
         for what, variable, unit in loads if len(sound) else ():
             size = np.sqrt(np.sum(arrays[variable][i] ** 2, axis=0))
             top = int(sound[np.argmax(size[sound])])
-            if system.mechanism.space == "planar" or size[top] > _rounding(arrays, variable):
-                key = f"{name}.{what.replace(' ', '_')}_max"
+            key, planar = f"{name}.{what.replace(' ', '_')}_max", system.mechanism.space == "planar"
+            if size[top] > _rounding(arrays, variable) or (planar and size[top] == 0):
                 yield Figure(key, f"{what} of {name}", size[top], unit, "maximum", f"at {dial.at(top)}")
+            elif planar:  # rounding has no place
+                yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
         slide = arrays["joint_slide"][i]
         slide = slide[arrays["status"] != Status.CONTACT_LOST]
         if PAIRS[kind].guided and np.any(np.isfinite(slide)):

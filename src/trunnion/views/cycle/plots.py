@@ -160,9 +160,7 @@ def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y"
 
 
 def _sound(result: xr.Dataset, ideal: xr.Dataset | None) -> tuple[xr.Dataset, xr.Dataset | None]:
-    """Both without reactions that are rounding, as some of a mechanism in space are by its shape."""
-    if not is_spatial(result):
-        return result, ideal
+    """Both without reactions that are rounding, as some are by the shape of the mechanism."""
     return without_noise(result), None if ideal is None else without_noise(ideal)
 
 
@@ -170,6 +168,7 @@ def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Magnitude of the reaction in each joint, of those with the same as one curve; without friction thin, dotted."""
     if is_spatial(result):
         return space_plots.reactions(*_sound(result, ideal), FREE)
+    result, ideal = _sound(result, ideal)
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
     free = [] if ideal is None else [np.hypot(*_reaction(ideal, joint)) for joint in joints]

@@ -37,8 +37,7 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
     count = result.sizes["position"]
     if ideal is not None and ideal.sizes["position"] != count:
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
-    if is_spatial(result):
-        result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
+    result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     picked = _picked(count, max_positions)
     over = abscissa(result)
     kept = result.isel(position=picked)

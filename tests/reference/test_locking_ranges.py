@@ -148,6 +148,17 @@ def test_springs_that_store_energy_and_are_not_marked_useful_are_told(spring: di
         assert set(states(found)) == {LockingState.RUNS}
 
 
+@pytest.mark.parametrize(("useful", "said"), [(True, True), (False, False)])
+def test_a_load_beside_the_drive_is_told_where_another_is_useful(useful: bool, said: bool) -> None:
+    """As of a hand; where no load is marked, it is one of the useful ones."""
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["loads"]["weight"]["useful"] = useful
+    data["loads"]["hand"] = {"link": "crank", "at": "P", "force": [0.0, 10.0]}
+    codes = [row["code"] for row in attribute(locking(Mechanism(**data), 8), "findings")]
+    assert ("locking.load_beside_drive" in codes) == said
+    assert "locking.load_beside_drive" not in [row["code"] for row in attribute(locking(hoist(), 8), "findings")]
+
+
 @pytest.mark.parametrize("load", [-40.0, 40.0])
 def test_locked_forward_and_jammed(load: float) -> None:
     """Beyond the critical coefficient the drawer locks: its state agrees with its status and with the way back."""

@@ -111,7 +111,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
 
 
 def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
-    """What the states leave out: seats of pins, and springs that store energy and are not marked useful."""
+    """What the states leave out: seats of pins, springs that are not marked useful; loads that move them."""
     notes = []
     if run.seats:
         notes.append(finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats]))
@@ -124,7 +124,19 @@ def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
         names = [str(name) for name, stores in zip(result["spring"].values, storing, strict=True) if stores]
         if names:
             notes.append(finding_for("locking.springs_not_useful", "springs", springs=names, count=len(names)))
+    beside = _beside_the_drive(mechanism) if rubbing(run.system) else []
+    if beside:
+        notes.append(finding_for("locking.load_beside_drive", "loads", loads=beside, count=len(beside)))
     return notes
+
+
+def _beside_the_drive(mechanism: Mechanism) -> list[str]:
+    """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
+    if not useful_springs(mechanism) and not any(load.useful for load in mechanism.loads.values()):
+        return []
+    driven = {link for name in mechanism.drivers for link in mechanism.effective_joints[name].links}
+    driven.discard(mechanism.fixed_link)
+    return [name for name, load in mechanism.loads.items() if load.link in driven and not load.useful]
 
 
 def _efficiency_reverse(back: Reverse) -> NDArray[np.float64]:

@@ -150,6 +150,12 @@ CYCLE: dict[str, Sentence] = {
         "the states are those of the useful loads alone",
         "mark a spring that stands for the work, such as an elastic workpiece, with useful: true",
     ),
+    "locking.load_beside_drive": Sentence(
+        NOTE,
+        "{loads} {count:#acts/act} on a driven link beside the drive and {count:#is/are} not useful: backward "
+        "{count:#it acts/they act} too, which moves the ranges",
+        "leave out a load that stands for the drive itself, such as the force of a hand",
+    ),
     "contact.lost": Sentence(
         WARNING,
         "the {part} loses contact {at}: its load falls to {least:~N} (peak {peak:~N}) and reverses, and the pin would "

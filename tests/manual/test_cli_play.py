@@ -131,3 +131,31 @@ def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
     there = float(result["worst_case_total"].sel(measure="place").isel(position=2))  # 90° of 0°, 45°, 90° …
     assert findings["play.at_a_place"].figures["worst"] == pytest.approx(there, rel=1e-9)
     assert findings["play.no_effect"].figures["measure"] == "held"
+
+
+def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: Path) -> None:
+    """To first order an extreme changes as the course does at its place."""
+    model = tmp_path / "model.yaml"
+    text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
+    model.write_text(
+        f"{text}\nmeasures:\n  course: {{angle: rocker}}\n  least: {{angle: rocker, as: minimum}}\n"
+        "  most: {angle: rocker, as: maximum}\n  swing: {angle: rocker, as: peak-to-peak}\n",
+        encoding="utf-8",
+    )
+    result = trunnion.play(trunnion.read(model), steps=720)
+    assert result["measure"].values.tolist() == ["course", "least", "most"]
+    figures = {one.name: one.value for one in result.trunnion.summary}
+    course = result.sel(measure="course")
+    for name, pick in (("least", np.argmin), ("most", np.argmax)):
+        there = course.isel(position=int(pick(course["value"].values)))
+        own = result.sel(measure=name)
+        assert own["extreme_worst_case"].values == pytest.approx(there["worst_case"].values, rel=1e-2, abs=1e-9)
+        assert figures[f"{name}.worst_case"] == pytest.approx(float(own["extreme_worst_case"].sum()), rel=1e-12)
+        assert float(own["extreme_time"]) == pytest.approx(float(there["time"]), abs=2e-3)
+    assert np.isnan(result["extreme_time"].sel(measure="course"))
+    codes = [one.code for one in result.trunnion.findings]
+    assert codes.count("play.at_an_extreme") == 2
+    assert "play.measures_left_out" in codes
+    titles = [one.title for one in tables(result)]
+    assert titles[1].startswith("least: the minimum, at ")
+    assert figure(result).axes

@@ -62,6 +62,11 @@ PLAY = {
         NOTE,
         "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the table has the whole cycle",
     ),
+    "play.at_an_extreme": Sentence(
+        NOTE,
+        "the {statistic} is at {at}: the worst case of {measure} to first order, ±{worst:~{unit}}, is of that place; "
+        "the figure and the files show the whole cycle besides",
+    ),
     "play.no_effect": Sentence(
         NOTE,
         "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",

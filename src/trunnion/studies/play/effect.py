@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
-    worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status.
+    worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status. extremes:
+    of each measure whose figure is a maximum or minimum, by name, what play does to it alone at its place.
     """
 
     run: Run
@@ -35,6 +36,12 @@ class Effect:
     deviation: Array
     loads: Array
     status: NDArray[np.int8]
+    extremes: Mapping[str, Effect] = field(default_factory=dict)
+
+    def of(self, i: int) -> tuple[Effect, int]:
+        """Where the figure of a measure is looked for, and its number there: at its extreme, or over the cycle."""
+        there = self.extremes.get(self.measures[i].name)
+        return (self, i) if there is None else (there, 0)
 
     @property
     def total(self) -> Array:

@@ -51,14 +51,14 @@ def exact_changes(effect: Effect, i: int) -> Array:
 
 def beyond_first_order(effect: Effect) -> Iterator[Finding]:
     """Measures that pins in their holes can change by more than the worst case of first order says."""
-    dial = effect.run.system.dial(effect.run.values, effect.time)
-    totals = relied_on(effect.total, effect.status)
     for i, measure in enumerate(effect.measures):
         if measure.kind not in MOTIONS:
             continue
+        own, k = effect.of(i)
+        dial, totals = own.run.system.dial(own.run.values, own.time), relied_on(own.total, own.status)[k]
         with np.errstate(all="ignore"):
-            exact = np.where(np.isfinite(totals[i]), exact_changes(effect, i), np.nan)
-            largest = np.nanmax(totals[i], initial=0.0)
+            exact = np.where(np.isfinite(totals), exact_changes(own, k), np.nan)
+            largest = np.nanmax(totals, initial=0.0)
         if not largest > 0 or not np.any(np.isfinite(exact)):
             continue
         at = int(np.nanargmax(exact))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,13 @@ VARIABLES: dict[str, Variable] = {
         ("measure", "joint", "end", "axis", "position"), "/m", "change of the measure for an offset of 1 m at an end"
     ),
     "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
+    "extreme_worst_case": Variable(
+        ("measure", "joint"), "", "worst case of a maximum or minimum, at its place; NaN of other measures"
+    ),
+    "extreme_deviation": Variable(
+        ("measure", "joint"), "", "standard deviation of a maximum or minimum, at its place; NaN of other measures"
+    ),
+    "extreme_time": Variable(("measure",), "s", "time at which a maximum or minimum is; NaN of other measures"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
 }
 
@@ -68,6 +75,8 @@ class PlayEffects(Protocol):
     def loads(self) -> Array: ...
     @property
     def status(self) -> NDArray[np.int8]: ...
+    @property
+    def extremes(self) -> Mapping[str, PlayEffects]: ...
 
 
 def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
@@ -84,6 +93,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "sensitivity": found.loads,
         "radius": _radii(found.plays, ends),
         "status": found.status,
+        **_at_extremes(found),
     }
     units = [measure.unit(system) for measure in found.measures]
     same = units[0] if len(set(units)) == 1 else ""
@@ -103,11 +113,30 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
-        "summary": figure_rows(_summary(found, units, dial)),
+        "extremes": [_extreme_of(found, measure) for measure in found.measures],
+        "summary": figure_rows(_summary(found, units)),
         "findings": finding_rows(findings),
         "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
     }
     return dataset_of("play", variables, labels, attributes, driven(found.time, *dial))
+
+
+def _extreme_of(found: PlayEffects, measure: Measure) -> list[str]:
+    """The word for a measure's extreme and where in the cycle it is, for tables; empty of one that is none."""
+    there = found.extremes.get(measure.name)
+    return [] if there is None else [measure.rule, found.run.system.dial(found.run.values, there.time).at(0)]
+
+
+def _at_extremes(found: PlayEffects) -> dict[str, Array]:
+    """What is at the places of extremes, NaN of measures that are none."""
+    names, count = [measure.name for measure in found.measures], len(found.plays)
+    worst, deviation = (np.full((len(names), count), np.nan) for _ in range(2))
+    time = np.full(len(names), np.nan)
+    for i, name in enumerate(names):
+        if name in found.extremes:
+            there = found.extremes[name]
+            worst[i], deviation[i], time[i] = there.worst_case[0, :, 0], there.deviation[0, :, 0], there.time[0]
+    return {"extreme_worst_case": worst, "extreme_deviation": deviation, "extreme_time": time}
 
 
 def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:
@@ -124,18 +153,22 @@ def _radii(plays: Mapping[str, Play], ends: int) -> Array:
     return found
 
 
-def _summary(found: PlayEffects, units: Sequence[str], dial: Any) -> Iterator[Figure]:
-    """Of each measure the largest worst case, what each joint has in it, RSS and deviation there."""
+def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
+    """Of each measure the largest worst case, or that of its extreme: what each joint has in it, RSS and deviation."""
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
-        name, total = measure.name, relied_on(found.total[i], found.status)
+        name, there = measure.name, found.extremes.get(measure.name)
+        own, k = (found, i) if there is None else (there, 0)
+        of = found.run.system.dial(found.run.values, own.time)
+        total = relied_on(own.total[k], own.status)
         worst = f"{name}.worst_case", f"{name}, worst case to first order"
         if not np.any(np.isfinite(total)):
             yield Figure(*worst, None, unit)
             continue
         top = int(np.nanargmax(total))
-        yield Figure(*worst, total[top], unit, "maximum", f"at {dial.at(top)}")
-        rss, deviation = (np.sqrt(np.sum(part[i, :, top] ** 2)) for part in (found.worst_case, found.deviation))
+        aspect = "maximum" if there is None else f"of the {measure.rule}"
+        yield Figure(*worst, total[top], unit, aspect, f"at {of.at(top)}")
+        rss, deviation = (np.sqrt(np.sum(part[k, :, top] ** 2)) for part in (own.worst_case, own.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
         for j, joint in enumerate(found.plays):
-            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", found.worst_case[i, j, top], unit)
+            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", own.worst_case[k, j, top], unit)

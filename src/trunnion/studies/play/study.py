@@ -17,6 +17,7 @@ a ball. Both are of first order in the play.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,8 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
+from trunnion.measures.evaluation import NumpyKernel
+from trunnion.measures.figures import moment, reference
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
 from trunnion.measures.positions import plan
@@ -53,6 +56,7 @@ if TYPE_CHECKING:
 __all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
 
 CHUNK = 4096  # positions at a time
+EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
 IDLE = 1e-9  # of the largest effect of a joint: what is less is rounding
 
 Array = NDArray[np.float64]
@@ -125,7 +129,8 @@ def play(
 
     measures: names of the model's, or written as `named` reads them, of what has one number at every position:
     `link.point.x`, `angle:link`, `effort:driver`, `velocity:link.point` …; all of the model if not given, or, where it
-    states none, rotation and slide of every joint to the ground that is not driven. Returns a Dataset over (measure,
+    states none, rotation and slide of every joint to the ground that is not driven. The figures of a maximum or minimum
+    are those at its place, `extreme_worst_case`; other statistics are left out. Returns a Dataset over (measure,
     joint, position) of `result.VARIABLES`: SI, each measure in its own unit. NaN where a position has no answer.
     steps: equally spaced positions of the cycle. progress: called with the number of positions done.
     Method: virtual work for coordinates and angles, derivatives by dual numbers for others; first order in the play,
@@ -140,6 +145,7 @@ def play(
     known = plays(run.system, run.values)
     _check(known)
     effect = _over(run, found, known, run.cycle.times(steps if run.cycle.duration > 0 else 1), progress)
+    effect = replace(effect, extremes=_extremes(run, found, known, steps))
     return dataset(effect, [*_model_findings(run, effect), *told])
 
 
@@ -147,7 +153,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
     mechanism = run.system.mechanism
     found = named(mechanism, mechanism.measures if names is None else names, run.values)
-    others = [one.name for one in found if one.kind not in MOTIONS and not one.single(run.system)]
+    others = [one.name for one in found if not _covered(run, one)]
     what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
     remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
@@ -163,6 +169,31 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
             Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
         )
     return found, [finding_for("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
+
+
+def _covered(run: Run, measure: Measure) -> bool:
+    """Whether it has one number at every position, and its figure is of one place: no mean, and no peak-to-peak."""
+    return (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
+
+
+def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], steps: int) -> dict[str, Effect]:
+    """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole.
+
+    To first order an extreme changes as its course does there: where the course turns back, to move along it does
+    nothing. None of a course that does not change.
+    """
+    found = {}
+    for measure in measures:
+        if measure.rule not in EXTREMES:
+            continue
+        places = plan(run, [measure], steps)
+        course = NumpyKernel(run, [measure], FrictionMethod()).courses(run.values, places.times)[0][measure.name]
+        rate = measure.rate_of_course(forward(run.system, run.values, run.chosen.assembly, places.times))
+        time = moment(reference(measure, course, places.windows[measure.name], run.system, rate))
+        if np.isfinite(time):
+            time = time % run.cycle.duration if run.cycle.periodic else time
+            found[measure.name] = _over(run, [measure], known, np.array([time]))
+    return found
 
 
 def _check(known: Mapping[str, Play]) -> None:
@@ -330,8 +361,15 @@ def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
 
 
 def _places(run: Run, effect: Effect) -> Iterator[Finding]:
-    """What play does at the place that a measure states: the result has the whole cycle."""
+    """What play does at the place that a measure states, or where its extreme is: the result has the whole cycle."""
     for measure in effect.measures:
+        if measure.name in effect.extremes:
+            there = effect.extremes[measure.name]
+            worst, at = float(there.total[0, 0]), run.system.dial(run.values, there.time).at(0)
+            yield finding_for(
+                "play.at_an_extreme", f"measures.{measure.name}", measure=measure.name, at=at, worst=worst,
+                statistic=measure.rule, unit=measure.unit(run.system),
+            )  # fmt: skip
         if measure.at is None:
             continue
         there = _over(run, [measure], effect.plays, plan(run, [measure], 1).times)

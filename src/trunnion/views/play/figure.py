@@ -64,9 +64,21 @@ def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str,
     axes.plot(x, lanes[-1], color=INK, linewidth=1.2, linestyle=(0, (5, 2)), label="RSS")
     if limit is not None:
         axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
+    if "extreme_worst_case" in result and np.isfinite(there := float(np.sum(result["extreme_worst_case"].values))):
+        # the curve is of the whole course, the figure of this place
+        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label="at the extreme", clip_on=False)
     axes.set_ylim(bottom=0.0)
     frame_peak(axes, most, shown, factor, unit)
     legend(axes)
+
+
+def _place(result: xr.Dataset, over: Abscissa) -> float:
+    """Where an extreme is on the abscissa, which goes on beyond the last position of a cycle as it does before it."""
+    at, time, values = float(result["extreme_time"]), result["time"].values, over.values
+    k = int(np.clip(np.searchsorted(time, at), 1, max(len(time) - 1, 1)))
+    if len(time) < 2:
+        return float(values[0])
+    return float(values[k - 1] + (values[k] - values[k - 1]) * (at - time[k - 1]) / (time[k] - time[k - 1]))
 
 
 def _marks(x: Array) -> dict[str, Any]:
@@ -87,6 +99,7 @@ def _over(result: xr.Dataset) -> Abscissa:
 # ---- table ----------------------------------------------------------------------------------------------------
 
 
+SUMS = ("all, worst case, first order", "all, RSS", "all, standard deviation")
 HEAD = ["joint", "play", "largest effect ±", "at", "share"]
 
 
@@ -94,8 +107,10 @@ def tables(result: xr.Dataset) -> list[TextTable]:
     """For each measure: the joints with their play, largest effect and where, and share in the largest worst case."""
     units, over = attribute(result, "measure_units"), _over(result)
     return [
-        _table(result.isel(measure=i), over, str(name), unit)
-        for i, (name, unit) in enumerate(zip(result["measure"].values, units, strict=True))
+        _table_there(result.isel(measure=i), str(name), unit, *there)
+        if there
+        else _table(result.isel(measure=i), over, str(name), unit)
+        for i, (name, unit, there) in enumerate(zip(result["measure"].values, units, _extremes(result), strict=True))
     ]
 
 
@@ -109,16 +124,30 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTabl
         where = over.say(int(np.nanargmax(effect))) if np.nanmax(effect) > 0 else "—"
         share = f"{100 * effect[top] / total[top]:.1f} %" if total[top] > 0 else "—"
         rows.append([str(joint), _play(result, j), quantity(float(np.nanmax(effect)), unit), where, share])
-    for label, key in (
-        ("all, worst case, first order", "worst_case_total"),
-        ("all, RSS", "rss"),
-        ("all, standard deviation", "deviation_total"),
-    ):
+    for label, key in zip(SUMS, ("worst_case_total", "rss", "deviation_total"), strict=True):
         row = _relied_on(result, key)
         best = int(np.nanargmax(row))
         rows.append([label, "", quantity(float(row[best]), unit), over.say(best), ""])
     low, high = (quantity(float(pick(result["value"].values)), unit) for pick in (np.nanmin, np.nanmax))
     return TextTable(f"{name}, from {low} to {high}; shares are at {over.say(top)}", HEAD, rows)
+
+
+def _extremes(result: xr.Dataset) -> list[list[str]]:
+    """Of each measure the word for its extreme and where it is; empty of others, and in results of before."""
+    return attribute(result, "extremes") if "extremes" in result.attrs else [[]] * result.sizes["measure"]
+
+
+def _table_there(result: xr.Dataset, name: str, unit: str, word: str, where: str) -> TextTable:
+    """The same of a measure that is a maximum or minimum: all effects are those at its place."""
+    effects, deviations = (result[f"extreme_{key}"].values for key in ("worst_case", "deviation"))
+    total, rows = float(np.sum(effects)), list[list[str]]()
+    for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
+        share = f"{100 * effect / total:.1f} %" if total > 0 else "—"
+        rows.append([str(joint), _play(result, j), quantity(float(effect), unit), where, share])
+    sums = total, np.sqrt(np.sum(effects**2)), np.sqrt(np.sum(deviations**2))
+    for label, number in zip(SUMS, sums, strict=True):
+        rows.append([label, "", quantity(float(number), unit), where, ""])
+    return TextTable(f"{name}: the {word}, at {where}", ["joint", "play", "effect ±", "at", "share"], rows)
 
 
 def _relied_on(result: xr.Dataset, name: str) -> Array:

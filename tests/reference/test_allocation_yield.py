@@ -84,6 +84,40 @@ def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
 
 
 @pytest.mark.slow
+def test_fresh_samples_correct_those_that_chose() -> None:
+    """Samples that chose flatter the answer (here by 3 % of its deviations): fresh ones raise the margin."""
+    problem = four_bar("yield")
+    chosen = solve(problem, target=0.99, verify=sampled(problem, 0.97))  # type: ignore[arg-type]
+    fresh, streams = sampled(problem), []
+
+    def check(t: Array, stream: int) -> tuple[float, float, float]:
+        streams.append(stream)
+        return fresh(t)  # type: ignore[operator,no-any-return]
+
+    answer = solve(problem, "continuous", 0.99, sampled(problem, 0.97), check)  # type: ignore[arg-type]
+    assert answer.checked is not None
+    assert answer.sampled is not None
+    assert chosen.sampled is not None
+    assert chosen.sampled.share >= 0.99
+    assert chosen.sampled.share < answer.sampled.share
+    assert answer.checked.high >= 0.99 > fresh(chosen.tolerances)[2]  # type: ignore[operator]
+    assert answer.cost > chosen.cost
+    assert streams == [*range(1, len(streams) + 1)]
+    assert not answer.findings
+
+
+@pytest.mark.parametrize(("check", "code"), [((0.5, 0.45, 0.55), "yield.check_missed"),
+                                             ((0.89, 0.87, 0.91), "yield.check_uncertain")])  # fmt: skip
+def test_a_yield_that_fresh_samples_never_have_is_told(check: tuple[float, float, float], code: str) -> None:
+    problem = four_bar("yield", positions=12)
+    answer = solve(problem, "continuous", 0.9, lambda t: (0.901, 0.88, 0.92), lambda t, stream: check)
+    (finding,) = answer.findings
+    assert finding.code == code
+    assert finding.figures["share"] == check[0]
+    assert finding.figures["chosen"] == 0.901
+
+
+@pytest.mark.slow
 def test_processes_meet_a_yield_at_least_cost() -> None:
     rng = np.random.default_rng(2)
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))

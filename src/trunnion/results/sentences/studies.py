@@ -326,6 +326,18 @@ ALLOCATION = {
     "yield.narrowest": Sentence(
         ERROR, "with all tolerances at their least the yield is {share:.6g}, below {target:g}", WIDER
     ),
+    "yield.check_missed": Sentence(
+        ERROR,
+        "samples that had no part in the choice have a yield of {share:.6g} (95 % confidence interval {low:.6g} to "
+        "{high:.6g}), below {target:g}; those that chose have {chosen:.6g}",
+        WIDER,
+    ),
+    "yield.check_uncertain": Sentence(
+        NOTE,
+        "samples that had no part in the choice have a yield of {share:.6g}, below {target:g}, which is within its "
+        "confidence interval {low:.6g} to {high:.6g}",
+        "take more samples, or require a higher yield",
+    ),
     "yield.best": Sentence(ERROR, "the best yield found is {share:.6g}, below {target:g}", WIDER),
 }
 

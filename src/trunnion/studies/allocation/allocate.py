@@ -50,6 +50,7 @@ __all__ = ["allocate", "half_widths"]
 Array = NDArray[np.float64]
 START = 1e-5  # m: a play that is none yet is first looked at with this one
 ROUNDS = 10
+FRESH = 1_000_003  # between the seeds of samples that choose and of those that check: nobody states seeds so far off
 SAME = 1e-9  # of a limit: effects that no longer change
 MOST_FACTORS = 201
 RANGE = (0.5, 2.0)  # of the stated limits: the curve of cost over accuracy
@@ -336,18 +337,19 @@ class _Search:
         """The answer of a problem; of a yield that of the samples."""
         asked, names = self.asked, [one.name for one in problem.contributions]
 
-        def verify(tolerances: Array) -> tuple[float, float, float]:
+        def verify(tolerances: Array, stream: int = 0) -> tuple[float, float, float]:
             bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
             sampled = tolerance(
-                self.mechanism.with_tolerances(bought), self.measures, ["monte-carlo"], asked.samples, asked.seed,
-                asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
+                self.mechanism.with_tolerances(bought), self.measures, ["monte-carlo"], asked.samples,
+                asked.seed + FRESH * stream, asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
             )  # fmt: skip
             if sampled.attrs["stopped"]:  # a part of the samples decides no tolerances
                 raise KeyboardInterrupt
             share, low, high = (float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high"))
             return share, low, high
 
-        return solve(problem, self.way, _target(asked), verify if asked.samples else None)
+        judges = (verify, verify) if asked.samples else (None, None)
+        return solve(problem, self.way, _target(asked), *judges)
 
 
 def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:

@@ -37,6 +37,8 @@ def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> I
     if answer.sampled is not None:
         yield Figure("yield_asked", "required yield", found.asked.target)
         yield Figure("yield", "yield of the samples", answer.sampled.share)
+    if answer.checked is not None:
+        yield Figure("yield_checked", "yield of fresh samples", answer.checked.share)
     for name, used in zip(known["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
         if answer.found and np.isfinite(used):
             yield Figure(f"{name}.used", f"{name}, share of the limits used", used)

@@ -223,7 +223,8 @@ class Answer:
     residual: of the optimality conditions, relative; proven: whether the gap proves a global optimum.
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
     active: rows that limit; used: share of its room each row takes. rounds: of the solver.
-    Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; trials: all that were sampled. There the
+    Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; checked, by samples that had no
+    part in the choice; trials: all that were sampled. There the
     optimum is that of the margins of the problem, one for each measure. saved: share of the cost that their split
     saves against one margin for all measures, NaN where nothing was split. floor: no half widths whose yield of normal
     deviations meets the target cost less, linearly; excess: share of it by which the cost before sampling is above it.
@@ -243,6 +244,7 @@ class Answer:
     rounds: int = 0
     expected: float = np.nan
     sampled: SampledYield | None = None
+    checked: SampledYield | None = None
     trials: tuple[Trial, ...] = ()
     saved: float = np.nan
     floor: float = np.nan

@@ -46,6 +46,9 @@ VARIABLES: dict[str, Variable] = {
     "cost_bound": Variable((), "1", "lower bound of the cost of feasible tolerances, to first order"),
     "gap": Variable((), "1", "optimality gap, relative to the part of the cost that depends on the tolerances"),
     "yield_expected": Variable((), "1", "yield of normal deviations, to first order"),
+    "yield_checked": Variable((), "1", "share within all limits of fresh samples, which had no part in the choice"),
+    "yield_checked_low": Variable((), "1", "yield of the fresh samples, lower end of the 95 % interval"),
+    "yield_checked_high": Variable((), "1", "yield of the fresh samples, upper end of the 95 % interval"),
     "trial_margin": Variable(T, "1", "margin in a trial, in standard deviations; the mean over the measures"),
     "trial_cost": Variable(T, "1", "cost of a trial"),
     "trial_yield": Variable(T, "1", "share of the samples within all limits in a trial"),
@@ -170,6 +173,9 @@ def _whole(found: Allocated) -> Mapping[str, Any]:
     }
     if found.asked.criterion == "yield":
         arrays["yield_expected"] = np.array(answer.expected)
+    if answer.checked is not None:
+        ends = zip(("", "_low", "_high"), answer.checked, strict=True)
+        arrays |= {f"yield_checked{end}": np.array(number) for end, number in ends}
     if answer.trials:
         arrays |= {
             "trial_margin": np.array([one.z for one in answer.trials]),

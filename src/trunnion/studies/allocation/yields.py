@@ -5,6 +5,8 @@ deviations in polar form its radius is integrated exactly (chi distribution) and
 (I. Deák, Three digit accurate multiple normal probabilities, Numerische Mathematik 35 (1980) 369–380). Rows of one
 measure at neighbouring positions fail together, so this is far closer than the sum of their failures (Bonferroni),
 which bounds z from above. The margin found is then corrected until the yield that the caller samples meets the target.
+What is cheapest of several is favoured by the samples that chose it, so other samples check it, and if they miss the
+target beyond their interval the margin is raised and it is tried again.
 """
 
 from __future__ import annotations
@@ -23,14 +25,16 @@ from trunnion.statistics.streams import SobolStream, factor
 from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial
 from trunnion.studies.allocation.splits import split
 
-__all__ = ["Verify", "meet", "normal_yield"]
+__all__ = ["Check", "Verify", "meet", "normal_yield"]
 
 Array = NDArray[np.float64]
 Verify = Callable[[Array], tuple[float, float, float]]
+Check = Callable[[Array, int], tuple[float, float, float]]
 DIRECTIONS = 2048
 ROWS = 128  # worked on at once
 FAR = 6.0  # standard deviations: a row with more room than that never fails
 TRIALS = 12
+CHECKS = 4  # by fresh samples, each with a margin that the one before has raised
 STEP = 1.0  # of z, at most, after one sampling
 CLOSE = 1e-3  # of z: two choices of processes that lie closer are neighbours
 NEAR = 1e-6  # of z: how close splits of the margins are settled
@@ -109,10 +113,12 @@ def meet(
     target: float,
     solve: Callable[[AllocationProblem], Answer],
     verify: Verify | None = None,
+    check: Check | None = None,
 ) -> Answer:
     """The allocation of least cost whose yield meets the target.
 
-    solve: of a problem with z given; verify: half widths (contribution,) → yield, and its interval, low and high.
+    solve: of a problem with z given; verify: half widths (contribution,) → yield, and its interval, low and high;
+    check: the same of other samples, with the number of their stream, from 1.
     """
     first = _expected(problem, target, solve)
     if not first.found:
@@ -120,7 +126,7 @@ def meet(
     best = first
     if not first.findings:
         best = split(first, lambda one: _expected(one, target, solve, AROUND), _plain_yield)
-    answer = best if verify is None else _sampled(best, target, solve, verify)
+    answer = best if verify is None else _sampled(best, target, solve, verify, check)
     saved = 1 - best.cost / first.cost if best is not first else np.nan
     return replace(answer, saved=saved, excess=best.cost / first.floor - 1 if first.floor > 0 else np.nan)
 
@@ -161,23 +167,38 @@ def _expected(
     return replace(best, findings=(*best.findings, doubt))
 
 
-def _sampled(answer: Answer, target: float, solve: Callable[[AllocationProblem], Answer], verify: Verify) -> Answer:
-    """The same with the margin corrected by what is sampled, until the target lies in the interval of the yield."""
+def _sampled(
+    answer: Answer,
+    target: float,
+    solve: Callable[[AllocationProblem], Answer],
+    verify: Verify,
+    check: Check | None,
+) -> Answer:
+    """The same with the margin corrected by what is sampled, until the samples meet the target, and fresh ones too."""
     low, high = 0.0, np.inf
     z, problem = answer.problem.z, answer.problem
+    goal, checks = _score(target), 0
     seen: dict[bytes, Answer] = {}
     trials: list[Trial] = []
     while len(trials) < TRIALS:
         if answer.found:
             key = np.round(answer.tolerances, 15).tobytes()
-            known = seen.get(key)
-            sampled = known.sampled if known and known.sampled else SampledYield(*verify(answer.tolerances))
-            seen[key] = answer = replace(answer, sampled=sampled)
+            known = seen.get(key, answer)
+            sampled = known.sampled or SampledYield(*verify(answer.tolerances))
+            seen[key] = answer = replace(answer, sampled=sampled, checked=known.checked)
             trials.append(Trial(z, answer.cost, sampled))
-            if sampled.low <= target <= sampled.high:
-                break
-            short = sampled.high < target
-            step = _correction(trials, target)
+            short = _score(sampled.share) < goal
+            if not short and _score(sampled.low) <= goal:
+                if check is None or checks == CHECKS:
+                    break
+                checks += 1
+                seen[key] = answer = _checked(answer, check, checks)
+                if _holds(answer, target):
+                    break
+                # the fresh samples are the ones without a bias: as much more of the others as those are short of
+                goal = _score(sampled.share) + max(_score(target) - _score(_share_of(answer.checked)), 0.0)
+                short = True
+            step = _correction(trials, goal + _half(sampled, target))
         else:
             short, step = False, np.nan
         low, high = (z, high) if short else (low, z)
@@ -189,21 +210,59 @@ def _sampled(answer: Answer, target: float, solve: Callable[[AllocationProblem],
         answer = solve(replace(problem, z=z))
         if answer.found:
             answer = replace(answer, expected=normal_yield(problem, answer.tolerances))
-    met = [one for one in seen.values() if one.sampled and one.sampled.high >= target]
-    best = min(met, key=lambda one: one.cost) if met else max(seen.values(), key=lambda one: (one.sampled or (0.0,))[0])
-    if met:
-        return replace(best, trials=tuple(trials))
-    share = best.sampled.share if best.sampled else np.nan
-    doubt = finding_for("yield.best", "yield", share=share, target=target)
-    return replace(best, trials=tuple(trials), findings=(*best.findings, doubt))
+    return replace(_chosen(list(seen.values()), target, check, checks), trials=tuple(trials))
 
 
-def _correction(trials: list[Trial], target: float) -> float:
+def _chosen(seen: list[Answer], target: float, check: Check | None, checks: int) -> Answer:
+    """The cheapest of those sampled that meets the target, by fresh samples too; or the best, with what it misses."""
+    known: list[Answer] = []
+    for one in sorted((one for one in seen if _share_of(one.sampled) >= target), key=lambda one: one.cost):
+        best = one
+        if check is not None and one.checked is None:
+            checks += 1
+            best = _checked(one, check, checks)
+        if _holds(best, target):
+            return best
+        known.append(best)
+    if known:
+        best = max(known, key=lambda one: _share_of(one.checked))
+        checked = best.checked or SampledYield(np.nan, np.nan, np.nan)
+        figures = {**checked._asdict(), "target": target, "chosen": _share_of(best.sampled)}
+        code = "yield.check_uncertain" if checked.high >= target else "yield.check_missed"
+        return replace(best, findings=(*best.findings, finding_for(code, "yield", **figures)))
+    best = max(seen, key=lambda one: _share_of(one.sampled))
+    if best.sampled is not None and best.sampled.high >= target:
+        return best
+    doubt = finding_for("yield.best", "yield", share=_share_of(best.sampled), target=target)
+    return replace(best, findings=(*best.findings, doubt))
+
+
+def _checked(answer: Answer, check: Check, stream: int) -> Answer:
+    return replace(answer, checked=SampledYield(*check(answer.tolerances, stream)))
+
+
+def _holds(answer: Answer, target: float) -> bool:
+    """Whether both samples together meet the target, and those that check do not speak against it."""
+    if answer.checked is None:
+        return True
+    return answer.checked.high >= target and (_share_of(answer.sampled) + answer.checked.share) / 2 >= target
+
+
+def _share_of(sampled: SampledYield | None) -> float:
+    return sampled.share if sampled else 0.0
+
+
+def _half(sampled: SampledYield, target: float) -> float:
+    """What to aim above the target by, in standard scores: half of the interval, so as to be above it next."""
+    return (_score(target) - _score(target - (sampled.share - sampled.low))) / 2
+
+
+def _correction(trials: list[Trial], goal: float) -> float:
     """Change of z by the line through the last two trials, or from 0 through the one: scores are nearly linear in z."""
     z, score = trials[-1].z, _score(trials[-1].sampled.share)
     z0, score0 = (trials[-2].z, _score(trials[-2].sampled.share)) if len(trials) > 1 else (0.0, 0.0)
     rise = (score - score0) / (z - z0) if z != z0 else 1.0
-    return float(np.clip((_score(target) - score) / max(rise, 0.1), -STEP, STEP))
+    return float(np.clip((goal - score) / max(rise, 0.1), -STEP, STEP))
 
 
 def _score(share: float) -> float:

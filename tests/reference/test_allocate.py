@@ -383,6 +383,19 @@ def test_names_of_any_script() -> None:
     assert result.attrs["found"]
 
 
+def test_the_curve_of_a_yield_passes_through_the_answer() -> None:
+    """Samples ask for another margin than normal deviations do: the curve is of that one."""
+    model = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
+    result = trunnion.allocate(model, ["rocker-angle"], "yield", 0.9, steps=12, samples=500, curve=3)
+    costs = result["trade_off_cost"].values
+    assert costs[1] == float(result["cost_total"])
+    assert list(costs) == sorted(costs, reverse=True)
+    assert float(result["yield_checked_high"]) >= 0.9
+    plain = trunnion.allocate(model, ["rocker-angle"], "yield", 0.9, steps=12, samples=0, curve=3)
+    ratio = costs / plain["trade_off_cost"].values
+    assert ratio == pytest.approx(np.full(3, ratio[1]), rel=2e-2)  # as much dearer everywhere
+
+
 def test_the_least_limits_of_a_curve_that_can_be_kept() -> None:
     model = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml")
     result = trunnion.allocate(model, steps=24, samples=0, curve=25)

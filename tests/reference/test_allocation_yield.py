@@ -117,6 +117,43 @@ def test_a_yield_that_fresh_samples_never_have_is_told(check: tuple[float, float
     assert finding.figures["chosen"] == 0.901
 
 
+def bounded(problem: AllocationProblem, count: int = 20_000) -> object:
+    """A yield with every contribution at either end of its tolerance, half and half: no tail at all."""
+
+    def verify(t: Array) -> tuple[float, float, float]:
+        rng = np.random.default_rng(5)
+        draws = rng.choice([-1.0, 1.0], size=(count, len(t))) @ (problem.effects.sigma() * t).T
+        share = float(np.mean(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1)))
+        half = 1.96 * float(np.sqrt(max(share * (1 - share), 1e-9) / count))
+        return share, share - half, share + half
+
+    return verify
+
+
+@pytest.mark.parametrize(("room", "kept"), [(0.12, True), (0.09, False)])
+def test_samples_decide_where_the_distribution_has_no_tail(room: float, kept: bool) -> None:
+    """A fixed contribution that is ±0.1 at either end, and another limit: z σ = 0.26 for normal ones is far beyond."""
+    parts = (Contribution("fixed", 1.0), *bought([PLAIN] * 2))
+    effects = replace(
+        rows(np.array([[0.3, 0.0, 0.0], [0.0, 1.0, 1.0]]), np.array([room, 0.1])), labels=("measures.a", "measures.b")
+    )
+    problem = AllocationProblem(parts, effects, "yield")
+    assert not solve(problem, target=0.99).found
+    answer = solve(problem, target=0.99, verify=bounded(problem))  # type: ignore[arg-type]
+    assert answer.found == kept
+    (finding,) = answer.findings
+    if kept:
+        assert finding.code == "yield.not_normal"
+        assert finding.figures["measures"] == ["a"]
+        assert answer.sampled is not None
+        assert answer.sampled.share >= 0.99
+        assert answer.expected < 0.99
+        costs = [one.cost for one in trade_off(answer.problem, [0.9, 1.0, 1.2], target=answer.expected)]
+        assert costs[1] == pytest.approx(answer.cost, rel=1e-3)
+    else:
+        assert finding.code == "allocation.impossible"
+
+
 @pytest.mark.slow
 def test_processes_meet_a_yield_at_least_cost() -> None:
     rng = np.random.default_rng(2)

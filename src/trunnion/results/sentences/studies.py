@@ -265,7 +265,7 @@ ALLOCATION = {
     "allocation.impossible": Sentence(
         ERROR,
         "the limit {limit_told} is infeasible: with all tolerances at their least the deviation is "
-        "{takes_told}{ratio}{more}",
+        "{takes_told}{normal}{ratio}{more}",
         "widen the limit, or first {narrow} has the largest share",
     ),
     "allocation.nominal_outside": Sentence(
@@ -325,6 +325,11 @@ ALLOCATION = {
     ),
     "yield.narrowest": Sentence(
         ERROR, "with all tolerances at their least the yield is {share:.6g}, below {target:g}", WIDER
+    ),
+    "yield.not_normal": Sentence(
+        NOTE,
+        "normal deviations would break the limits of {measures} too often whatever the tolerances, and these have a "
+        "yield of {normal:.4g} by them; the samples decide, with {share:.6g}",
     ),
     "yield.check_missed": Sentence(
         ERROR,

@@ -177,10 +177,22 @@ def _found(mechanism: Mechanism, measures: Sequence[str], asked: AllocationReque
         answer, now, rows, more = search.tightened(answer, now, rows, more)
     offers: list[tuple[float, Answer]] = []
     if asked.curve and answer.found:
-        factors = np.geomspace(*RANGE, asked.curve).tolist()
-        offers = list(zip(factors, trade_off(answer.problem, factors, way, _target(asked)), strict=True))
+        offers = _curve(answer, way, asked)
     findings = (*notes, *more)
     return Allocated(asked, now, rows, answer, way, prices, before, findings, search.tight, tuple(offers))
+
+
+def _curve(answer: Answer, way: Way, asked: AllocationRequest) -> list[tuple[float, Answer]]:
+    """Factors of all limits with the answers of least cost.
+
+    Of a yield they have that of normal deviations which the answer has: what samples have shown the target to take.
+    """
+    factors: list[float] = np.geomspace(*RANGE, asked.curve).tolist()
+    target = _target(asked)
+    if target is not None and answer.sampled is not None and 0 < answer.expected < 1:
+        target = answer.expected
+    offers = trade_off(answer.problem, factors, way, target)
+    return [(factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, offers, strict=True)]
 
 
 def _studied(mechanism: Mechanism, measures: Sequence[str], asked: AllocationRequest) -> ToleranceStudy:

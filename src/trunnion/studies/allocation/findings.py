@@ -76,7 +76,7 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
 def _margins(found: Allocated) -> Iterator[Finding]:
     """How the permitted failures are split over several limits."""
     answer, count = found.answer, len(np.unique(found.rows.measure))
-    if count < 2:
+    if count < 2 or any(one.code == "yield.not_normal" for one in answer.findings):
         return
     above: dict[str, Any] = {"count": count, "excess": answer.excess if np.isfinite(answer.excess) else None}
     if found.way == "discrete":

@@ -326,7 +326,9 @@ def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) ->
     narrow = f"narrow {name}, which has no cost and" if largest.fixed else f"allow {name} a smaller least: it"
     ratio = f", {over / limit:.3g} times the limit" if over * limit > 0 else ""
     takes = f"{effects.say(row, over)}{effects.place(row)}"
+    normal = f" ({problem.margins()[row]:.3g} standard deviations of a normal distribution)"
     phrases = {
+        "normal": normal if problem.criterion == "yield" else "",
         "limit_told": effects.say(row, limit),
         "takes_told": takes,
         "ratio": ratio,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ DIRECTIONS = 2048
 ROWS = 128  # worked on at once
 FAR = 6.0  # standard deviations: a row with more room than that never fails
 TRIALS = 12
+HIGHEST = 8.0  # standard score, and z, that is looked at
 CHECKS = 4  # by fresh samples, each with a margin that the one before has raised
 STEP = 1.0  # of z, at most, after one sampling
 CLOSE = 1e-3  # of z: two choices of processes that lie closer are neighbours
@@ -122,9 +123,9 @@ def meet(
     """
     first = _expected(problem, target, solve)
     if not first.found:
-        return first
+        return first if verify is None else _beyond_normal(first, target, solve, verify, check)
     best = first
-    if not first.findings:
+    if not first.findings and (problem.ratios is None or np.all(problem.ratios > 0)):
         best = split(first, lambda one: _expected(one, target, solve, AROUND), _plain_yield)
     answer = best if verify is None else _sampled(best, target, solve, verify, check)
     saved = 1 - best.cost / first.cost if best is not first else np.nan
@@ -143,13 +144,15 @@ def _expected(
     def over(z: float) -> float:
         answer = solve(replace(problem, z=z))
         if not answer.found:
-            return 8.0
+            return HIGHEST
         answer = replace(answer, expected=normal_yield(problem, answer.tolerances))
         tried.append(answer)
         return _score(answer.expected) - _score(target)
 
     rows, ratios = len(problem.effects.worst), np.ones(1) if problem.ratios is None else problem.ratios
     least, most = float(ndtri(target)) - 1e-3, float(ndtri(1 - (1 - target) / (2 * rows))) + 1e-3
+    if not np.all(ratios > 0):  # rows that samples alone decide over: what they fail is no matter of the margin
+        ratios, most = np.where(ratios > 0, ratios, 1.0), HIGHEST
     ends = (max(least, 1e-3) / float(np.max(ratios)), most / float(np.min(ratios)))
     near = (max(ends[0], problem.z - around), min(ends[1], problem.z + around))
     for low, high in dict.fromkeys((near, ends)):
@@ -165,6 +168,51 @@ def _expected(
     best = max(tried, key=lambda one: one.expected)
     doubt = finding_for("yield.narrowest", "yield", share=best.expected, target=target)
     return replace(best, findings=(*best.findings, doubt))
+
+
+def _beyond_normal(
+    first: Answer,
+    target: float,
+    solve: Callable[[AllocationProblem], Answer],
+    verify: Verify,
+    check: Check | None,
+) -> Answer:
+    """Where no half widths keep the limits for normal deviations: those that samples keep, as without tails they may.
+
+    The measures that are short get a smaller margin, however large that of the others: first none, then more.
+    `first` if no such allocation meets the target with samples.
+    """
+    short = {one.where for one in first.findings}
+    own = np.array([first.problem.effects.label(row) in short for row in range(len(first.problem.effects.worst))])
+
+    def capped(problem: AllocationProblem, most: float) -> Answer:
+        return solve(replace(problem, ratios=np.where(own, np.minimum(most / problem.z, 1.0), 1.0)))
+
+    low, high = 0.0, first.problem.z
+    while own.any() and high - low > CLOSE:
+        middle = (low + high) / 2
+        low, high = (middle, high) if capped(first.problem, middle).found else (low, middle)
+    for more in (
+        (STEP, STEP / 2) if low > 0 else ()
+    ):  # where the least half widths miss it, there is nothing to look for
+        least = capped(replace(first.problem, z=first.problem.z + more), low)
+        if least.found:
+            if SampledYield(*verify(least.tolerances)).high < target:
+                return first
+            break
+    for most in (0.0, low / 2, low) if low > 0 else ():
+        best = capped(first.problem, most)
+        if not best.found:
+            continue
+        best = replace(best, expected=normal_yield(best.problem, best.tolerances))
+        found = _sampled(best, target, partial(capped, most=most), verify, check)
+        if not found.findings and _share_of(found.sampled) >= target:
+            note = finding_for(
+                "yield.not_normal", "yield", measures=sorted(name.removeprefix("measures.") for name in short),
+                share=_share_of(found.sampled), normal=found.expected,
+            )  # fmt: skip
+            return replace(found, findings=(note,))
+    return first
 
 
 def _sampled(

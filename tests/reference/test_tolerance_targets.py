@@ -168,3 +168,18 @@ def test_a_yield_that_is_asked_for_decides_alone(asked: float, fine: bool) -> No
 def test_a_yield_that_cannot_be_asked_for(target: float, methods: list[str]) -> None:
     with pytest.raises(trunnion.MechanismError):
         trunnion.tolerance(fourbar(), methods=methods, target=target)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.9])
+def test_what_to_narrow_first_for_a_yield_of_correlated_numbers_is_by_variance(coefficient: float) -> None:
+    """The worst case knows no correlation; a yield does."""
+    text = made(limit="±0.01 deg")
+    together = [{"of": ["l2", "l3", "l4"], "coefficient": coefficient}] if coefficient else []
+    result = trunnion.tolerance(fourbar(**text, correlations=together), methods=["linear", "monte-carlo"], samples=2000,
+                                target=0.99)  # fmt: skip
+    key = "contribution_variance" if coefficient else "contribution_worst_case"
+    parts = result[key].sel(measure="angle")
+    top = str(parts["parameter"].values[int(parts.values.argmax())])
+    share = 100 * float(parts.max() / parts.sum())
+    (row,) = missed(result)
+    assert f"'{top}', {share:.3g} % of the {'variance' if coefficient else 'worst case'}" in row["remedy"]

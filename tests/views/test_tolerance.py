@@ -86,6 +86,13 @@ def test_every_result_makes_a_sheet(case, tmp_path):
     assert save(drawn, tmp_path / "sheet.svg").stat().st_size > 20_000
 
 
+def test_the_legend_of_correlated_tolerances_stays_on_a_sheet_of_three_columns():
+    """ "RSS, uncorrelated" is longer than "RSS"."""
+    result = toleranced(24, 500, measures=2).assign_attrs(correlated=1, limits=json.dumps([None, None]))
+    plain = result.drop_vars([name for name in result if str(name).startswith("searched")])
+    assert not outside(sheet(plain))
+
+
 def test_every_result_makes_tables(case):
     for table in [*tables(case), inputs(case), overview(case)]:
         assert table.title
@@ -343,6 +350,7 @@ def test_files_are_refused_before_anything_is_computed(tmp_path):
         (lambda: check_files([tmp_path / "a.xyz"]), "cannot write a result as '.xyz'"),
         (lambda: check_files([tmp_path / "a.svg"], drawn=False), "cannot write a result as '.svg'"),
         (lambda: check_files([], tmp_path / "a.txt"), "a report is HTML"),
+        (lambda: check_files([tmp_path / "a.contributions.csv"], of="tolerance"), "there is no table 'contributions'"),
         (lambda: check_kind("pie"), "there is no figure 'pie'"),
     ):
         with pytest.raises(MechanismError, match=what):
@@ -380,6 +388,9 @@ def test_tables_of_a_file_by_its_name(tmp_path):
     assert places["angle-error.links.crank.length.sensitivity"].to_numpy() == pytest.approx(
         result.curve_sensitivity.values[0, 1]
     )
+    with pytest.raises(MechanismError, match="there is no table 'contributions'"):
+        export(result, tmp_path / "x.contributions.csv")
+    export(result, tmp_path / "x.2026-11.csv")  # a date asks for no table
     export(CASES["linear only"](), tmp_path / "y.histogram.csv")
     assert (tmp_path / "y.histogram.csv").read_text().startswith("measure,from,to,count")
 

@@ -36,11 +36,12 @@ def check_files(
     kind: str | None = None,
     instead: str = "",
 ) -> None:
-    """MechanismError for a file that cannot be written, or a kind of figure that a result of some kind (`of`) has not.
+    """MechanismError for a file that cannot be written, or a table or figure that a result of some kind (`of`) has not.
 
     drawn: whether figures can be written; instead: what writes them where they cannot.
     """
     from trunnion.results.export import check_format
+    from trunnion.results.tables import check_table
 
     others = IMAGES if drawn else ()
     for path in out:
@@ -49,6 +50,8 @@ def check_files(
             raise MechanismError(Finding(what, "--out", f"figures: {instead} --out {path}"))
         if path.suffix.lower() not in others:
             check_format(path, others)
+            if of:
+                check_table(path, of)
     check_page(report, "--report")
     if kind is not None:
         from trunnion.views.shown import check_kind

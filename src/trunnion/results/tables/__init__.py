@@ -7,13 +7,16 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from trunnion.errors import Finding, MechanismError
 from trunnion.results.tables import comparison, cycle, identification, studies, tolerances
 from trunnion.results.tables.column import Column, whole
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["KINDS", "Column", "columns", "kind_of", "table_of"]
+__all__ = ["KINDS", "Column", "check_table", "columns", "kind_of", "table_of"]
+
+TABULAR = (".csv", ".parquet", ".xlsx")  # files whose name says which table; the others hold the whole result
 
 Tables = Mapping[str, Callable[[Any], list[Column]]]
 
@@ -59,7 +62,23 @@ def columns(result: xr.Dataset, table: str = "") -> list[Column]:
 
 
 def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
-    """The table that a file of this name holds: of `x.positions.csv` the positions, if there is such a table."""
-    tables = KINDS[kind_of(result)]
-    inner = Path(Path(path).stem).suffix.lstrip(".").lower()
-    return inner if inner in tables else next(iter(tables))
+    """The table that a file of this name holds: of `x.positions.csv` the positions; MechanismError as `check_table`."""
+    kind = kind_of(result)
+    check_table(path, kind)
+    inner = _inner(path)
+    return inner if inner in KINDS[kind] else next(iter(KINDS[kind]))
+
+
+def check_table(path: str | os.PathLike[str], kind: str) -> None:
+    """MechanismError for a name such as `x.contributions.csv`, which asks for a table that a kind of result has not.
+
+    Only of kinds with several tables; a part of a name with other characters than letters (`x.2.csv`) asks for none.
+    """
+    tables, inner = KINDS[kind], _inner(path)
+    if Path(path).suffix.lower() in TABULAR and len(tables) > 1 and inner.isalpha() and inner not in tables:
+        remedy = f"use x.{Path(path).suffix.lstrip('.')} or x.TABLE{Path(path).suffix}, TABLE: {', '.join(tables)}"
+        raise MechanismError(Finding(f"there is no table '{inner}'", str(path), remedy))
+
+
+def _inner(path: str | os.PathLike[str]) -> str:
+    return Path(Path(path).stem).suffix.lstrip(".").lower()

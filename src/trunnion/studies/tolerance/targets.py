@@ -193,7 +193,8 @@ def _remedy(outcome: Outcome, of: Of, say: _Words) -> str:
     off = _off_middle(lower, upper, middle)
     first = f"bring the nominal mechanism {say.say(-off)} nearer to the middle of the limits, and " if off else ""
     name, share, priced = _largest(outcome, of)
-    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the worst case"
+    whole = "variance" if _by_variance(outcome) else "worst case"
+    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the {whole}"
     if not priced:
         return f"{narrow}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
     if not fixed:
@@ -221,10 +222,21 @@ def _off_middle(lower: float, upper: float, middle: float) -> float:
     return off if np.isfinite(room) and abs(off) > HALF * room else 0.0
 
 
+def _by_variance(outcome: Outcome) -> bool:
+    """Whether a yield is asked for where numbers vary together."""
+    return outcome.target is not None and outcome.study.effects.correlated
+
+
 def _largest(outcome: Outcome, of: Of) -> tuple[str, float, bool]:
-    """The number with the largest part in the worst case, its share, and whether anything has a cost."""
+    """The number with the largest part in the worst case, its share, and whether anything has a cost.
+
+    Where a yield is asked for of correlated numbers, in the variance: the worst case knows no correlation.
+    """
     study = outcome.study
-    worst = np.nan_to_num(np.maximum(-of.spread.lower, of.spread.upper))
+    if _by_variance(outcome):
+        worst = np.nan_to_num(study.effects.covariances(of.spread, of.slope))
+    else:
+        worst = np.nan_to_num(np.maximum(-of.spread.lower, of.spread.upper))
     top = int(np.argmax(worst))
     total = float(np.sum(worst))
     priced = bool(study.run.system.mechanism.costs)

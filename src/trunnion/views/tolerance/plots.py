@@ -199,7 +199,8 @@ def envelope(parent: FigureBase, read: MeasureReading) -> None:
     for k, one in enumerate(limits):
         axes.axhline(one * read.factor, label=None if k else f"limits {read.told_limits}", **LIMITED)
     axes.margins(y=0.07)
-    legend(axes, most=4)
+    # beside two other figures "RSS, uncorrelated" is cut off at the end of one row
+    legend(axes, most=4, room=75 if read.correlated else 90)
 
 
 def rss_label(read: MeasureReading) -> str:

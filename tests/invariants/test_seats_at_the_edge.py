@@ -60,6 +60,39 @@ def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
 
 
 @pytest.mark.slow
+def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None:
+    """No load from 40° to 180°."""
+    data = read(EXAMPLES / "slider-crank.yaml").data()
+    data["gravity"] = [0, 0]
+    for link in data["links"].values():
+        for key in ("mass", "centre", "inertia"):
+            link.pop(key, None)
+    data["joint_defaults"] = {"pin": {"clearance": "10 um"}, "seat": "loaded"}
+    data["measures"] = {"course": {"slide": "S"}, "stroke": {"stroke": "S"}, "mean": {"slide": "S", "as": "rms"}}
+    data["measures"] |= {one: {"slide": "S", "as": one} for one in ("minimum", "maximum")}
+    window = {"slide": "S", "over": ["50 deg", "170 deg"]}
+    data["measures"] |= {"low": window | {"as": "minimum"}, "swing": window | {"as": "peak-to-peak"}}
+    data["measures"]["there"] = {"slide": "S", "at": "90 deg"}
+    result = analyse(Mechanism(**data), steps=360)
+    valid = result["status"].values != 3
+    slide = result["joint_slide"].sel(joint="S").values
+    figures = {one.name: one for one in result.trunnion.summary}
+    note = f"of {np.count_nonzero(valid)} of 360 positions"
+    assert note == "of 219 of 360 positions"
+    assert figures["S.stroke"].value == pytest.approx(np.ptp(slide[valid]))
+    assert {figures[name].note for name in ("S.stroke", "course.min", "course.max")} == {note}
+    assert figures["course.max"].value == pytest.approx(np.max(slide[valid]))
+    for name, pick in (("minimum", np.min), ("maximum", np.max)):
+        assert figures[name].value == pytest.approx(pick(slide[valid]), rel=1e-5)  # valid, next to the stretch
+    for name in ("low", "swing", "there"):
+        assert figures[name].value is None
+        assert "loses contact" in figures[name].note
+        assert np.isnan(result["measure_figure"].sel(measure=name))
+    assert figures["mean"].value is not None
+    assert "loses contact at " in figures["mean"].note
+
+
+@pytest.mark.slow
 def test_nothing_is_said_of_contact_where_it_is_locked() -> None:
     result = analyse(changed("fourbar-with-play", {"joint_defaults.friction.coefficient": 5}), steps=60)
     locked = result["status"].values >= 4

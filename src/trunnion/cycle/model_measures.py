@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of, figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import plan
@@ -24,7 +24,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Watched", "watched"]
+__all__ = ["VARIABLES", "Watched", "positions_told", "watched"]
 
 Array = NDArray[np.float64]
 # the model's measures, each in its own unit, in the attributes `measure_units` and `measure_figure_units`
@@ -32,18 +32,30 @@ VARIABLES = {
     "measure_value": Variable(("measure", "position"), "", "the model's measure; NaN of one that has several numbers"),
     "measure_figure": Variable(("measure",), "", "figure of the measure over the cycle; NaN of one that states none"),
 }
+# figures of single positions, and the course whose extremes these are
+OF_PLACES: dict[str, Callable[[Array], Array]] = {
+    **dict.fromkeys(
+        ("value", "maximum", "minimum", "peak-to-peak", "place-of-maximum", "place-of-minimum"), lambda course: course
+    ),
+    "largest": np.abs,
+}
 TAKEN = ("time", "drive", "power_in", "power_useful", "seat_rounds", "status")  # columns of the result
 
 
 @dataclass(frozen=True)
 class Watched:
-    """values: (measure, position), figures: (measure,), SI; findings: which measures of the model are left out, why."""
+    """values: (measure, position), figures: (measure,), SI; findings: which measures of the model are left out, why.
+
+    valid: the positions where no pin loses contact; notes: what that does to a figure, by the measure's name.
+    """
 
     run: Run
     measures: Sequence[Measure]
     values: Array
     figures: Array
     findings: Sequence[Finding]
+    valid: NDArray[np.bool_]
+    notes: Mapping[str, str]
 
     def joined(self, result: xr.Dataset) -> xr.Dataset:
         """A result with them."""
@@ -64,14 +76,24 @@ class Watched:
             name, subject, unit = measure.name, f"measure {measure.name}", measure.unit(self.run.system)
             if measure.rule != "deviation":
                 own = measure.figure_unit(self.run.system, self.run.values)
-                yield Figure(name, subject, figure, own, measure.statistic.replace("-", " "))
-            elif np.any(np.isfinite(values)):
-                yield Figure(f"{name}.min", subject, np.nanmin(values), unit, "minimum")
-                yield Figure(f"{name}.max", subject, np.nanmax(values), unit, "maximum")
+                aspect = measure.statistic.replace("-", " ")
+                yield Figure(name, subject, figure, own, aspect, note=self.notes.get(name, ""))
+            elif np.any(np.isfinite(values[self.valid])):
+                note, own = positions_told(self.valid), values[self.valid]
+                yield Figure(f"{name}.min", subject, np.nanmin(own), unit, "minimum", note=note)
+                yield Figure(f"{name}.max", subject, np.nanmax(own), unit, "maximum", note=note)
 
 
-def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:
-    """The model's measures over the cycle. time: positions of the result, s."""
+def positions_told(valid: NDArray[np.bool_]) -> str:
+    """Of how many positions a figure is, where a pin loses contact at others; empty where it does at none."""
+    return "" if np.all(valid) else f"of {np.count_nonzero(valid)} of {len(valid)} positions"
+
+
+def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None) -> Watched:
+    """The model's measures over the cycle. time: positions of the result, s; status: theirs, if known.
+
+    A figure at a position where a pin loses contact is NaN: it is that of a seat which would jump.
+    """
     steps, measures, findings = len(time), [], []
     for name in run.system.mechanism.measures:
         try:
@@ -83,7 +105,33 @@ def watched(run: Run, time: Array, method: FrictionMethod) -> Watched:
     if measures:
         with np.errstate(all="ignore"):
             _fill(run, measures, time, method, (values, figures))
-    return Watched(run, measures, values, figures, findings)
+    valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
+    notes: dict[str, str] = {}
+    for i, measure in enumerate(measures if not np.all(valid) else ()):
+        if measure.rule == "deviation":
+            continue
+        there = _resting_on(run, measure, values[i], time)
+        lost = ~valid[there]
+        if measure.rule in OF_PLACES and np.any(lost):
+            figures[i], notes[measure.name] = np.nan, "not valid: a pin loses contact at its place"
+        elif np.any(lost):
+            notes[measure.name] = f"a pin loses contact at {np.count_nonzero(lost)} of its {len(lost)} positions"
+    return Watched(run, measures, values, figures, findings, valid, notes)
+
+
+def _resting_on(run: Run, measure: Measure, values: Array, time: Array) -> NDArray[np.intp]:
+    """Positions that a figure is of, nearest to it: those of its extremes, or all of its window."""
+    window = plan(run, [measure], len(time)).windows[measure.name]
+    duration = run.cycle.duration
+    places = window.time % duration if run.cycle.periodic and duration > 0 else window.time
+    more = [duration] if run.cycle.periodic and duration > 0 else []  # after the last position the first one again
+    index = np.unique(np.rint(np.interp(places, [*time, *more], range(len(time) + len(more)))).astype(int) % len(time))
+    course = values[index]
+    if measure.rule not in OF_PLACES or not np.any(np.isfinite(course)):
+        return index
+    picks = [pick(OF_PLACES[measure.rule](course)) for pick in (np.nanargmin, np.nanargmax)]
+    ends = {"minimum": picks[:1], "place-of-minimum": picks[:1], "peak-to-peak": picks}
+    return index[ends.get(measure.rule, picks[1:])]
 
 
 def _had(run: Run, name: str, steps: int) -> Measure:

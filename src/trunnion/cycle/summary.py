@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from trunnion.cycle.positions import Positions
     from trunnion.solve.run import Run
 
-from trunnion.cycle.model_measures import watched
+from trunnion.cycle.model_measures import positions_told, watched
 from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
@@ -77,7 +77,7 @@ def result_of(run: Run, found_positions: Positions) -> Result:
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
-    measured = watched(run, time, method)
+    measured = watched(run, time, method, arrays["status"])
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
     attributes = encoded(
         {
@@ -316,9 +316,11 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
             elif planar:  # rounding has no place
                 yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
         slide = arrays["joint_slide"][i]
-        slide = slide[arrays["status"] != Status.CONTACT_LOST]
+        valid = arrays["status"] != Status.CONTACT_LOST
+        slide = slide[valid]
         if PAIRS[kind].guided and np.any(np.isfinite(slide)):
-            yield Figure(f"{name}.stroke", f"stroke of {name}", np.nanmax(slide) - np.nanmin(slide), "m")
+            stroke, note = np.nanmax(slide) - np.nanmin(slide), positions_told(valid)
+            yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
 
 
 def _rounding(arrays: Arrays, variable: str) -> float:

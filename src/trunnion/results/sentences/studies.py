@@ -146,9 +146,9 @@ TOLERANCE = {
     ),
     "tolerance.seats_not_taken": Sentence(
         NOTE,
-        "the pins of {joints} can be anywhere in their holes here: seat: loaded is one of these positions and limits "
-        "nothing",
-        "`trunnion analyse` has the deviation with that seat",
+        "the pins of {joints} can be anywhere in their holes here: that the model has them pressed by the load (seat: "
+        "loaded) is left out, and scatter and limits are about the mechanism with every pin in the middle of its hole",
+        "`trunnion analyse` has the shift by that seat; pins that are always pressed one way: state seat: {{xi: …}}",
     ),
     "tolerance.correlations_left_out": Sentence(
         NOTE,

@@ -138,8 +138,10 @@ def identify(
         with bar("models evaluated", None) as progress:
             result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts,  # type: ignore[arg-type]
                          progress=progress)  # fmt: skip
-    found = gathered(  # of the notes those that tell what was set
-        one for one in measurement.findings if one.severity is not Severity.NOTE or one.where == "files"
+    found = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
+        one
+        for one in measurement.findings
+        if one.severity is not Severity.NOTE or one.where == "files" or one.code == "data.angle.steps"
     )
 
     show, sections = partial(_show, result), ["assembly", "measures"]

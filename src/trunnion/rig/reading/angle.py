@@ -16,6 +16,7 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
+from trunnion.rig.reading.angle_steps import stated_as, unstated_step
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import AngleSource
@@ -42,12 +43,13 @@ class Coordinate:
     """Coordinate of the driver by row, rad, NaN where it is not known.
 
     spoilt: stretches of time, (stretch, 2), in which it is wrong; lag: standard uncertainty, s, of the time at which it
-    passes a value, in the mean over many pulses.
+    passes a value, in the mean over many pulses; step: of the readings, rad, where it is neither stated nor told of.
     """
 
     values: Array
     spoilt: Array
     lag: float = 0.0
+    step: float = 0.0
 
 
 def coordinate(
@@ -70,6 +72,7 @@ def coordinate(
     else:
         assert speed is not None
         values = _integrated(speed, line, account)
+    step = _unstated(source, values, account)
     values, lag = _refined(source, values, line, account)
     values = source.sign * values
     if index.size > 1 and source.from_ in ("time", "speed"):
@@ -77,7 +80,7 @@ def coordinate(
     else:
         spoilt = np.empty((0, 2))
         _check_index(values, index, line, account)
-    return Coordinate(values + zero, spoilt, lag)
+    return Coordinate(values + zero, spoilt, lag, step)
 
 
 def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float]:
@@ -87,7 +90,6 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     """
     known = np.flatnonzero(np.isfinite(values))
     if source.resolution is None or known.size < FEWEST:
-        _tell_steps(source, values, account)
         return values, 0.0
     step = float(source.resolution.evaluate())
     raw, seconds = values[known], line.seconds[known]
@@ -103,7 +105,14 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     return refined, math.hypot(unresolved((raw - smooth)[spans > 0], step), step / math.sqrt(12.0)) / rate
 
 
-def _tell_steps(source: AngleSource, values: Array, account: Account) -> None:
+def _unstated(source: AngleSource, values: Array, account: Account) -> float:
+    """The step of an angle, rad, that is not stated; 0 if there is none, or if it is wide enough to be told at once."""
+    if source.from_ != "column" or source.resolution is not None or _tell_steps(source, values, account):
+        return 0.0
+    return unstated_step(values)
+
+
+def _tell_steps(source: AngleSource, values: Array, account: Account) -> bool:
     """Tell of an angle that is read in steps as wide as what it gains in a few samples: they shift it within a turn.
 
     From sample to sample it then gains one step or another number of them; of one that is read finely, always as much.
@@ -112,17 +121,19 @@ def _tell_steps(source: AngleSource, values: Array, account: Account) -> None:
     gained = np.abs(np.diff(part))
     gained = gained[np.isfinite(gained)]  # from each row to the next: a reading that is left out is no step
     levels = np.unique(np.round(part[np.isfinite(part)] % TURN, 9))
-    if source.from_ != "column" or not np.any(gained > 0) or not FEWEST < levels.size < part.size / FEWEST:
-        return
+    if not np.any(gained > 0) or not FEWEST < levels.size < part.size / FEWEST:
+        return False
     apart = np.diff(levels)
     step = float(np.median(apart))
     low, high = np.percentile(gained[gained > 0], (1, 99))
     between = np.diff(np.flatnonzero(gained > 0))  # samples from one step to the next; more than a few, and it stands
     uneven = high - low > 0.5 * step or np.mean((between > 1) & (between < 1 / COARSE**2)) > 0.05
     if uneven and float(np.percentile(apart, 5)) > 0.7 * step and step > COARSE * float(np.mean(gained[gained > 0])):
-        told = f"{np.degrees(step):.4g} deg"
+        told = stated_as(step)
         what = f"the column '{source.column}' is read in steps of {told}, about what it gains in a sample"
         account.note("data.angle.steps", "angle", what, f"state angle: {{resolution: {told}}} to have it smoothed")
+        return True
+    return False
 
 
 def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:

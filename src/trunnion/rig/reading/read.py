@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
+from trunnion.rig.reading.angle_steps import tell_slopes
 from trunnion.rig.reading.channels import ChannelReading, Zeroed, filtered, read_in, reading, resolution, shown, zeroed
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, told
@@ -179,7 +180,7 @@ class _File:
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
-        self.lag = 0.0
+        self.lag, self.step = 0.0, 0.0
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
@@ -226,7 +227,15 @@ class _File:
             told = signs(mapping.channels, whole, turning, account)
             units = {name: shown(own) for name, own in self.own.items()}
             speeds(mapping.channels, whole, units, turning, told, account)
-        return [self._condition(part, zeros, drifts, way) for part in parts]
+        found = [self._condition(part, zeros, drifts, way) for part in parts]
+        self._check_steps(found)
+        return found
+
+    def _check_steps(self, found: Sequence[Condition]) -> None:
+        """Tell once of steps of the angle that are not stated and matter to a channel."""
+        if self.step and self.mapping.angle is not None:
+            column, cycle = str(self.mapping.angle.column), float(self.mapping.cycle.evaluate())
+            any(tell_slopes(column, self.step, cycle, one.courses, self.account) for one in found)
 
     def _named(self, setting: Setting) -> str:
         return setting.name or self.path.stem
@@ -253,7 +262,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag = found.lag
+        self.lag, self.step = found.lag, found.step
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"

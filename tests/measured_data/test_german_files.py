@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -163,3 +164,16 @@ def test_fine_steps_are_told_where_half_of_one_moves_a_channel(
         found = read_measured(mapping, [file])
         assert found.conditions[0].lag > 0
         assert "data.angle.steps" not in {one.code for one in found.findings}
+
+
+def test_a_zero_that_every_file_replaces_is_told(tmp_path: Path) -> None:
+    mapping = recorded(tmp_path, "Zeit [ms];Winkel [°];Moment [Nm];Drehzahl [U/min]")
+    for shared, own in (("1 deg", None), (None, "2 deg"), ("1 deg", "2 deg")):
+        mapping["angle"].pop("zero", None)
+        mapping["angle"] |= {"zero": shared} if shared else {}
+        mapping["files"] = [{"file": "lauf.csv", **({"angle": {"zero": own}} if own else {})}]
+        (tmp_path / "mapping.json").write_text(json.dumps(mapping))
+        found = read_measured(tmp_path / "mapping.json")
+        assert ("data.angle.zero_unused" in {one.code for one in found.findings}) == bool(shared and own)
+        assert found.conditions[0].zero == pytest.approx(np.radians(2 if own else 1))
+        assert found.conditions[0].own_zero == bool(own)

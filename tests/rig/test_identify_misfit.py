@@ -55,6 +55,8 @@ CASES = {
         "  per_turn: 360\n", "  per_turn: 360\n  zero: 120 deg\n", "shift", -2.0944, 6e-4,
     ),
     "a gain": ("    unit: N m\n", "    unit: N m\n    gain: 1.05\n", "gain", 0.05, 3e-3),
+    "a unit a hundredth of the true one": ("    unit: N m\n", "    unit: N m\n    gain: 0.01\n", "gain", -0.99, 1e-4),
+    "a unit a thousand times the true one": ("    unit: N m\n", "    unit: N m\n    gain: 1000\n", "gain", 999.0, 3.0),
     "a sign": ("    unit: N m\n", "    unit: N m\n    sign: -1\n", "sign", -1.0, 1e-9),
 }  # fmt: skip
 
@@ -69,6 +71,9 @@ def test_what_explains_a_misfit(folder: Path, name: str) -> None:
     assert found.figures["kind"] == kind
     assert found.figures["size"] == pytest.approx(size, abs=near)
     assert found.figures["explains_percent"] > 95
+    if abs(size) > 0.5 and kind == "gain":  # as a factor, as `compare` has it
+        assert "times its true value" in found.what
+        assert "unit" in found.remedy
 
 
 def test_a_zero_explains_a_misfit_and_tells_the_estimate(folder: Path) -> None:
@@ -135,6 +140,24 @@ def test_one_condition_alone_is_named_with_its_size(folder: Path, name: str, lag
     assert names[0] not in found.what
     assert names[1] in found.remedy
     assert "add" not in found.remedy  # nothing to the zero that all share
+
+
+def test_zeros_that_the_files_state_are_corrected_there(folder: Path) -> None:
+    """The zero that all share has no effect then: the new one of each file is named."""
+    text = (folder / "mapping.yaml").read_text()
+    (folder / "off.yaml").write_text(text.replace("  per_turn: 360\n", "  per_turn: 360\n  zero: 2 deg\n"))
+    found = trunnion.rig.read(folder / "off.yaml")
+    assert all(one.zero == pytest.approx(np.radians(2)) and not one.own_zero for one in found.conditions)
+    own = replace(found, conditions=tuple(replace(one, own_zero=True) for one in found.conditions))
+    machine = trunnion.read(MODEL)
+    shared, single = (cause(trunnion.rig.identify(machine, one, {"mu": [GUIDE]}, ["M"])) for one in (found, own))
+    assert "add -2.0" in shared.remedy
+    assert "add" not in single.remedy
+    for condition in own.conditions:
+        name = Path(condition.files[0]).name
+        at = re.search(rf"file: {name}, angle: {{zero: (\S+) deg}}", single.remedy)
+        assert at
+        assert float(at[1]) == pytest.approx(0.0, abs=0.05)
 
 
 def test_no_cause_is_named_whose_size_is_zero_within_its_uncertainty(folder: Path) -> None:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = ["identify"]
 
 MOST_ROWS = 24
+SAID = ("data.angle.steps", "data.angle.zero_unused")  # notes of the data that are said here too
 GROSS = 25.0  # reduced χ²: residuals of five times the scatter; estimates then stand for something else
 
 Parameters = Annotated[
@@ -141,7 +142,7 @@ def identify(
     found = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
         one
         for one in measurement.findings
-        if one.severity is not Severity.NOTE or one.where == "files" or one.code == "data.angle.steps"
+        if one.severity is not Severity.NOTE or one.where == "files" or one.code in SAID
     )
 
     show, sections = partial(_show, result), ["assembly", "measures"]

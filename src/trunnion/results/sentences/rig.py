@@ -107,7 +107,7 @@ COMPARE = {
         ERROR,
         "{channels} do not agree within U {cases}; an error of {range} in the crank angle explains "
         "{explains_percent:.0f} % of the mean square of the residuals",
-        "add {mean_told} to the zero of the angle in the mapping",
+        "{remedy}",
     ),
     "compare.efficiency": Sentence(
         ERROR,
@@ -190,20 +190,26 @@ IDENTIFY = {
     "fit.cause": Sentence(
         WARNING,
         "{story} would explain {explains_percent:.0f} % of the misfit{also}; the estimates would then be {estimates}",
-        lambda kind, size_told, channel, odd, conditions=None, **_: (
+        lambda kind, size_told, channel, odd, files, conditions=None, **_: (
             {
                 "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
-                "correct their angle: zero: in a mapping of their own, not the one that all share",
+                f"correct the zero of their files alone: files: [{files or '{file: …, angle: {zero: …}}'}]",
                 "zero": f"check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
-                "gain": f"check range and gain of {channel}, and the loads, in {odd}",
+                "gain": f"check range and gain of {channel}, and lengths and loads of the model, in {odd}",
             }
             if conditions
             else {
-                "shift": f"check the zero of the angle; if it is off, add {size_told} to angle: zero: in the mapping",
+                "shift": "check the zero of the angle; if it is off, "
+                + (
+                    f"correct the zeros that the files state: files: [{files}]"
+                    if files
+                    else f"add {size_told} to angle: zero: in the mapping"
+                ),
                 "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
                 "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
                 "zero": f"check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is estimated too",
-                "gain": f"check the gain of {channel}; with accuracy: {{gain: …}} in the mapping it is estimated too",
+                "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike; "
+                "with accuracy: {gain: …} in the mapping a gain is estimated too",
             }
         )[kind],
     ),

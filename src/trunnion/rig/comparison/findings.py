@@ -20,6 +20,7 @@ from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
 from trunnion.rig.comparison.error_sources import KINDS, Cause
+from trunnion.rig.reading.measurement import zeros_of_files
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
@@ -362,7 +363,11 @@ def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
     names = ", ".join(dict.fromkeys(name for name, _, _ in cases))
     where = _in(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
     least = min(cause.explains for _, _, cause in cases)
-    phrases = {"cases": where, "channels": names, "range": _range(ahead, unit), "mean_told": said(mean, unit, True)}
+    remedy = f"add {said(mean, unit, True)} to the zero of the angle in the mapping"
+    conditions = [one.condition for one in {id(one): one for _, one, _ in cases}.values()]
+    if all(one.own_zero for one in conditions) and (entries := zeros_of_files(conditions, [mean] * len(conditions))):
+        remedy = f"correct the zeros that the files state: files: [{entries}]"
+    phrases = {"cases": where, "channels": names, "range": _range(ahead, unit), "remedy": remedy}
     yield finding_for("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
 
 

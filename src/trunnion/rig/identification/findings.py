@@ -17,6 +17,7 @@ from trunnion.rig.identification.identifiability import Combination, Inseparable
 from trunnion.rig.identification.misfit import MisfitCause, OwnSize
 from trunnion.rig.identification.number_text import amount, share
 from trunnion.rig.identification.uncertainty import RANDOM, quantile
+from trunnion.rig.reading.measurement import zeros_of_files
 
 __all__ = ["sentences"]
 
@@ -29,6 +30,7 @@ MOST_NAMED = 3
 SMALL = 0.2  # of the largest: what a condition has of an error to be named with it
 MOST_TOLD = 4
 FEW = 5.0  # degrees of freedom
+FACTOR = 0.5  # of a gain: told as a factor from here on
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 
@@ -113,14 +115,27 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     unit = {"shift": "rad", "delay": "s", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
     phrases = {
         "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
+        "odd": _joined(_odd(judged, first)), "files": _zeros(judged, first),
         "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
     }  # fmt: skip
     each: dict[str, Any] = {"conditions": {_condition(judged, one): one.size for one in first.own}} if first.own else {}
     yield finding_for(
-        "fit.cause", "fit", phrases=phrases | {"odd": _joined(_odd(judged, first))}, kind=first.kind, size=first.size,
+        "fit.cause", "fit", phrases=phrases, kind=first.kind, size=first.size,
         expanded=first.expanded, explains_percent=100 * first.explains, **each,
         values={one.name: float(value) for one, value in zip(problem.model.unknowns, first.estimates, strict=True)},
     )  # fmt: skip
+
+
+def _zeros(judged: Assessment, one: MisfitCause) -> str:
+    """Zeros of the angle that single files are to state; empty where that is not what corrects them."""
+    conditions = judged.found.measurement.conditions
+    if one.kind != "shift":
+        return ""
+    if one.own:
+        odd = _apart(one)[0]
+        return zeros_of_files([conditions[own.condition] for own in odd], [own.size for own in odd])
+    stated = [condition for condition in conditions if condition.own_zero]
+    return zeros_of_files(stated, [one.size] * len(stated)) if len(stated) == len(conditions) else ""
 
 
 def _unit_of(judged: Assessment, channel: str) -> str:
@@ -152,6 +167,8 @@ def _story(judged: Assessment, one: MisfitCause) -> str:
     }.get(one.kind)
     if what is None:
         return f"{KINDS[one.kind]} of {one.channel}"
+    if not one.own and one.kind == "gain" and abs(one.size) >= FACTOR:
+        return f"a gain of {one.channel} {amount(1 + one.size, one.expanded, '1')} times its true value"
     if not one.own:
         return f"{what} of {_sized(judged, one, one.size, one.expanded)}"
     odd, others = _apart(one)

@@ -38,6 +38,7 @@ class SensorError:
     sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
     of a sensor behind a course that is computed, what it does to that, with its sign.
     stated: whether anything is known of it; one that is not is free. group: of one of many, what they are together.
+    least: of a gain, the least factor that a sensor may read of the model.
     """
 
     name: str
@@ -46,6 +47,7 @@ class SensorError:
     sizes: tuple[float, ...]
     stated: bool
     group: str = ""
+    least: float = LEAST_GAIN
 
     @property
     def source(self) -> str:
@@ -193,7 +195,7 @@ class FitProblem:
         """Limits of unknowns and sensors."""
         low = [one.lower for one in self.model.unknowns]
         high = [one.upper for one in self.model.unknowns]
-        least = [(LEAST_GAIN - 1) / max(one.sizes) if one.kind == "gain" else -inf for one in self.sensors]
+        least = [(one.least - 1) / max(one.sizes) if one.kind == "gain" else -inf for one in self.sensors]
         return np.array([*low, *least]), np.array([*high, *([inf] * len(self.sensors))])
 
     def courses(self, x: Array) -> Courses:

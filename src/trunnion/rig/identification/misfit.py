@@ -30,6 +30,7 @@ SETTLED = np.radians(0.01)
 ROUNDS = 5
 BEYOND = 4.0  # standard uncertainties: an error of one condition so far from what is stated explains the misfit itself
 OTHER = 0.05  # of a speed, by which conditions differ enough to tell a delay from an offset of the angle
+LEAST = 1e-6  # of the model, that a wrong unit may have a sensor read: N mm for kN m
 ALIKE = 3.0  # standard deviations of χ², within which two candidates explain the same
 
 
@@ -79,6 +80,11 @@ class _Refit:
     conditions: tuple[int, ...] = ()
 
     @property
+    def bounded(self) -> bool:
+        """Whether a gain ended where the search does: such a size is none that was found."""
+        return self.kind == "gain" and min(self.sizes) < 2 * LEAST - 1
+
+    @property
     def strange(self) -> bool:
         """Whether what is stated of a single condition or file is far off with it: these then explain the misfit."""
         first, count = self.problem.count, len(self.sizes) * (self.scale != 0)
@@ -92,7 +98,9 @@ def explanations(problem: FitProblem, search: Search, test: Test) -> list[Misfit
     One whose size is 0 within its uncertainty explains nothing; what each condition has by itself is named only where
     nothing that they share explains as much.
     """
-    tried = [one for one in _candidates(problem, search) if np.isfinite(one.fit.cost) and not one.strange]
+    tried = [
+        one for one in _candidates(problem, search) if np.isfinite(one.fit.cost) and not one.strange and not one.bounded
+    ]
     left = [lack_of_fit(one.problem, one.fit.x).reduced for one in tried]
     explained = [min((test.reduced - one) / (test.reduced - 1), 1.0) for one in left]
     chance = 1 + ALIKE * np.sqrt(2 / max(test.freedom, 2.0))  # of the ratio of two reduced χ²
@@ -186,7 +194,7 @@ def _sensor(
     size = 0.01 if kind == "gain" else 0.01 * float(np.sqrt(np.nanmean(np.concatenate(
         [np.ravel(block.turns) for block in own]) ** 2))) or 1.0  # fmt: skip
     sizes = tuple(size * (block.channel == channel) for block in problem.blocks)
-    error = SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False)
+    error = SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False, least=LEAST)
     extra = _apart(problem, error, conditions)
     more, found = _with(problem, start, extra)
     told = tuple(float(one) * size for one in found.x[-len(extra) :])

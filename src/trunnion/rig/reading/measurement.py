@@ -5,10 +5,12 @@ Everything is SI. A measurement has conditions, a condition has courses, a cours
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +24,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "dataset"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "dataset", "zeros_of_files"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -127,7 +129,8 @@ class Condition:
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
-    duration: of a cycle that is a time, s; NaN of one that is an angle.
+    duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
+    known; own_zero: whether its file states it, in place of the zero that all share.
     """
 
     name: str
@@ -141,6 +144,24 @@ class Condition:
     lag: float = 0.0
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
     duration: float = float("nan")
+    zero: float = float("nan")
+    own_zero: bool = False
+
+
+def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:
+    """Entries of a mapping that correct the zero of the angle file by file; empty where it is not known of each.
+
+    ahead: rad, to be added to the zero of each condition.
+    """
+    rows = {one.files[0]: one.zero + size for one, size in zip(conditions, ahead, strict=True) if one.files}
+    if len(rows) != len(conditions) or not all(math.isfinite(one) for one in rows.values()):
+        return ""
+    told = [f"{{file: {Path(name).name}, angle: {{zero: {round(math.degrees(zero), 2) + 0.0:.6g} deg}}}}"
+            for name, zero in rows.items()]  # fmt: skip
+    return ", ".join(told[:MOST_FILES]) + (", …" if len(told) > MOST_FILES else "")
+
+
+MOST_FILES = 3  # named in a remedy
 
 
 @dataclass(frozen=True)

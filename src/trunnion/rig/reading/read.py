@@ -59,7 +59,7 @@ def read_measured(
             failed = True
         findings += account.findings
         accounts.append(account)
-    findings = mapped.placed([*findings, *notes])
+    findings = mapped.placed([*findings, *notes, *_unused_zero(mapped, [entry for _, entry in entries])])
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
     name = mapped.mapping.name or Path(mapped.file).stem
@@ -132,6 +132,16 @@ def _files(
         remedy = f"add {{file: {paths[0].name}, {missing.split('`')[1]}: …}} to `files`" if missing else ""
         notes += [Finding(what, "files", remedy, Severity.NOTE, code="data.files.less")] if missing else []
     return found, notes
+
+
+def _unused_zero(mapped: Mapped, entries: Sequence[File]) -> list[Finding]:
+    """A note of a zero of the angle that nothing takes, as every file states its own."""
+    angle = mapped.mapping.angle
+    if angle is None or "zero" not in angle.model_fields_set or not all(entry.angle for entry in entries):
+        return []
+    what = "is not used: every file states a zero of its own, in place of it"
+    remedy = "remove it, or add it to each zero in files: angle: {zero: …}"
+    return [Finding(what, "angle.zero", remedy, Severity.NOTE, code="data.angle.zero_unused")]
 
 
 def _says(*entries: File) -> str:
@@ -424,6 +434,8 @@ class _File:
         return Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, dimensions=known_as, duration=duration,
+            zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
+            own_zero=self.entry.angle is not None,
         )  # fmt: skip
 
 

@@ -230,7 +230,8 @@ def test_a_model_that_does_not_fit_is_said_and_its_intervals_are_wider(
     data = torque.measured(1, sensors=Sensors(noise=0.001))
     true = identify(four_bar, data, [FRICTION])
     heavy = identify(four_bar.with_values({"coupler.mass": "31 kg"}), data, [FRICTION])
-    assert "does not fit" in said(heavy, "warning")
+    assert heavy["reduced_chi_squared"] > 25
+    assert "does not fit" in said(heavy, "error")
     assert "does not fit" not in said(true)
     assert heavy["standard_uncertainty"].values[0] > 3 * true["standard_uncertainty"].values[0]
     assert float(heavy["reduced_chi_squared"]) > 2

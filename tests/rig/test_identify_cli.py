@@ -67,6 +67,9 @@ def test_estimates_of_a_model_that_does_not_fit_are_not_written(folder: Path, ca
     assert status == 1
     assert "'off-model.yaml' is not written: the model does not fit" in text
     assert not (folder / "off-model.yaml").exists()
+    status, text = call("--parameter", f"mu={FRICTION}", mapping="data/off.yaml")  # nor is it well without --write
+    assert status == 1
+    assert "error: fit: the model does not fit" in text
 
 
 @pytest.mark.slow

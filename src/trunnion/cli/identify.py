@@ -39,7 +39,6 @@ __all__ = ["identify"]
 
 MOST_ROWS = 24
 SAID = ("data.angle.steps", "data.angle.zero_unused")  # notes of the data that are said here too
-GROSS = 25.0  # reduced χ²: residuals of five times the scatter; estimates then stand for something else
 
 Parameters = Annotated[
     list[str] | None,
@@ -224,10 +223,11 @@ def _write_model(
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
         why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
         return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
-    misfit = float(result["reduced_chi_squared"])
-    if misfit > GROSS:
+    told = {one.code: one.severity for one in findings_of(result)}
+    if told.get("fit.misfit") is Severity.ERROR:
+        misfit = float(result["reduced_chi_squared"])
         what = f"'{write}' is not written: the model does not fit (reduced χ² {misfit:.3g})"
-        explained = any(one.code == "fit.cause" for one in findings_of(result))
+        explained = "fit.cause" in told
         named = "correct what explains the misfit, and identify again"
         unknown = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
         return [Finding(what, "--write", named if explained else unknown)]

@@ -80,7 +80,10 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
         phrases = {"chance_told": chance, "reduced_told": _times(test.reduced)}
-        yield finding_for("fit.misfit", "fit", phrases=phrases, reduced=test.reduced, chance=test.chance)
+        severity = Severity.ERROR if test.gross else None
+        yield finding_for(
+            "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
+        )
         yield from _causes(judged)
     apart = judged.found.spread.apart
     for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):

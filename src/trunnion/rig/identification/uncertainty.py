@@ -26,6 +26,7 @@ RANDOM = ("scatter", "conditions", "misfit")
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
 UNLIKELY = 0.001  # a chance below which the model is said not to fit
 RARE = 0.01  # one below which conditions are said to disagree
+GROSS = 25.0  # reduced χ² of residuals of five times the scatter
 WORTH = 1.05  # reduced χ² up to which it is not
 
 
@@ -45,6 +46,11 @@ class Test:
     def misfit(self) -> bool:
         """Whether the model does not fit."""
         return bool(self.chance < UNLIKELY and self.reduced > WORTH)
+
+    @property
+    def gross(self) -> bool:
+        """Whether it fits so badly that the estimates stand for something else."""
+        return self.misfit and self.reduced > GROSS
 
 
 @dataclass(frozen=True)

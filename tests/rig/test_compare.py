@@ -202,6 +202,18 @@ def test_offset_and_gain_together_are_named():
     assert said(result, "an offset of +4 N m and a gain error of +20 %")
 
 
+@pytest.mark.parametrize(("more", "models"), [(0.0, False), (-1.5, True)])
+def test_offset_and_gain_that_change_with_the_condition_are_the_models(more, models):
+    settings = ({"A.speed": 4.0}, {"A.speed": 6.0})
+    found = measured(settings=settings, wrong=wrong_in("torque", lambda true: 1.2 * true + 4.0), noise=0.005)
+    second = found.conditions[1]
+    torque = replace(second.courses["torque"], turns=second.courses["torque"].turns + more)
+    courses = {**second.courses, "torque": torque}
+    result = compare(replace(found, conditions=(found.conditions[0], replace(second, courses=courses))))
+    assert bool(said(result, "and a gain error of", "not the sensor")) == models
+    assert bool(said(result, "and a gain error of", "zero and gain of the channel")) != models
+
+
 def test_a_shift_of_the_angle_is_named_once_for_all_channels():
     shifted = measured(positions=72, wrong=lambda channel, true: np.roll(true, 1), noise=0.005)
     result = compare(shifted)

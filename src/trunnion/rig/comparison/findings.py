@@ -263,11 +263,11 @@ REMEDIES = {
     "mirror": "state angle: {sign: -1} in the mapping, or remove it, and check the zero of the angle",
     "sign": "state sign: -1 for the channel in the mapping, or remove it",
     "zero": "check the zero of the channel, and whether the model lacks a load",
-    "gain": "check gain and unit of the channel, and friction and loads of the model",
+    "gain": "check gain and unit of the channel, and dimensions, friction and loads of the model",
     "shift": "check the zero of the angle, also of single files, and delays of the channel",
-    "zero and gain": "check zero and gain of the channel",
+    "zero and gain": "check zero and gain of the channel, and dimensions, friction and loads of the model",
 }
-MODEL = "it differs between conditions: check friction and loads of the model, not the sensor"
+MODEL = "it differs between conditions: check dimensions, friction and loads of the model, not the sensor"
 
 
 def _story(
@@ -299,15 +299,20 @@ def _story(
         story = KINDS[kind]
     else:
         story = f"an offset of {_range(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
-    return story, MODEL if kind in ("zero", "gain") and _differ(kind, sizes, members) else REMEDIES[kind]
+    return story, MODEL if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members) else REMEDIES[
+        kind
+    ]
 
 
 def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]) -> bool:
     """Whether an offset or a gain changes with the condition by more than its uncertainty, as no sensor's does."""
+    if kind == "zero and gain":
+        gains = [one._replace(size=one.gain) for one in sizes]
+        return _differ("zero", sizes, members) or _differ("gain", gains, members)
     values = [one.size for one in sizes]
     spread = max(values) - min(values)
     known = [pair.judged.bias_expanded for _, pair in members]
-    typical = [max(abs(float(np.nanmean(pair.course.mean))), 1e-300) for _, pair in members]
+    typical = [max(float(np.sqrt(np.nanmean(pair.course.mean**2))), 1e-300) for _, pair in members]
     wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
     return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
 

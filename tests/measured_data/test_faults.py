@@ -137,6 +137,17 @@ def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
     assert "larger range" in one.remedy
 
 
+def test_a_channel_that_is_nearly_all_clipped_is_refused(run: Columns, tmp_path: Path) -> None:
+    """A unit a thousand times too large: nothing of the channel is left to go on with."""
+    with pytest.raises(MechanismError) as refused:
+        read(run, tmp_path, {"channels/torque-in/range": "24 mN m"})
+    (one,) = (one for one in refused.value.findings if one.code == "data.readings.clipped")
+    assert one.severity is Severity.ERROR
+    assert one.where == "channels.torque-in"
+    assert one.figures["count"] > 0.9 * one.figures["readings"]
+    assert "unit" in one.remedy
+
+
 def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
     """A signal of a few dozen levels stays long on each, and long at its largest."""
     for name in ("T1", "T2"):

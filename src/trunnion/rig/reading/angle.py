@@ -100,7 +100,7 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     refined = values.copy()
     refined[known] = smooth
     usual = float(np.median(spans))
-    even = f"; it is smoothed over {usual:.3g} turns, with which all readings agree" if usual > 0 else ""
+    even = f"; it is smoothed over {_turns(usual)}, with which all readings agree" if usual > 0 else ""
     account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
     return refined, math.hypot(unresolved((raw - smooth)[spans > 0], step), step / math.sqrt(12.0)) / rate
 
@@ -290,7 +290,7 @@ def _of_pulses(
         values[line.seconds > found.until] = np.nan
     known = "" if found.crossings else ", each known to ± {} deg by the sampling"
     usual = float(np.median(spans)) if spans.size else 0.0
-    even = f"; it is smoothed over {usual:.3g} turns, with which all pulses agree" if usual > 0 else ""
+    even = f"; it is smoothed over {_turns(usual)}, with which all pulses agree" if usual > 0 else ""
     account.say(
         f"the angle is interpolated between pulses {pulse:.4g} deg apart{known}{even}",
         None if found.crossings else blur,
@@ -325,6 +325,10 @@ def smoothed(values: Array, off: float, per_turn: float, over: Array | None = No
         taken = good & (spans == 0)
         found[taken], spans[taken] = fitted[taken], span
     return found, spans
+
+
+def _turns(number: float) -> str:
+    return f"{number:.3g} turn{'s' * (number != 1)}"
 
 
 def unresolved(off: Array, step: float) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import bdtrc
 
-from trunnion.errors import Severity
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.log import Account, counted, places, runs
 
@@ -20,6 +20,7 @@ __all__ = ["FaultSpan", "cells", "signal"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 CLIP = 0.9995  # of the range, from which a reading is at it: the top code of 12 bits is 2047/2048
+MOST = 0.5  # of the readings at the end of the range: more is no load that is now and then too large
 STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
 FAR = 12.0  # robust standard deviations from it
@@ -144,7 +145,16 @@ def _recurring(phase: Array) -> Mask:
 
 def _clipped(where: str, part: Array, time: Array, limit: float, account: Account) -> None:
     mask = np.abs(part) >= CLIP * limit
-    if count := int(np.count_nonzero(mask)):
+    count, finite = int(np.count_nonzero(mask)), int(np.count_nonzero(np.isfinite(part)))
+    if count > MOST * finite:  # what is left says nothing of the channel
+        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of the range of {limit:.6g}"
+        figures = {"count": count, "readings": finite}
+        remedy = "check unit, gain and range of the channel in the mapping; else use a larger range"
+        what = f"{what} in the unit of the readings"
+        raise MechanismError(
+            Finding(what, where, remedy, file=account.file, code="data.readings.clipped", figures=figures)
+        )
+    if count:
         what = f"clipped: {counted(count, 'reading')} of {part.size:,} at the end of the range, {places(mask, time)}"
         what = f"{what}; left out, so that means there are too small"
         account.warn("data.readings.clipped", where, what, "use a larger range or a smaller load")

@@ -79,13 +79,12 @@ def allocate(
 
     What is to be chosen are the tolerances and plays with a cost (`Mechanism.prices`); all others stay as they are.
     measures: those with limits that are to be kept; all of the model if not given. criterion: an entry of `CRITERIA`:
-    worst-case, rss, or yield, of which target is the share of mechanisms within all limits, 0.9973 if
-    not given; with another criterion it is an error. choice: continuous,
-    discrete, or auto: discrete where any cost is a list of processes or options. steps: positions of a whole cycle; at:
-    the place of measures that state none. samples, seed: of the samples that verify it, none if 0; jobs: processes for
-    them. curve: how many points of cost over accuracy, all limits being multiplied by 0.5 to 2.
-    friction_method: how friction and reactions are settled; Newton's method if not given.
-    progress: called with the samples done.
+    worst-case, rss, or yield, of which target is the share of mechanisms within all limits, 0.9973 if not given; with
+    another criterion it is an error. choice: continuous, discrete, or auto: discrete where any cost is a list of
+    processes or options. steps: positions of a whole cycle; at: the place of measures that state none. samples, seed:
+    of the samples that verify it, none if 0; jobs: processes for them. curve: how many points of cost over accuracy,
+    all limits being multiplied by 0.5 to 2. friction_method: how friction and reactions are settled; Newton's method if
+    not given. progress: called with the samples done.
     exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
     Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
     (parameter), (measure), (offer) those of `result.VARIABLES`.

@@ -37,6 +37,7 @@ __all__ = ["Cluster"]
 
 CONNECT = 10  # s to reach the scheduler
 ARRIVE = 60  # s for the first worker to be there
+RESTARTED = 10  # s for one that died to be there again
 COUNTED = 5.0  # s between two counts of the workers
 
 
@@ -83,7 +84,7 @@ class Cluster(Generic[T]):
     """`Crew` on a Dask cluster: `address` of its scheduler, or "local" for so many processes here."""
 
     def __init__(self, job: Job[T], address: str, jobs: int) -> None:
-        self._address = address
+        self._address, self._jobs = address, jobs
         self._name = f"trunnion-{uuid.uuid4().hex[:12]}"
         self._under_way: dict[Future[bytes], Blocks] = {}
         self._stack = ExitStack()
@@ -166,4 +167,7 @@ class Cluster(Generic[T]):
             if self._client.status == "running":
                 with suppress(OSError, TimeoutError):
                     self._executor.shutdown(wait=finished)
+                    if self._address == "local" and not finished:
+                        # one that is being started again while the cluster closes says so on the terminal
+                        self._client.wait_for_workers(self._jobs, timeout=RESTARTED)
             self._under_way.clear()

@@ -41,15 +41,21 @@ def test_the_end_float_is_no_end_of_the_pin() -> None:
     assert finding["figures"]["peak"] == pytest.approx(2 * axial, rel=0.01)  # each end has half of it
 
 
-@pytest.mark.slow
-def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
-    """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
+def massless_compressor() -> dict[str, Any]:
+    """The model's data, pins in loaded seats; without pressure, from 40° to 180°, nothing presses."""
     data = read(EXAMPLES / "slider-crank.yaml").data()
     data["gravity"] = [0, 0]
     for link in data["links"].values():
         for key in ("mass", "centre", "inertia"):
             link.pop(key, None)
     data["joint_defaults"] = {"pin": {"clearance": "10 um"}, "seat": "loaded"}
+    return data
+
+
+@pytest.mark.slow
+def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
+    """The massless compressor has no pressure from 40° to 180°: nothing presses there."""
+    data = massless_compressor()
     result = analyse(Mechanism(**data), steps=360)
     lost = np.flatnonzero(result["contact_lost"].sel(joint="P"))
     assert np.array_equal(lost, np.arange(40, 181))
@@ -62,12 +68,7 @@ def test_a_stretch_without_load_is_one_loss_of_contact() -> None:
 @pytest.mark.slow
 def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None:
     """No load from 40° to 180°."""
-    data = read(EXAMPLES / "slider-crank.yaml").data()
-    data["gravity"] = [0, 0]
-    for link in data["links"].values():
-        for key in ("mass", "centre", "inertia"):
-            link.pop(key, None)
-    data["joint_defaults"] = {"pin": {"clearance": "10 um"}, "seat": "loaded"}
+    data = massless_compressor()
     data["measures"] = {"course": {"slide": "S"}, "stroke": {"stroke": "S"}, "mean": {"slide": "S", "as": "rms"}}
     data["measures"] |= {one: {"slide": "S", "as": one} for one in ("minimum", "maximum")}
     window = {"slide": "S", "over": ["50 deg", "170 deg"]}

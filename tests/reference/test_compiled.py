@@ -286,7 +286,7 @@ def test_the_engine_is_chosen_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
     found = toleranced("auto", samples=200)
     assert found.attrs["engine"] == "compiled"
     assert [one.figures for one in found.trunnion.findings if one.code == "samples.engine"] == [{"engine": "compiled"}]
-    monkeypatch.setattr(kernel, "find_spec", lambda name: None)
+    monkeypatch.setattr("trunnion.solve.compiled.find_spec", lambda name: None)
     assert toleranced("auto", samples=200).attrs["engine"] == "numpy"
 
 

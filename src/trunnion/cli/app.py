@@ -28,6 +28,7 @@ from trunnion.cli.options import (
     Columns,
     Criterion,
     Data,
+    Engine,
     File,
     FrictionLaw,
     Kinds,
@@ -149,7 +150,7 @@ def analyse(
     units: Units = TableUnits.si,
     columns: Columns = None,
     uncut: Uncut = False,
-    engine: Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")] = "auto",
+    engine: Engine = "auto",
 ) -> None:
     """Analyse a cycle: motion, reactions, friction, effort, power."""
     check_files(out or [], report, drawn=False, instead=f"trunnion plot {file}")

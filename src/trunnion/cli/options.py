@@ -18,6 +18,7 @@ __all__ = [
     "Criterion",
     "Data",
     "DataFiles",
+    "Engine",
     "File",
     "Force",
     "FrictionLaw",
@@ -109,6 +110,7 @@ Out = Annotated[
         "--out", help="Write tables: .csv .xlsx .json .nc .zarr .parquet; figures: .png .svg .pdf .jpg. Repeatable."
     ),
 ]
+Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
 TABLES = "x.positions.csv the curves, x.histogram.csv the samples, x.convergence.csv how they settle"
 OutTolerance = Annotated[
     list[Path] | None,

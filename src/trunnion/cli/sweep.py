@@ -12,6 +12,7 @@ import typer
 from trunnion.cli.model import lines_of, stated
 from trunnion.cli.options import (
     IMAGES,
+    Engine,
     File,
     FrictionLaw,
     Out,
@@ -66,7 +67,6 @@ Family = Annotated[
 ]
 Kind = Annotated[str, typer.Option("--kind", help="curves, or map: contours over two swept values.")]
 Margin = Annotated[bool, typer.Option("--margin", help="Compute the locking margin too; takes many times as long.")]
-Engine = Annotated[str, typer.Option("--engine", help="numpy, compiled, or auto: by size.")]
 Picture = Annotated[str, typer.Option("--format", help="png, svg, pdf or jpg, for a folder of figures.")]
 
 

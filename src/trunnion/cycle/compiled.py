@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled import Figure, Lanes
+from trunnion.solve.compiled import Figure, Lanes, pays
 from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -114,5 +113,4 @@ def compiles(engine: str, run: Run, positions: int) -> bool:
     if engine == "compiled" and run.seats:
         what = "pins in seats follow the load: that is not compiled"
         raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
-    pays = positions >= WORTH_COMPILING and not run.seats and find_spec("llvmlite") is not None
-    return engine == "compiled" or (engine == "auto" and pays)
+    return engine == "compiled" or (engine == "auto" and not run.seats and pays(positions, WORTH_COMPILING))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ from trunnion.solve.status import (
 )
 from trunnion.solve.system import Values, law_of, rubbing
 
-__all__ = ["Array", "CompiledKernel", "Figure", "Lanes", "lanes_of"]
+__all__ = ["Array", "CompiledKernel", "Figure", "Lanes", "lanes_of", "pays"]
 
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
@@ -148,6 +149,11 @@ class CompiledKernel(ABC):
                 found.status[row, column] = status
                 for name, figure in self.figures.items():
                     found.curves[name][row, column] = figure(back)
+
+
+def pays(configurations: int, least: int) -> bool:
+    """Whether compiling may pay for so many configurations: not below the least, nor where it is not installed."""
+    return configurations >= least and find_spec("llvmlite") is not None
 
 
 def lanes_of(value: Number, rows: NDArray[np.intp]) -> Number:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -18,6 +17,7 @@ from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
+from trunnion.solve.compiled import pays
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -90,7 +90,7 @@ def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], co
     """The engine by its name; of auto the compiled one where it is installed, pays, and can take the mechanism."""
     if engine != "auto":
         return engine
-    if configurations < WORTH_COMPILING or find_spec("llvmlite") is None:
+    if not pays(configurations, WORTH_COMPILING):
         return "numpy"
     try:
         OtherKernel(numpy, "compiled").check(values)

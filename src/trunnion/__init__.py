@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from trunnion.cycle.analyse import analyse
     from trunnion.cycle.inspect import check
     from trunnion.cycle.locking import locking
+    from trunnion.dynamics.simulate import simulate
     from trunnion.errors import MechanismError, Status
     from trunnion.model.mechanism import Mechanism
     from trunnion.model.mechanism import read_mechanism as read
@@ -48,10 +49,11 @@ _PLACES = {
     "read": ("trunnion.model.mechanism", "read_mechanism"),
     "report": ("trunnion.views.shown", "report"),
     "save": ("trunnion.results.export", "save"),
+    "simulate": ("trunnion.dynamics.simulate", "simulate"),
     "sweep": ("trunnion.studies.sweep.study", "sweep"),
     "tolerance": ("trunnion.studies.tolerance.study", "tolerance"),
 }
-_RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "sweep", "tolerance"}
+_RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "simulate", "sweep", "tolerance"}
 _MODULES = {"dual": "trunnion.dual", "rig": "trunnion.rig"}
 # names that were public here, with where they are now
 _MOVED = {
@@ -82,6 +84,7 @@ __all__ = [
     "report",
     "rig",
     "save",
+    "simulate",
     "sweep",
     "tolerance",
 ]

@@ -47,6 +47,7 @@ from trunnion.cli.options import (
 from trunnion.cli.play import play
 from trunnion.cli.result import Shown, check_files, check_page, write_text
 from trunnion.cli.rig import rig
+from trunnion.cli.simulate import simulate
 from trunnion.cli.sweep import sweep
 from trunnion.cli.terminal import bar, console, say, show_figures, wrote
 from trunnion.cli.tolerance import tolerance
@@ -184,6 +185,7 @@ def design(
     show_figures(mechanism.name or str(file), figures)
 
 
+verb(simulate)
 verb(locking)
 verb(assemble)
 verb(tolerance)

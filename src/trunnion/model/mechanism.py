@@ -393,6 +393,9 @@ class Mechanism(Numbers):
         for measure in data["measures"].values():
             for key in [key for key, value in measure.items() if value is None and key not in HASHED]:
                 del measure[key]
+        for driver in data["drivers"].values():  # nor for those that analyses of a prescribed motion do not know
+            for key in [key for key in ("free", "motor", "initial") if not driver[key]]:
+                del driver[key]
         for spring in data["springs"].values():  # the hash of a spring is older than what may make it useful
             if not spring["useful"]:
                 del spring["useful"]

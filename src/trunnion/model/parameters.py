@@ -166,6 +166,8 @@ def item_name(location: Location, index: int) -> str:
     row = len(location) > 1 and location[-2] == "points" and isinstance(location[-1], int)
     if row and location[0] == "tables":
         return ("at", "value")[index] if index < 2 else str(index)
+    if row and "motor" in location:
+        return ("place", "effort")[index] if index < 2 else str(index)
     if row:
         names: tuple[str, ...] = ("time", "coordinate")
     else:
@@ -225,9 +227,27 @@ def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
     if joint is None or section == "loads" or entry.kind in KINDS.values():
         return entry.kind
     slides = "rotation" not in freedoms(joint.type)
+    if "motor" in entry.location:
+        return _motor_kind(mechanism.drivers[name], entry, slides)
     if entry.location[-1] == "speed":
         return KINDS["speed" if slides else "angular speed"]
     return KINDS["length" if slides else "angle"]
+
+
+def _motor_kind(driver: Driver, entry: Entry, slides: bool) -> Kind:
+    """Efforts of a motor are torques or forces, by what its joint does; so are its speeds."""
+    key = str(entry.location[-1] if isinstance(entry.location[-1], str) else entry.path.rpartition(".")[2])
+    speed, effort = KINDS["speed" if slides else "angular speed"], KINDS["force" if slides else "moment"]
+    if key == "place":
+        return KINDS["time"] if driver.motor and driver.motor.over == "time" else speed
+    if key.endswith("speed") or key == "target":
+        return speed
+    if key == "inertia":
+        return KINDS["mass" if slides else "moment of inertia"]
+    if key in ("proportional", "integral"):
+        gain = "damping" if key == "proportional" else "stiffness"
+        return KINDS[gain if slides else f"torsional {gain}"]
+    return effort if key in ("effort", "limit", "brake") or key.endswith("_effort") else entry.kind
 
 
 def _table_kind(mechanism: Fields, name: str) -> Kind:

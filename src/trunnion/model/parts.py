@@ -23,6 +23,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
+from trunnion.joints.motors import MOTORS, MotorKind
 from trunnion.model.cost_parts import Cost, CostOption
 from trunnion.model.entry import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.joint_parts import (
@@ -74,6 +75,7 @@ __all__ = [
     "Guide",
     "Hint",
     "InertiaTensor",
+    "Initial",
     "Joint",
     "JointDefaults",
     "Link",
@@ -81,6 +83,7 @@ __all__ = [
     "LoopJoint",
     "Measure",
     "Misalignment",
+    "Motor",
     "Name",
     "Part",
     "Pin",
@@ -95,6 +98,7 @@ __all__ = [
 ]
 
 _check_motion, _schema_motion = known(tuple(MOTION_LAWS), "motion law")
+_check_motor, _schema_motor = known(tuple(MOTORS), "kind of motor")
 
 
 class Point(Part):
@@ -163,8 +167,52 @@ class Link(Part):
     frame: str | None = None
 
 
+class Motor(Part):
+    """What drives a joint whose motion is found, by a kind of `joints.motors`, and what is between it and the joint.
+
+    ratio: speed of the motor over that of the joint; efficiency: of that gear; inertia: of the rotor (mass of a linear
+    motor), on the motor's side. off: time at which the motor is switched off; brake: effort that resists the joint from
+    the time brake_from on.
+    """
+
+    kind: Annotated[str, _check_motor, _schema_motor]
+    effort: ForceOrMoment | None = None
+    stall_effort: ForceOrMoment | None = None
+    no_load_speed: Rate | None = None
+    breakdown_effort: ForceOrMoment | None = None
+    breakdown_slip: Dimensionless | None = None
+    synchronous_speed: Rate | None = None
+    points: Annotated[tuple[tuple[AnyQuantity, ForceOrMoment], ...], Field(min_length=2)] | None = None
+    over: Literal["speed", "time"] = "speed"
+    target: Rate | None = None
+    proportional: AnyQuantity | None = None
+    integral: AnyQuantity | None = None
+    limit: ForceOrMoment | None = None
+    ratio: Dimensionless | None = None
+    efficiency: Dimensionless | None = None
+    inertia: AnyQuantity | None = None
+    off: Time | None = None
+    brake: ForceOrMoment | None = None
+    brake_from: Time | None = None
+
+    @property
+    def of(self) -> MotorKind:
+        """The kind."""
+        return MOTORS[self.kind]
+
+
+class Initial(Part):
+    """Where a free coordinate begins and how fast: from rest at the driver's start if not stated."""
+
+    coordinate: AngleOrLength | None = None
+    speed: Rate | None = None
+
+
 class Driver(Part):
-    """Prescribed motion of the joint it is named after, by a law of `joints.motion`: `constant` if none is stated."""
+    """Prescribed motion of the joint it is named after, by a law of `joints.motion`: `constant` if none is stated.
+
+    With `free: true` or a motor, motion in time finds it; all other analyses prescribe it as stated.
+    """
 
     law: Annotated[str, _check_motion, _schema_motion] = "constant"
     speed: Rate | None = None
@@ -183,6 +231,14 @@ class Driver(Part):
     periodic: bool = False
     ends: Literal["clamped", "natural"] = "clamped"
     delay: Time | None = None
+    free: bool = False
+    motor: Motor | None = None
+    initial: Initial | None = None
+
+    @property
+    def found(self) -> bool:
+        """Whether motion in time finds the coordinate."""
+        return self.free or self.motor is not None
 
     @property
     def motion(self) -> MotionLaw:

@@ -25,7 +25,19 @@ from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links
 from trunnion.solve.loads import LoadAction, Share, SpringState, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
-__all__ = ["Backward", "Given", "Sense", "Slip", "backward", "held", "sense_of", "solve", "under"]
+__all__ = [
+    "Backward",
+    "Given",
+    "Sense",
+    "Slip",
+    "backward",
+    "body_loads",
+    "held",
+    "sense_of",
+    "solve",
+    "stated_actions",
+    "under",
+]
 
 
 Sense = Share | tuple[Share, ...]
@@ -91,7 +103,8 @@ class Backward:
     load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the share of its
     friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
     N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
-    that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart.
+    that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart;
+    module_reactions: reactions as their modules see them, of `under` alone.
     """
 
     walk: Forward
@@ -114,6 +127,7 @@ class Backward:
     travels: bool = False
     passed: dict[str, Number] = field(default_factory=dict)
     gear_power: Number = 0.0
+    module_reactions: dict[str, Any] = field(default_factory=dict)
 
     def friction_power(self, joint: str) -> Number:
         """Power lost in a joint, W."""
@@ -180,10 +194,26 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
         reactions = walk.reacting(group).reactions(walk.poses[number], [back.loads[link] for link in module.links])
         for place, reaction in zip(places, reactions, strict=False):  # then come those of gear pairs
             if not place.witness:
+                back.module_reactions[place.joint] = reaction
                 _record(back, place, walk.wrench(place, reaction), [], place.joint in module.driven)
         for i, (*_, torque) in enumerate(reactions[len(places) :]):
             _push(back, number, acting(walk, number, i, torque, parting=False))
     return back
+
+
+def body_loads(walk: Forward) -> dict[str, Any]:
+    """Gravity and inertia of every link."""
+    back = Backward(walk, _unloaded(walk))
+    _add_body_loads(back)
+    return back.loads
+
+
+def stated_actions(walk: Forward, zero_slip: Mapping[str, Sense]) -> tuple[dict[str, Any], Number, Number]:
+    """What the stated loads and springs do to every link, and the power of both, W. zero_slip: see `Given`."""
+    back = Backward(walk, _unloaded(walk))
+    _add_stated_loads(back, zero_slip)
+    powers = sum(back.load_powers.values(), 0.0), sum((state.power for state in back.springs.values()), 0.0)
+    return back.loads, *powers
 
 
 def _unloaded(walk: Forward) -> dict[str, Any]:

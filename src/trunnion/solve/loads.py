@@ -120,8 +120,13 @@ class Stated:
 
     @functools.cached_property
     def _drive(self) -> tuple[Number, Number, Number]:
-        first = next(iter(self.walk.system.mechanism.drivers))
-        return self.walk.system.drive(self.walk.values, first, self.walk.time)
+        system, values = self.walk.system, self.walk.values
+        first = next(iter(system.mechanism.drivers))
+        found = system.drive(values, first, self.walk.time)
+        if not system.is_free(values, first) or not (span := system.span(values, first)).periodic:
+            return found
+        begin = values.get(f"drivers.{first}.start", 0.0)  # loads come again every turn
+        return begin + np.mod(found[0] - begin, span.travel), *found[1:]
 
     def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
         """Knots and values of a table, and the place in it."""

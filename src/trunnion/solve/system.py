@@ -26,8 +26,9 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve import shifts
 from trunnion.structure.decompose import Module, Plan
 
-__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values"]
+__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "freed"]
 
+STATE, FREED = "state.", ("coordinate", "rate", "second")  # paths of what a free driver does
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
 Values = Mapping[str, Number]  # every number of a mechanism by its path, SI
 
@@ -266,19 +267,28 @@ class System:
         return self.vector(values, path)
 
     def drive(self, values: Values, name: str, time: Number) -> tuple[Number, Number, Number]:
-        """Coordinate, rate and second derivative of a driver at `time` (s) from the start, by its motion law."""
+        """Coordinate, rate and second derivative of a driver at `time` (s) from the start, by its motion law.
+
+        Of a free one what the values say, see `freed`.
+        """
+        if self.is_free(values, name):
+            return tuple(values[f"{STATE}{name}.{key}"] for key in FREED)
         law = self.mechanism.drivers[name].motion
-        return law.function(time, self._motion(values, name))
+        return law.function(time, self.motion_of(values, name))
+
+    def is_free(self, values: Values, name: str) -> bool:
+        """Whether the values say what a driver does, in place of its motion law."""
+        return f"{STATE}{name}.coordinate" in values
 
     def span(self, values: Values, name: str) -> Span:
         """One cycle of a driver."""
-        return self.mechanism.drivers[name].motion.span(self._motion(values, name))
+        return self.mechanism.drivers[name].motion.span(self.motion_of(values, name))
 
     def knots(self, values: Values, name: str) -> list[Number]:
         """Times, s, within one cycle of a driver at which a derivative of its coordinate jumps."""
-        return self.mechanism.drivers[name].motion.knots(self._motion(values, name))
+        return self.mechanism.drivers[name].motion.knots(self.motion_of(values, name))
 
-    def _motion(self, values: Values, name: str) -> dict[str, Number]:
+    def motion_of(self, values: Values, name: str) -> dict[str, Number]:
         """What the motion law of a driver is given."""
         found: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
         found.update(self.mechanism.drivers[name].options)
@@ -381,6 +391,14 @@ class System:
         """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
         revolute = self.turns(driver)
         return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
+
+
+def freed(values: Values, motions: Mapping[str, tuple[Number, Number, Number]]) -> dict[str, Number]:
+    """The values with coordinates, rates and second derivatives of free drivers, which go before their motion laws."""
+    found = dict(values)
+    for name, motion in motions.items():
+        found.update(zip((f"{STATE}{name}.{key}" for key in FREED), motion, strict=True))
+    return found
 
 
 def driven_coordinates(

@@ -23,11 +23,12 @@ __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report
 REPORTS = {
     "cycle": "cycle.report", "tolerance": "tolerance.report", "allocation": "allocation.allocation",
     "comparison": "compare.report", "identification": "identify.report",
+    "motion": "motion.report",
 }  # fmt: skip
 FIGURES = {
     "cycle": "cycle.plots", "sweep": "sweep.figure", "play": "play.figure", "assembly": "assembly.figure",
     "tolerance": "tolerance.figure", "allocation": "allocation.allocation", "comparison": "compare.figure",
-    "identification": "identify.figure",
+    "identification": "identify.figure", "motion": "motion.figure",
 }  # fmt: skip
 
 

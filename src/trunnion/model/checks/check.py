@@ -17,6 +17,7 @@ from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.costs import cost_names, cost_values
 from trunnion.model.checks.errors import errors, joint_errors
+from trunnion.model.checks.free_motion import FREE, free_motion
 from trunnion.model.checks.gears import gears
 from trunnion.model.checks.loads import motion_dimensions, springs, tables, unknown_name, unread
 from trunnion.model.checks.measures import check_measure, measure_values, point_exists
@@ -250,6 +251,7 @@ def _drivers(mechanism: Numbers) -> Iterator[Finding]:
         elif "rotation" not in freedoms(joints[name].type) and driver.law == "constant" and driver.range is None:
             yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
         yield from _motion(driver, where)
+        yield from free_motion(driver, where)
 
 
 def _motion(driver: Driver, where: str) -> Iterator[Finding]:
@@ -258,7 +260,7 @@ def _motion(driver: Driver, where: str) -> Iterator[Finding]:
         yield unread(driver.file, where)
         return
     law, takes = driver.motion, (*driver.motion.needs, *driver.motion.takes)
-    stray = [key for key in driver.model_fields_set if key != "law" and key not in takes]
+    stray = [key for key in driver.model_fields_set if key not in ("law", *FREE, *takes)]
     for key in sorted(stray):
         given = "points" if key == "file" else key
         others = [name for name, one in MOTION_LAWS.items() if given in (*one.needs, *one.takes)]

@@ -12,6 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
 from trunnion.model.checks.errors import error_sizes, play_values
+from trunnion.model.checks.free_motion import motor_values
 from trunnion.model.checks.gears import gear_values
 from trunnion.model.checks.loads import spring_values, table_values
 from trunnion.model.checks.space import direction_values, pitch_values
@@ -158,6 +159,7 @@ def _driver(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
         yield from _table(mechanism, name, values)
     if values.get(f"{where}.speed") == 0:
         yield Finding("the speed is 0", f"{where}.speed", "give a speed, however small, with its sign")
+    yield from motor_values(driver, values, where)
     start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
     if start == end:
         yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.results.tables import comparison, cycle, identification, studies, tolerances
+from trunnion.results.tables import comparison, cycle, identification, motion, studies, tolerances
 from trunnion.results.tables.column import Column, whole
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ _OF_TOLERANCES = {name: _whole(flat) for name, flat in tolerances.TABLES.items()
 # the kinds of results: of each its tables by name, the one that a file holds first if its name says nothing else
 KINDS: dict[str, Tables] = {
     "cycle": {"positions": cycle.positions},
+    "motion": {"times": motion.times, "events": _whole(motion.events)},
     "sweep": {"points": _whole(_swept)},
     "play": {"positions": studies.played},
     "assembly": {"positions": studies.fitted},

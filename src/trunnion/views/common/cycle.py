@@ -87,9 +87,9 @@ def column(result: xr.Dataset, name: str, **where: str) -> Array | None:
 
 
 def abscissa(result: xr.Dataset) -> Abscissa:
-    """The drive of the first driver, if it runs one way; otherwise time or the count of positions."""
+    """The drive of the first driver, if it runs one way; otherwise, or of a motion in time, time, or the positions."""
     drivers = names(result, "driver")
-    if drivers:
+    if drivers and result.attrs.get("kind") != "motion":
         first = drivers[0]
         sliding = layout(result)["joints"].get(first, {}).get("type") in GUIDED
         name, turn = ("joint_slide", 0.0) if sliding else ("joint_rotation", 2 * np.pi)

@@ -1,0 +1,86 @@
+"""`trunnion simulate`: what a mechanism does when its motors, loads and friction act on it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from trunnion.cli.model import lines_of, stated
+from trunnion.cli.options import (
+    File,
+    FrictionLaw,
+    Out,
+    Report,
+    Set,
+    TableFile,
+    TableUnits,
+    Units,
+    UnitsRow,
+)
+from trunnion.cli.result import Shown, check_files
+from trunnion.cli.terminal import bar
+from trunnion.errors import Finding, MechanismError
+
+__all__ = ["simulate"]
+
+MILLISECOND = 1000.0
+
+
+def simulate(
+    file: File,
+    time: Annotated[
+        str | None,
+        typer.Option(
+            "--time", help="Duration, as 2s or 300ms; default: ten cycles of the stated motion.", show_default=False
+        ),
+    ] = None,
+    steps: Annotated[int, typer.Option("--steps", help="Equal intervals of time in the result.")] = 1000,
+    tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
+    set_: Set = None,
+    table: TableFile = None,
+    friction: FrictionLaw = None,
+    kind: Annotated[
+        str, typer.Option("--kind", help="Figure to write: sheet, speed, effort, reactions, energy or phase.")
+    ] = "sheet",
+    out: Out = None,
+    report: Report = None,
+    units_row: UnitsRow = False,
+    units: Units = TableUnits.si,
+) -> None:
+    """Motion in time: start-up, run-down, rest, locking.
+
+    The motion of drivers that are free or have a motor, with friction, stick and slip, forces, energy and events.
+    """
+    from trunnion.dynamics.simulate import simulated
+
+    check_files(out or [], report, of="motion", kind=kind if out else None)
+    duration = None if time is None else _seconds(time)
+    mechanism = stated(file, set_, table, friction)
+    with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
+
+        def told(reached: float) -> None:
+            if progress:
+                progress(int(reached * MILLISECOND))
+
+        result = simulated(mechanism, duration, steps, tolerance, told)
+    Shown(result, file, ["drivers"], out or [], report, units_row, drawn={"kind": kind}, units=units).finish()
+
+
+def _seconds(text: str) -> float:
+    """A duration, s, from a number or a text with a unit."""
+    from trunnion.model.quantity import Quantity
+    from trunnion.model.units import KINDS, UnitError
+
+    try:
+        return float(Quantity.read(float(text) if _plain(text) else text, KINDS["time"]).evaluate())
+    except UnitError as error:
+        raise MechanismError(Finding(error.what, "--time", error.remedy or "give a time such as 2s")) from None
+
+
+def _plain(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""Motion in time: drivers whose motion is found from what drives them."""

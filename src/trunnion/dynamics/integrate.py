@@ -1,0 +1,420 @@
+"""Integration of a free motion in time, from event to event.
+
+SciPy's integrators take the steps: DOP853 (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations
+I, 2nd ed., Springer, 1993) or, where bristles make the equations stiff, LSODA (L. Petzold, SIAM J. Sci. Stat. Comput. 4
+(1983) 136-148, doi:10.1137/0904010). Where a force jumps or bends - a joint turns round, a load begins, a motor is
+switched - the step ends, and the next begins from there, so that every step is taken through smooth forces. Such places
+are located on the dense output to rounding.
+
+One free coordinate whose friction is an interval at rest stays at rest while what drives it lies between the efforts at
+which it would break away forward and backward; see `rest`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DOP853, LSODA, OdeSolver
+
+from trunnion.dynamics.energy import kinetic_energy
+from trunnion.dynamics.followed import Snapshot
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout
+from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.state import FreeMotion
+from trunnion.errors import Status
+from trunnion.solve.status import pose_status
+
+__all__ = ["Ended", "Event", "Integration", "Solution", "Stretch"]
+
+Array = NDArray[np.float64]
+
+MOST_EVENTS = 100_000
+SECANTS = 8  # rounds to the place of a time in a step along another number
+INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
+CLOSE = 1e-13  # of the time or coordinate: places that are one
+
+
+class Event(NamedTuple):
+    """Something that happens at a time, s: its kind, what it happens to, and a figure with its unit."""
+
+    time: float
+    kind: str
+    of: str
+    figure: float = np.nan
+    unit: str = ""
+
+
+class Stretch(NamedTuple):
+    """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
+
+    sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
+    goes on, where it is followed.
+    """
+
+    begin: float
+    end: float
+    state: Callable[[Array], Array]
+    sense: float
+    resting: bool
+    now: float
+    snapshot: Snapshot | None = None
+
+
+class Passing(NamedTuple):
+    """A number of the state, by its place in the row, and the value that it passes."""
+
+    number: int
+    value: float
+
+
+class Ended(NamedTuple):
+    """Why an integration ended before its time."""
+
+    code: str
+    time: float
+    figures: dict[str, Any]
+
+
+@dataclass
+class Solution:
+    """What an integration found: stretches one after the other, events, and why it ended early, if it did."""
+
+    layout: Layout
+    stretches: list[Stretch] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    ended: Ended | None = None
+    asked: int = 0
+
+    @property
+    def end(self) -> float:
+        """The time until which there is a motion, s."""
+        return self.stretches[-1].end if self.stretches else 0.0
+
+    def at(self, time: Array) -> tuple[Array, NDArray[np.intp]]:
+        """State (number, time) and number of the stretch at rising times; NaN, −1 after the end."""
+        found = np.full((self.layout.size, len(time)), np.nan)
+        which = np.full(len(time), -1, np.intp)
+        ends = np.array([one.end for one in self.stretches])
+        number = np.searchsorted(ends, time)
+        for k in np.unique(number[number < len(ends)]):
+            lanes = number == k
+            found[:, lanes] = self.stretches[k].state(time[lanes])
+            which[lanes] = k
+        return found, which
+
+
+@dataclass
+class Integration:
+    """One motion from its initial state.
+
+    bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
+    limits: coordinates between which the driver may move; progress: told the time that is reached; inside: share of the
+    coordinate by which forces are asked for on this side of a bend.
+    """
+
+    motion: FreeMotion
+    dynamics: Dynamics
+    duration: float
+    tolerance: float
+    bends: Sequence[float] = ()
+    period: float | None = None
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    progress: Callable[[float], None] | None = None
+    inside: float = INSIDE
+
+    def __post_init__(self) -> None:
+        self.layout = Layout(len(self.motion.names), len(self.motion.bristles))
+        self.solution = Solution(self.layout)
+        times = {time for drive in self.motion.drives.values() for time in drive.times if 0 < time < self.duration}
+        self.breaks = [*sorted(times), self.duration]
+        self.rest = Rest(self.motion, self.layout) if self.sticks else None
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the one free coordinate may rest in friction."""
+        braked = any(np.isfinite(drive.brake_from) for drive in self.motion.drives.values())
+        return len(self.motion.names) == 1 and bool(self.motion.sticking or braked)
+
+    # ---- the whole way ----------------------------------------------------------------------------------------
+
+    def run(self, row: Array) -> Solution:
+        """The motion from an initial row."""
+        self._follow(0.0, row, 0.0, 0.0)
+        time, step, sense = 0.0, None, float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0
+        for _ in range(MOST_EVENTS):
+            if time >= self.duration * (1 - CLOSE) or self.solution.ended:
+                return self.solution
+            until = next(one for one in self.breaks if one > time + CLOSE * self.duration)
+            if self.rest is not None and row[self.layout.coordinates] == 0.0:
+                sense = self.rest.sense(time, row, 0.5 * (time + until))
+                if sense == 0.0:
+                    time, row = self._rest(time, row, until)
+                    continue
+                self._note(time, "break-away", sense)
+            time, row, step = self._move(time, row, until, sense, step)
+        self.end("events", time, {"count": float(MOST_EVENTS)})
+        return self.solution
+
+    def end(self, code: str, time: float, figures: dict[str, Any] | None = None) -> None:
+        self.solution.ended = Ended(f"simulate.{code}", time, figures or {})
+
+    def _note(self, time: float, kind: str, figure: float = np.nan, unit: str = "") -> None:
+        self.solution.events.append(Event(time, kind, self.motion.names[0], figure, unit))
+
+    def _add(self, stretch: Stretch) -> None:
+        self.solution.stretches.append(stretch)
+        if self.progress:
+            self.progress(stretch.end)
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """From which the assembly goes on; None where it is not followed."""
+        return self.motion.followed[0].snapshot if self.motion.followed else None
+
+    def _follow(self, time: float, row: Array, sense: float, now: float) -> None:
+        with np.errstate(all="ignore"):
+            self.motion.step(self.layout.moment(np.array([time]), row[:, None], sense, now))
+
+    # ---- at rest ----------------------------------------------------------------------------------------------
+
+    def _rest(self, time: float, row: Array, until: float) -> tuple[float, Array]:
+        """Stay until what drives it leaves the interval, or the next break."""
+        assert self.rest is not None
+        if not self.solution.stretches or not self.solution.stretches[-1].resting:
+            self._note(time, "rest")
+        end = self.rest.until(time, row, until)
+
+        def held(moments: Array) -> Array:
+            return self.rest.held(time, row, moments) if self.rest else np.empty(0)
+
+        self._add(Stretch(time, end, held, 0.0, True, 0.5 * (time + until)))
+        return end, held(np.array([end]))[:, 0]
+
+    # ---- in motion --------------------------------------------------------------------------------------------
+
+    def _move(
+        self, time: float, row: Array, until: float, sense: float, step: float | None
+    ) -> tuple[float, Array, float | None]:
+        """Move until the next place where a force jumps or bends, a rest, or the next break."""
+        now, n = 0.5 * (time + until), self.layout.coordinates
+        between = self._place(float(row[0]), sense or float(np.sign(row[n])))
+        rate = self._rate(sense, now, between)
+        first = min(step, 0.5 * (until - time)) if step else None
+        solver = self._solver(rate, time, row, until, self._absolute(row), first)
+        while solver.status == "running":
+            before, row = float(solver.t), np.array(solver.y)
+            near = self._near(row, between, self._next(solver, until))
+            failed = None if near else solver.step()
+            if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
+                return self._failed(before, row, sense, now, failed)
+            passed = near or self._passed(row, np.array(solver.y), sense, between)
+            if passed is not None:
+                last = float(solver.step_size or 0.0)
+                return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
+            self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
+            self._follow(float(solver.t), np.array(solver.y), sense, now)
+        return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
+
+    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
+        """The derivative of a row by time, within one stretch: nothing beyond its ends is asked for."""
+        n, one_way = self.layout.coordinates, len(self.motion.names) == 1
+        low, high = between
+
+        def rate(moment: float, numbers: Array) -> Array:
+            self.solution.asked += 1
+            speeds = numbers[n : 2 * n]
+            asked = numbers.copy()
+            if one_way:
+                inside = self.inside * max(1.0, abs(float(numbers[0])))
+                asked[0] = min(max(numbers[0], low + inside), high - inside)
+                if sense and sense * speeds[0] < 0.0:
+                    asked[n] = 0.0
+            at = self.layout.moment(np.array([moment]), asked[:, None], sense, now)
+            with np.errstate(all="ignore"):
+                rates = self.dynamics(at)
+            return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
+
+        return rate
+
+    def _solver(
+        self, rate: Callable[[float, Array], Array], begin: float, row: Array, end: float, absolute: Array,
+        first: float | None = None,
+    ) -> OdeSolver:  # fmt: skip
+        kind = LSODA if self.motion.bristles else DOP853
+        return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first)
+
+    @staticmethod
+    def _next(solver: OdeSolver, until: float) -> float:
+        """How far the next step is about to go, s."""
+        return min(float(getattr(solver, "h_abs", None) or solver.step_size or 0.0), until - float(solver.t))
+
+    def _near(self, row: Array, between: tuple[float, float], step: float) -> Passing | None:
+        """The bend that the next step would pass, foreseen by the speed."""
+        speed = float(row[self.layout.coordinates])
+        level = between[1] if speed > 0 else between[0]
+        if len(self.motion.names) != 1 or not np.isfinite(level) or speed == 0.0:
+            return None
+        return Passing(0, level) if (level - row[0]) / speed < step else None
+
+    def _passed(self, before: Array, after: Array, sense: float, between: tuple[float, float]) -> Passing | None:
+        """What a step has passed: the speed 0, or else a bend; the step is then taken anew, up to it."""
+        n = self.layout.coordinates
+        if sense and sense * after[n] <= 0.0:
+            return Passing(n, 0.0)
+        if len(self.motion.names) == 1:
+            for level in between:
+                if np.isfinite(level) and (before[0] - level) * (after[0] - level) < 0:
+                    return Passing(0, level)
+        return None
+
+    def _approach(
+        self, time: float, row: Array, to: Passing, until: float, sense: float, now: float,
+        rate: Callable[[float, Array], Array],
+    ) -> tuple[float, Array]:  # fmt: skip
+        """Move exactly to where a number of the state has a value: that number takes the place of the time.
+
+        M. Hénon, On the numerical computation of Poincaré maps, Physica D 5 (1982) 412-414,
+        doi:10.1016/0167-2789(82)90034-3. No force beyond the place is asked for. Where another number gets to its own
+        place first, as a speed that becomes 0 before the bend, that one is approached instead.
+        """
+        n, k = self.layout.coordinates, to.number
+
+        def by_number(value: float, numbers: Array) -> Array:
+            state = numbers.copy()
+            moment, state[k] = float(numbers[k]), value
+            if k == 0 and sense and sense * state[n] <= 0.0:
+                return np.full_like(state, np.nan)  # it turns round before
+            found = rate(moment, state)
+            pace = found[k]
+            with np.errstate(all="ignore"):
+                slopes: Array = found / pace
+                slopes[k] = 1.0 / pace
+            return slopes
+
+        begin, state = float(row[k]), row.copy()
+        if begin == to.value:
+            return time, row
+        state[k], absolute = time, self._absolute(row)
+        absolute[k] = self.tolerance / max(float(np.max(np.sqrt(self.motion.unit))), 1e-300)
+        solver = self._solver(by_number, begin, state, to.value, absolute)
+        while solver.status == "running":
+            last, held = float(solver.t), np.array(solver.y)
+            failed = solver.step()
+            wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), held.copy()
+            before[k] = last
+            if wrong and k == 0 and sense:
+                return self._approach(float(held[k]), before, Passing(n, 0.0), until, sense, now, rate)
+            if wrong:
+                return self._failed(float(held[k]), before, sense, now, failed)[:2]
+            if solver.y[k] > until:
+                return self._plain(float(held[k]), before, until, sense, now, rate)
+            along = _by_time(solver.dense_output(), last, float(solver.t), k)
+            self._add(Stretch(float(held[k]), float(solver.y[k]), along, sense, False, now, self.snapshot))
+        found = np.array(solver.y)
+        end, found[k] = float(found[k]), to.value
+        self._follow(end, found, sense, now)
+        if k == 0 and to.value in self.limits:
+            self.end("range", end, {"coordinate": to.value})
+        return end, found
+
+    def _plain(
+        self, time: float, row: Array, until: float, sense: float, now: float, rate: Callable[[float, Array], Array]
+    ) -> tuple[float, Array]:
+        """Up to a break in time that comes before the place is reached."""
+        solver = self._solver(rate, time, row, until, self._absolute(row))
+        while solver.status == "running":
+            before = float(solver.t)
+            failed = solver.step()
+            if solver.status == "failed":
+                return self._failed(before, np.array(solver.y), sense, now, failed)[:2]
+            self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
+        return float(solver.t), np.array(solver.y)
+
+    def _absolute(self, row: Array) -> Array:
+        """Absolute tolerances: a share of what is typical of each number."""
+        unit, n = self.motion.unit, self.layout.coordinates
+        pace = float(np.max(np.sqrt(unit)))
+        sizes = np.array([1.0 if self.motion.system.turns(name) else np.sqrt(u) / pace for name, u in
+                          zip(self.motion.names, unit, strict=True)])  # fmt: skip
+        found = np.full(len(row), self.tolerance)
+        found[:n] *= 0.01 * sizes
+        found[n : 2 * n] *= 0.01 * sizes * pace
+        found[2 * n : 3 * n] *= sizes
+        found[3 * n : 3 * n + self.layout.bristles] *= 1e-9
+        found[-len(WORKS) :] = np.inf  # the works follow the motion; they do not decide its steps
+        return found
+
+    def _place(self, q: float, sense: float) -> tuple[float, float]:
+        """The coordinates on either side of q at which a step ends; a coordinate that is one of them is left behind."""
+        bends = np.asarray(self.bends, float)
+        low, high = self.limits
+        if len(bends):
+            laps = (
+                [0.0]
+                if self.period is None
+                else np.floor(q / self.period) * self.period + self.period * np.arange(-1, 2)
+            )
+            every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
+            near = 1e-12 * max(1.0, abs(q))
+            below, above = every[every < q - near], every[every > q + near]
+            low = max(low, below[-1]) if len(below) else low
+            high = min(high, above[0]) if len(above) else high
+        return low, high
+
+    def _failed(
+        self, time: float, row: Array, sense: float, now: float, message: str | None
+    ) -> tuple[float, Array, None]:
+        """Say why there is no next step; a linkage that locks as it runs stops."""
+        n, row = self.layout.coordinates, row.copy()
+        ahead = row.copy()
+        ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
+        causes = [self._cause(time, one, sense, now) for one in (row, ahead)]
+        figures = {"coordinate": float(row[0]), "rate": float(row[n])}
+        if self.rest is not None and "locked" in causes:
+            energy = self._kinetic(time, row, sense, now)
+            self._note(time, "lock", energy, "J")
+            row[n] = 0.0
+            return time, row, None
+        code = next((one for one in causes if one != "locked" and one), "step")
+        self.end(code, time, figures)
+        return time, row, None
+
+    def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
+        """Why a state has no acceleration; empty if it has one."""
+        at = self.layout.moment(np.array([time]), row[:, None], sense, now)
+        with np.errstate(all="ignore"):
+            walk = self.motion.walk(at, np.zeros_like(at.q))
+            if int(pose_status(walk, (1,))[0]) == Status.NOT_ASSEMBLED:
+                return "not_assembled"
+            rates = self.dynamics(at)
+        return "" if rates.sound else "locked" if rates.locked else "no_acceleration"
+
+    def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
+        at = self.layout.moment(np.array([time]), row[:, None], sense, now)
+        return float(np.ravel(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))[0])
+
+
+def _by_time(dense: Callable[[Array], Array], low: float, high: float, k: int) -> Callable[[Array], Array]:
+    """The state at times, of a step along its k-th number: by the secant to where the time is that."""
+    begin, end = float(dense(np.array([low]))[k, 0]), float(dense(np.array([high]))[k, 0])
+
+    def state(time: Array) -> Array:
+        """Rising or falling, the time is nearly even along a step: a few rounds get it to rounding."""
+        time = np.clip(time, begin, end)
+        before, after = np.full(np.shape(time), low), low + (high - low) * (time - begin) / (end - begin)
+        at_before = begin - time
+        for _ in range(SECANTS):
+            at_after = dense(after)[k] - time
+            with np.errstate(all="ignore"):
+                step = at_after * (after - before) / (at_after - at_before)
+            before, at_before = after, at_after
+            after = np.clip(after - np.where(np.isfinite(step), step, 0.0), min(low, high), max(low, high))
+        rows = np.array(dense(after))
+        rows[k] = after
+        return rows
+
+    return state

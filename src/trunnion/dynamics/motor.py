@@ -1,0 +1,95 @@
+"""The motors of the free drivers of a mechanism, with gear, rotor, switch and brake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.joints.motors import transmitted
+from trunnion.model.parts import Motor
+from trunnion.solve.system import System, Values
+
+__all__ = ["Drive", "drives"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives one free coordinate; nothing if it has no motor.
+
+    parameters: of the motor, SI; inertia: of the rotor as the motor sees it, kg m² or kg; ratio: motor speed over the
+    coordinate's; off, brake_from: times, s, from which the motor is off and the brake on.
+    """
+
+    motor: Motor | None
+    parameters: Mapping[str, Any]
+    ratio: float = 1.0
+    efficiency: float = 1.0
+    inertia: float = 0.0
+    off: float = np.inf
+    brake: float = 0.0
+    brake_from: float = np.inf
+
+    @property
+    def controlled(self) -> bool:
+        """Whether it has a controller with an integral."""
+        return self.motor is not None and self.motor.of.error is not None
+
+    @property
+    def times(self) -> list[float]:
+        """Times, s, at which its effort jumps or bends."""
+        found = [self.off, self.brake_from]
+        if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
+            found += list(self.parameters["points.place"])
+        return [time for time in found if np.isfinite(time)]
+
+    @property
+    def timed(self) -> bool:
+        """Whether its effort may change while the coordinate rests."""
+        return bool(self.times) or self.controlled
+
+    def shaft(self, time: Array, speed: Array, integral: Array, now: float) -> Array:
+        """Effort at the motor's shaft. now: a time, s, that says what is switched on: within one stretch all is."""
+        if self.motor is None or now >= self.off:
+            return 0.0 * speed
+        return self.motor.of.function(self.ratio * speed, time, self.parameters, integral)
+
+    def effort(self, time: Array, speed: Array, second: Array, integral: Array, now: float) -> Array:
+        """Effort on the coordinate, less what the rotor takes to be accelerated; second: of the coordinate."""
+        free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
+        return transmitted(free, speed, self.ratio, self.efficiency)
+
+    def braking(self, now: float) -> float:
+        """Effort of the brake, against the motion."""
+        return self.brake if now >= self.brake_from else 0.0
+
+    def error(self, time: Array, speed: Array, integral: Array, now: float) -> Array:
+        """Rate of the controller's integral."""
+        if self.motor is None or self.motor.of.error is None or now >= self.off:
+            return 0.0 * speed
+        return self.motor.of.error(self.ratio * speed, time, self.parameters, integral)
+
+
+def drives(system: System, values: Values) -> dict[str, Drive]:
+    """What drives each free coordinate, by driver."""
+    found: dict[str, Drive] = {}
+    for name, driver in system.mechanism.drivers.items():
+        if not driver.found:
+            continue
+        motor, path = driver.motor, f"drivers.{name}.motor."
+        if motor is None:
+            found[name] = Drive(None, {})
+            continue
+        own = {key.removeprefix(path): value for key, value in values.items() if key.startswith(path)}
+        parameters: dict[str, Any] = {"integral": 0.0, **own, "over": motor.over}
+        for key in ("place", "effort"):
+            rows = range(len(motor.points or ()))
+            parameters[f"points.{key}"] = np.array([float(own[f"points.{k}.{key}"]) for k in rows])
+        known = ("ratio", "efficiency", "inertia", "off", "brake", "brake_from")
+        found[name] = Drive(motor, parameters, **{key: float(own[key]) for key in known if key in own})
+    return found

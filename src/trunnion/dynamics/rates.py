@@ -1,0 +1,107 @@
+"""Rates of everything that is integrated in time, and how it stands in one row of numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.solve.backward import Backward
+from trunnion.solve.system import law_of
+
+__all__ = ["WORKS", "Dynamics", "Layout", "Rates", "direct_rates", "works_of"]
+
+Array = NDArray[np.float64]
+
+# what is integrated to make the books: by the drivers (freed or not), loads and springs into the mechanism, to friction
+WORKS = ("drive", "loads", "springs", "friction")
+
+
+class Rates(NamedTuple):
+    """Second derivatives (coordinate,), rates of the controllers' integrals (coordinate,), of the deflections
+    (bristle,) and of the works, W. sound: whether there is one acceleration; locked: whether friction has no solution.
+    """
+
+    second: Array
+    integral: Array
+    bristles: Array
+    works: Array
+    sound: bool
+    locked: bool = False
+
+
+class Dynamics(Protocol):
+    """What tells the rates at one moment."""
+
+    def __call__(self, at: Moment) -> Rates: ...
+
+
+class Layout(NamedTuple):
+    """Where what stands in a row: coordinates, rates, integrals of controllers, deflections, works."""
+
+    coordinates: int
+    bristles: int
+
+    @property
+    def size(self) -> int:
+        return 3 * self.coordinates + self.bristles + len(WORKS)
+
+    def moment(self, time: Array, rows: Array, sense: float = 0.0, now: float = 0.0) -> Moment:
+        """The state of lanes, (number, lane)."""
+        n = self.coordinates
+        return Moment(
+            time, rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n : 3 * n + self.bristles], sense, now
+        )
+
+    def works(self, rows: Array) -> Array:
+        """The works, (work, lane)."""
+        return rows[3 * self.coordinates + self.bristles :]
+
+    def row(self, rate: Array, rates: Rates) -> Array:
+        """The derivative of a row."""
+        return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.works])
+
+
+def direct_rates(motion: FreeMotion) -> Dynamics:
+    """The rates by walks through the modules: works for every mechanism, and is what faster ways are held against."""
+    last: list[Array] = []
+
+    def rates(at: Moment) -> Rates:
+        found = motion.accelerate(at, last[0] if last else None)
+        if np.all(np.isfinite(found.second)):
+            last[:] = [found.second]
+        integral = np.array([
+            drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(motion.drives.values())
+        ]).reshape(at.q.shape)  # fmt: skip
+        works = works_of(found.back, at)
+        sound = bool(np.all(found.converged & ~found.turned))
+        locked = any(bool(np.any(np.less(one.share, 1.0))) for one in found.back.settled)
+        return Rates(
+            found.second[:, 0], integral[:, 0], bristle_rates(motion, at, found.back)[:, 0], works, sound, locked
+        )
+
+    return rates
+
+
+def works_of(back: Backward, at: Moment) -> Array:
+    """Power of the drivers, loads and springs into the mechanism, and to friction, W; one lane."""
+    walk = back.walk
+    drive = sum(float(np.ravel(primal(e * walk.rate(name)))[0]) for name, e in back.efforts.items())
+    loads = sum(float(np.ravel(primal(power))[0]) for power in back.load_powers.values())
+    springs = sum(float(np.ravel(primal(state.power))[0]) for state in back.springs.values())
+    friction = sum(float(np.ravel(primal(back.friction_power(joint)))[0]) for joint in walk.system.joints)
+    return np.array([drive, loads, springs, friction])
+
+
+def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> Array:
+    """ż = v − d(v) z of every contact with a memory, m/s, (bristle, lane)."""
+    found = np.empty(at.bristles.shape)
+    for row, joint, deflection in zip(found, motion.bristles, at.bristles, strict=True):
+        law, slip = law_of(motion.system, joint), primal(back.contacts[joint][0].slip)
+        parameters = {key: motion.values[f"joints.{joint}.friction.{key}"] for key in law.parameters}
+        assert law.relaxation is not None  # or it would have no bristles
+        row[:] = slip - law.relaxation(slip, **parameters) * deflection
+    return found

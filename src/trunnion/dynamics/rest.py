@@ -1,0 +1,107 @@
+"""A coordinate at rest in friction: what would break it away, and for how long it stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.state import FreeMotion, Moment
+
+__all__ = ["Rest"]
+
+Array = NDArray[np.float64]
+
+SCANNED = 200  # times of a rest at which what drives it is looked at, where that changes
+SHARES = 40  # bisections of the share of the friction that acts at rest
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The one free coordinate of a mechanism at rest: all joints rest with it, unless others are driven.
+
+    It stays while what drives it lies between the efforts that the walk demands at the brink of moving backward and
+    forward, every friction and resisting load against that motion, at its value for slip 0.
+    """
+
+    motion: FreeMotion
+    layout: Layout
+
+    def _moment(self, time: Array, row: Array, begin: float, sense: float, now: float) -> Moment:
+        rows = self.held(begin, row, time)
+        return self.layout.moment(time, rows, sense, now)
+
+    def held(self, begin: float, row: Array, time: Array) -> Array:
+        """The state at times of a rest that began at a time in a row: only controllers move on."""
+        found = np.repeat(row[:, None], len(time), axis=1)
+        (drive,), n = self.motion.drives.values(), self.layout.coordinates
+        start = row[2 * n : 3 * n]
+        rate = drive.error(np.array([begin]), np.zeros(1), start, begin)
+        found[2 * n] = start[0] + rate[0] * (time - begin)
+        return found
+
+    def beyond(self, time: Array, row: Array, begin: float, now: float) -> tuple[Array, Array]:
+        """By how much what drives it exceeds the break-away effort forward and backward, N m or N; both < 0 at rest."""
+        found = []
+        for sense in (1.0, -1.0):
+            at = self._moment(time, row, begin, sense, now)
+            zero = np.zeros_like(at.q)
+            with np.errstate(all="ignore"):
+                demanded = self.motion.demanded(self.motion.solve(at, zero), at.q.shape)
+                given = self.motion.given(at, zero)
+            miss = sense * (given - demanded)[0]
+            found.append(np.where(np.isfinite(demanded[0]), miss, -np.inf))  # no solution: it locks, that way
+        return found[0], found[1]
+
+    def sense(self, time: float, row: Array, now: float) -> float:
+        """+1, −1: which way it moves on; 0: it stays."""
+        forward, backward = (float(one[0]) for one in self.beyond(np.array([time]), row, time, now))
+        if forward <= 0.0 and backward <= 0.0:
+            return 0.0
+        return 1.0 if forward >= backward else -1.0
+
+    def until(self, time: float, row: Array, until: float) -> float:
+        """The time at which it breaks away, or the end of the stretch."""
+        now = 0.5 * (time + until)
+        if not self._changes:
+            return until
+        times = np.linspace(time, until, SCANNED + 1)
+
+        def most(moments: Array) -> Array:
+            return np.maximum(*self.beyond(moments, row, time, now))
+
+        over = np.flatnonzero(most(times)[1:] > 0)
+        if not len(over):
+            return until
+        low, high = times[over[0]], times[over[0] + 1]
+        at_low, at_high = (float(most(np.array([t]))[0]) for t in (low, high))
+        if not (np.isfinite(at_low) and at_low < 0 < at_high):
+            return float(high)
+        found = brentq(lambda t: float(most(np.array([t]))[0]), low, high, xtol=1e-14)
+        # on the far side, so that it does move on
+        return float(min(until, found + 1e-13 * max(1.0, abs(found))))
+
+    @property
+    def _changes(self) -> bool:
+        """Whether anything may change while it rests."""
+        system = self.motion.system
+        prescribed = any(name not in self.motion.drives for name in system.mechanism.drivers)
+        varies = any(entry.varies for entry in system.mechanism.parameter_set.entries.values())
+        return prescribed or varies or any(drive.timed for drive in self.motion.drives.values())
+
+    def shares(self, at: Moment) -> Array:
+        """The share of the friction, of the same part in every joint, that holds each lane at rest; from −1 to 1."""
+        zero = np.zeros_like(at.q)
+        low, high = np.full(at.q.shape[1], -1.0), np.full(at.q.shape[1], 1.0)
+        given = self.motion.given(at._replace(sense=0.0), zero)[0]
+        for _ in range(SHARES):
+            middle = 0.5 * (low + high)
+            senses = self.motion.beginning(at._replace(sense=1.0), middle)
+            demanded = self.motion.demanded(self.motion.solve(at, zero, senses), at.q.shape)[0]
+            less = demanded < given
+            low, high = np.where(less, middle, low), np.where(less, high, middle)
+        found: Array = 0.5 * (low + high)
+        return found

@@ -1,0 +1,215 @@
+"""The books of a motion in time: variables, energy, events, summary and findings, gathered into the result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
+from trunnion.dynamics.integrate import Solution
+from trunnion.dynamics.rates import WORKS
+from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.steady import steady_figures
+from trunnion.errors import Finding
+from trunnion.results import variables as results
+from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
+from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.figure import Figure
+from trunnion.results.result import Result
+from trunnion.results.sentences import finding_for
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["MOTION", "Books", "result_of"]
+
+Array = NDArray[np.float64]
+
+# what there is beside the variables of a cycle
+MOTION: dict[str, Variable] = {
+    "drive_coordinate": Variable(("driver", "time"), "rad", "coordinate of the driver, whole turns included"),
+    "drive_rate": Variable(("driver", "time"), "rad/s", "rate of the driver's coordinate"),
+    "work_drive": Variable(("time",), "J", "work of the drivers since the start"),
+    "work_loads": Variable(("time",), "J", "work of the loads since the start, positive into the mechanism"),
+    "work_springs": Variable(("time",), "J", "work of springs and dampers since the start, likewise"),
+    "work_friction": Variable(("time",), "J", "work lost to friction since the start"),
+    "kinetic_energy": Variable(("time",), "J", "kinetic energy of the links"),
+    "potential_energy": Variable(("time",), "J", "potential energy of the links in the field of gravity"),
+    "energy_residual": Variable(("time",), "J", "works less changes of energy; 0 but for the errors of integration"),
+    "resting": Variable(("time",), "1", "1 while the mechanism rests in friction", np.int8),
+    "event_time": Variable(("event",), "s", "time of the event"),
+}
+
+
+class Books(NamedTuple):
+    """What is known at the rows of a result: variables as `analyse` has them, state, accelerations of the free
+    coordinates, kinetic and potential energy, works, and where the mechanism rests."""
+
+    time: Array
+    arrays: Mapping[str, Array]
+    labels: dict[str, list[str]]
+    at: Moment
+    seconds: Array
+    energies: Array
+    works: Array
+    resting: NDArray[np.bool_]
+
+
+def result_of(motion: FreeMotion, solution: Solution, books: Books) -> Result:
+    """The result of a motion in time."""
+    mechanism, system = motion.system.mechanism, motion.system
+    residual, turned_over = _energy(books)
+    findings = [*_findings(motion, solution, books), *_unbalanced(residual, turned_over)]
+    attributes = encoded(
+        {
+            **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
+            **cited(references(mechanism)),
+            "driver_units": effort_units(system),
+            "spring_units": spring_units(system),
+            "free_drivers": list(motion.names),
+            "findings": finding_rows(findings),
+            "summary": figure_rows(_summary(motion, solution, books, residual, turned_over)),
+            "inputs": inputs(mechanism),
+            "scene": scene_of(motion.run),
+            "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
+                       for one in solution.events],
+        }
+    )  # fmt: skip
+
+    def build() -> xr.Dataset:
+        known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
+        found = described(books.arrays, known) | described(_own(motion, solution, books, residual), MOTION)
+        time = described({"time": books.time}, {"time": Variable(("time",), "s", "time from the start")})
+        return dataset_of("motion", found, books.labels, attributes, time)
+
+    return Result(attributes, build)
+
+
+def _own(motion: FreeMotion, solution: Solution, books: Books, residual: Array) -> dict[str, Any]:
+    """What there is beside the variables of a cycle."""
+    system, names = motion.system, list(motion.system.mechanism.drivers)
+    coordinates, rates = np.empty((2, len(names), len(books.time)))
+    for row, name in enumerate(names):
+        if name in motion.names:
+            i = motion.names.index(name)
+            coordinates[row], rates[row] = books.at.q[i], books.at.rate[i]
+        else:
+            coordinates[row], rates[row], _ = system.drive(motion.values, name, books.time)
+    return {
+        "drive_coordinate": coordinates,
+        "drive_rate": rates,
+        **{f"work_{name}": work for name, work in zip(WORKS, books.works, strict=True)},
+        "kinetic_energy": books.energies[0],
+        "potential_energy": books.energies[1],
+        "energy_residual": residual,
+        "resting": books.resting,
+        "event_time": np.array([one.time for one in solution.events], float),
+    }
+
+
+# ---- energy ---------------------------------------------------------------------------------------------------
+
+
+def _energy(books: Books) -> tuple[Array, float]:
+    """What works and energies differ by at every row, J, and the energy turned over, J."""
+    drive, loads, springs, friction = books.works
+    energy = books.energies.sum(axis=0)
+    residual = drive + loads + springs - friction - (energy - energy[0])
+    sizes = [np.nanmax(np.abs(one), initial=0.0) for one in (*books.works, *(books.energies - books.energies[:, :1]))]
+    return residual, float(max(sizes))
+
+
+WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
+
+
+def _unbalanced(residual: Array, turned_over: float) -> Iterator[Finding]:
+    worst = float(np.nanmax(np.abs(residual), initial=0.0))
+    if turned_over > 0 and worst > WORST * turned_over:
+        yield finding_for("simulate.energy", share=worst / turned_over)
+
+
+# ---- findings -------------------------------------------------------------------------------------------------
+
+
+def _findings(motion: FreeMotion, solution: Solution, books: Books) -> Iterator[Finding]:
+    system = motion.system
+    yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
+    centred = [one.joint for one in motion.run.seats]
+    if centred:
+        yield finding_for("simulate.centred", joints=centred)
+    name = motion.names[0]
+    turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
+    for event in solution.events:
+        if event.kind == "lock":
+            yield finding_for("simulate.locks", f"drivers.{event.of}", time=event.time, energy=event.figure)
+    rests = [one for one in solution.events if one.kind == "rest"]
+    if rests and solution.stretches and solution.stretches[-1].resting:
+        last = solution.stretches[-1]
+        given, needed = _holding(motion, solution, last.begin)
+        code = "stays_at_rest" if len(solution.stretches) == 1 else "rests"
+        figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
+        more: dict[str, Any] = {} if code == "stays_at_rest" else {"times": len(rests), "time": rests[-1].time}
+        yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
+    if solution.ended is not None:
+        ended = solution.ended
+        unit: dict[str, Any] = (
+            {"unit": "rad" if turns else "m", "driver": name} if ended.code == "simulate.range" else {}
+        )
+        yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
+
+
+def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float, float]:
+    """Effort that acts at a time of rest, and the effort at which it would break away that way."""
+    rows, _ = solution.at(np.array([time]))
+    rest, at = Rest(motion, solution.layout), solution.layout.moment(np.array([time]), rows, 1.0, time)
+    given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])
+    forward, backward = (float(one[0]) for one in rest.beyond(np.array([time]), rows[:, 0], time, time))
+    return given, given - forward if forward >= backward else given + backward
+
+
+# ---- summary --------------------------------------------------------------------------------------------------
+
+
+def _summary(
+    motion: FreeMotion, solution: Solution, books: Books, residual: Array, turned_over: float
+) -> Sequence[Figure]:
+    """The figures that one looks at first."""
+    found: list[Figure] = []
+    names = list(motion.system.mechanism.drivers)
+    for i, name in enumerate(motion.names):
+        turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
+        rate, what = books.at.rate[i], "speed"
+        unit = "rad/s" if turns else "m/s"
+        most = int(np.nanargmax(np.abs(rate)))
+        found.append(Figure(f"{name}.speed_max", f"{what} of {name}", rate[most], unit, "largest", _at(books, most)))
+        last = np.flatnonzero(np.isfinite(rate))[-1]
+        found.append(Figure(f"{name}.speed_end", f"{what} of {name}", rate[last], unit, "at the end", _at(books, last)))
+        efforts = books.arrays["drive_effort"][names.index(name)]
+        most = int(np.nanargmax(np.abs(efforts)))
+        noun = "drive torque" if turns else "drive force"
+        found.append(
+            Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
+        )
+        found += steady_figures(motion, solution, i)
+    for i, joint in enumerate(motion.system.joints):
+        size = np.sqrt(np.sum(books.arrays["reaction_force"][i] ** 2, axis=0))
+        if np.any(size > 0):
+            most = int(np.nanargmax(size))
+            found.append(Figure(f"{joint}.reaction_max", f"reaction in {joint}", size[most], "N", "largest",
+                                _at(books, most)))  # fmt: skip
+    done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
+    words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction")
+    for key, word, work in zip(WORKS, words, books.works[:, done], strict=True):
+        if np.any(books.works[WORKS.index(key)] != 0.0):
+            found.append(Figure(f"work_{key}", word, work, "J"))
+    worst = float(np.nanmax(np.abs(residual)))
+    found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))
+    return found
+
+
+def _at(books: Books, row: int) -> str:
+    return f"at {books.time[row]:.4g} s"

@@ -1,0 +1,171 @@
+"""Motion in time: what a mechanism does when its motors, loads and friction are let act on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.variables import fill_of
+from trunnion.cycle.written import fill_chunk
+from trunnion.dynamics.checks import refuse
+from trunnion.dynamics.energy import kinetic_energy, potential_energy
+from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
+from trunnion.dynamics.rates import direct_rates
+from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.result import Books, result_of
+from trunnion.dynamics.start import initial_row, places
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.tables import tabulated
+from trunnion.dynamics.tabulated import TabulatedRates
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.mechanism import Mechanism
+from trunnion.results import variables as results
+from trunnion.solve.backward import Backward
+from trunnion.solve.memory import CHUNK
+from trunnion.solve.run import prepare
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from trunnion.results.result import Result
+
+__all__ = ["simulate", "simulated"]
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 1_000_000
+TABLED = 1e-14  # as `integrate.INSIDE`, of tables, which know on which side they are asked
+CYCLES = 10  # of the nominal motion: the duration if none is stated
+
+
+@np.errstate(all="ignore")
+def simulate(
+    mechanism: Mechanism,
+    duration: float | None = None,
+    steps: int = 1000,
+    tolerance: float = 1e-9,
+    progress: Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Motion in time of a mechanism whose drivers are free: coordinates, forces, energy and events.
+
+    duration: s, ten cycles of the stated motion if not given; steps: equal intervals at whose ends the result stands;
+    tolerance: relative, of every step of the integration; progress: called with the time that is reached, s.
+    Returns a Dataset with the names and units of `analyse` over `time`, with works, energies and events beside them.
+    Method: the free coordinates accelerate so that the effort the modules demand is what the motors give
+    (`dynamics.state`); integrated from event to event (`dynamics.integrate`).
+    Raises MechanismError if no driver is free, or if the motion cannot be found for what the joints are.
+    """
+    return simulated(mechanism, duration, steps, tolerance, progress).dataset
+
+
+@np.errstate(all="ignore")
+def simulated(
+    mechanism: Mechanism,
+    duration: float | None = None,
+    steps: int = 1000,
+    tolerance: float = 1e-9,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """What `simulate` does, before it becomes a Dataset."""
+    refuse(mechanism)
+    run = prepare(mechanism)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    duration = CYCLES * run.cycle.duration if duration is None else duration
+    _check_numbers(duration, steps, tolerance)
+    motion = FreeMotion.of(run)
+    known = places(motion)
+    tables, walks = tabulated(motion, known), direct_rates(motion)
+    rates = walks if tables is None else TabulatedRates(tables, walks)
+    integration = Integration(
+        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
+        INSIDE if tables is None else TABLED,
+    )  # fmt: skip
+    try:
+        solution = integration.run(initial_row(motion))
+    except KeyboardInterrupt:  # what is done is kept
+        solution = integration.solution
+        integration.end("stopped", solution.end)
+    time = np.linspace(0.0, duration, steps + 1)
+    return result_of(motion, solution, Filling(motion, solution, time).books())
+
+
+def _check_numbers(duration: float, steps: int, tolerance: float) -> None:
+    """MechanismError for numbers that make no sense."""
+    found = []
+    if not (np.isfinite(duration) and duration > 0):
+        found.append(Finding(f"a duration of {duration:g} s", "duration", "give a time above 0, such as 2 s"))
+    if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+        found.append(Finding(f"cannot give {steps} steps", "steps", f"give a whole number from 1 to {MOST_STEPS:,}"))
+    if not 1e-13 <= tolerance <= 1e-2:
+        found.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))
+    if found:
+        raise MechanismError(found)
+
+
+@dataclass(frozen=True)
+class Filling:
+    """The variables of a result at the times of its rows, from the state by walks, as `analyse` has them."""
+
+    motion: FreeMotion
+    solution: Solution
+    time: Array
+
+    def books(self) -> Books:
+        """Every variable, over the rows up to where the motion ends; NaN after it."""
+        motion, system = self.motion, self.motion.system
+        fill = fill_of(system)
+        labels = fill.labels(system)
+        arrays = results.allocate(labels, len(self.time), fill.absent(system))
+        rows, which = self.solution.at(self.time)
+        layout = self.solution.layout
+        seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
+        arrays["status"][...] = Status.NOT_CONVERGED
+        for lanes, stretch in self._alike(which):
+            at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
+            second, back = self._solved(at, stretch)
+            seconds[:, lanes] = second
+            window = slice(int(lanes[0]), int(lanes[-1]) + 1)
+            fill_chunk(arrays, back, at.time, window)
+            energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
+        whole = layout.moment(self.time, rows)
+        for array in arrays.values():  # there is no motion any more
+            if array.flags.writeable and array.dtype == np.float64:
+                array[..., which < 0] = np.nan
+        fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
+        resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
+        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting)
+
+    def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
+        """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
+        found: list[tuple[NDArray[np.intp], Stretch]] = []
+        stretches = self.solution.stretches
+
+        def key(k: int) -> object:
+            one = stretches[k]
+            return one.sense, one.resting, one.now, None if one.snapshot is None else id(one.snapshot)
+
+        begin = 0
+        for i in range(1, len(which) + 1):
+            same = i < len(which) and i - begin < CHUNK and which[i] >= 0 and key(which[i]) == key(which[begin])
+            if which[begin] >= 0 and not same:
+                found.append((np.arange(begin, i), stretches[which[begin]]))
+            if not same:
+                begin = i
+            if begin < len(which) and which[begin] < 0:
+                break
+        return found
+
+    def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward]:
+        """Accelerations and the walk; at rest with the share of the friction that holds it."""
+        self.motion.begin(stretch.snapshot)
+        if not stretch.resting:
+            found = self.motion.accelerate(at)
+            return found.second, found.back
+        share = Rest(self.motion, self.solution.layout).shares(at)
+        zero = np.zeros_like(at.q)
+        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share))

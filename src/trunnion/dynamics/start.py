@@ -1,0 +1,62 @@
+"""Where a free motion begins, between which coordinates it may go, and where forces jump or bend on its way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.state import FreeMotion
+from trunnion.solve.switches import Mechanisms, bends
+
+__all__ = ["Places", "initial_row", "places"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Coordinates of the one free driver at which a force jumps or bends, the period after which they come again, and
+    the coordinates between which the nominal cycle knows the assembly."""
+
+    bends: tuple[float, ...] = ()
+    period: float | None = None
+    limits: tuple[float, float] = (-np.inf, np.inf)
+
+
+def _number(values: object) -> float:
+    return float(np.ravel(primal(values))[0])
+
+
+def initial_row(motion: FreeMotion) -> Array:
+    """The state at the start: coordinates and speeds as stated, else at rest where the driver starts."""
+    values, layout = motion.values, Layout(len(motion.names), len(motion.bristles))
+    row = np.zeros(layout.size)
+    for i, name in enumerate(motion.names):
+        path = f"drivers.{name}"
+        begin = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(values, name)).value
+        row[i] = _number(values.get(f"{path}.initial.coordinate", begin))
+        row[layout.coordinates + i] = _number(values.get(f"{path}.initial.speed", 0.0))
+    return row
+
+
+def places(motion: FreeMotion) -> Places:
+    """Of one free driver that alone moves the mechanism; of several, none are known beforehand."""
+    if len(motion.system.mechanism.drivers) != 1:
+        return Places()
+    (name,) = motion.names
+    run, cycle = motion.run, motion.cycle
+    times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
+    law = motion.system.mechanism.drivers[name].motion
+    own = motion.system.motion_of(run.values, name)
+    begin, speed = _number(law.function(0.0, own).value), _number(law.function(0.0, own).rate)
+    coordinates = begin + speed * np.append(times, [0.0, cycle.duration][: 0 if cycle.periodic else 2])
+    if cycle.periodic:
+        period = abs(speed) * cycle.duration
+        return Places(tuple(np.unique(np.mod(coordinates, period))), period)
+    ends = begin, begin + speed * cycle.duration
+    inside = coordinates[(coordinates > min(ends)) & (coordinates < max(ends))]
+    return Places(tuple(np.unique(inside)), None, (min(ends), max(ends)))

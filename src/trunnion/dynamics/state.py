@@ -1,0 +1,261 @@
+"""Accelerations of the free coordinates, from walks through the modules.
+
+Free coordinates q accelerate so that the effort which the walk demands of every free driver is what its motor gives:
+E(q, q̇, q̈, t) = T(q̇, q̈, t). Without friction E is affine in q̈; with it E is piecewise smooth, and the equations are
+solved by Newton's method on the walks themselves: one lane for q̈ and one more for each coordinate. No mass matrix of
+the whole mechanism is assembled, and nothing is solved that the analysis of a prescribed motion does not solve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.dynamics.followed import Followed, Snapshot, follows
+from trunnion.dynamics.motor import Drive, drives
+from trunnion.solve.backward import Backward, Given, Sense, solve
+from trunnion.solve.forward import Assembly, Forward, forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run
+from trunnion.solve.system import Cycle, System, Values, freed, law_of, rubbing, sticking
+
+__all__ = ["Accelerated", "FreeMotion", "Moment"]
+
+Array = NDArray[np.float64]
+
+ROUNDS = 30  # of Newton's method
+SETTLED = 1e-11  # of the largest acceleration: where it ends
+CLOSE = 1e-6  # a step of which the next is below rounding, for it converges to the square
+DIFFERENCE = 1e-4  # of the acceleration, by which the derivative is taken where E is not affine
+
+
+class Moment(NamedTuple):
+    """The state of some lanes: time, s, coordinates and rates (coordinate, lane), controllers' integrals likewise,
+    deflections of bristles (bristle, lane), m. sense: of the motion where the speed is 0, +1 or −1, of one coordinate;
+    now: a time within the stretch, which says what is switched on.
+    """
+
+    time: Array
+    q: Array
+    rate: Array
+    integral: Array
+    bristles: Array
+    sense: float = 0.0
+    now: float = 0.0
+
+
+class Accelerated(NamedTuple):
+    """Second derivatives of the coordinates (coordinate, lane), the walk with them, and where there is no answer.
+
+    back: lanes as asked for. turned: lanes in which more acceleration would take less effort: the mechanism locks
+    itself under its inertia, so that there is no acceleration or there are several. converged: lanes that are solved.
+    """
+
+    second: Array
+    back: Backward
+    turned: NDArray[np.bool_]
+    converged: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """A mechanism with free drivers, ready to be asked for its accelerations.
+
+    run: prepared for the nominal cycle; drives: what drives the free coordinates, by name; assembly: of every module.
+    """
+
+    run: Run
+    drives: Mapping[str, Drive]
+    assembly: Assembly
+    method: FrictionMethod = field(default_factory=FrictionMethod)
+
+    @classmethod
+    def of(cls, run: Run) -> FreeMotion:
+        """The free motion of a prepared mechanism."""
+        found = drives(run.system, run.values)
+        return cls(run, found, follows(run, len(found) > 1))
+
+    @property
+    def system(self) -> System:
+        return self.run.system
+
+    @property
+    def values(self) -> Values:
+        return self.run.values
+
+    @property
+    def cycle(self) -> Cycle:
+        return self.run.cycle
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The free drivers."""
+        return tuple(self.drives)
+
+    @cached_property
+    def bristles(self) -> tuple[str, ...]:
+        """Joints whose friction has a memory: the deflection of its bristles."""
+        system = self.system
+        return tuple(name for name in rubbing(system) if law_of(system, name).relaxation is not None)
+
+    @cached_property
+    def sticking(self) -> tuple[str, ...]:
+        """Joints whose friction, or a load that resists them, is an interval at rest."""
+        return tuple(sticking(self.system))
+
+    @cached_property
+    def affine(self) -> bool:
+        """Whether efforts are affine in the accelerations."""
+        return not rubbing(self.system) and all(drive.efficiency == 1.0 for drive in self.drives.values())
+
+    @cached_property
+    def unit(self) -> Array:
+        """An acceleration typical of each coordinate, rad/s² or m/s²."""
+        pace = max(float(np.ravel(primal(self.system.pace(self.values)))[0]), 1e-300)
+        size = float(np.ravel(self.system.size(self.values))[0])
+        return np.array([pace * pace * (1.0 if self.system.turns(name) else size) for name in self.names])
+
+    # ---- walks ------------------------------------------------------------------------------------------------
+
+    def values_at(self, at: Moment, second: Array) -> Values:
+        """The numbers of the mechanism with the motion of the free coordinates."""
+        return freed(self.values, {name: (at.q[i], at.rate[i], second[i]) for i, name in enumerate(self.names)})
+
+    def walk(self, at: Moment, second: Array) -> Forward:
+        """Motion alone."""
+        return forward(self.system, self.values_at(at, second), self.assembly, at.time)
+
+    def solve(self, at: Moment, second: Array, zero_slip: Mapping[str, Sense] | None = None) -> Backward:
+        """Motion and forces. zero_slip: see `backward.Given`; of one coordinate what begins to move in its sense."""
+        given = Given(
+            self.beginning(at) if zero_slip is None else zero_slip,
+            dict(zip(self.bristles, at.bristles, strict=True)),
+        )
+        return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
+
+    def beginning(self, at: Moment, share: Number = 1.0) -> dict[str, Sense]:
+        """The sense in which each joint that sticks is about to move, times a share; of one coordinate."""
+        if len(self.names) != 1 or not self.sticking or not np.any(np.asarray(at.sense)):
+            return {}
+        rate = np.broadcast_to(self.unit[0] ** 0.5, at.q.shape)
+        walk = self.walk(at._replace(rate=rate), np.zeros_like(at.q))
+        found: dict[str, Sense] = {}
+        for joint in self.sticking:
+            sign = np.where(walk.still(joint, self.system.turns(joint)), 0.0, np.sign(walk.speed(joint)))
+            found[joint] = at.sense * share * sign
+        return found
+
+    # ---- the assembly by momentum -----------------------------------------------------------------------------
+
+    @cached_property
+    def followed(self) -> tuple[Followed, ...]:
+        """The modules whose assembly is followed."""
+        return tuple(one for one in self.assembly if isinstance(one, Followed))
+
+    def step(self, at: Moment) -> None:
+        """Go on from here: the assembly of the modules that are followed is this one from now on; one lane."""
+        if self.followed:
+            second = self.accelerate(at).second
+            walk = self.walk(at, second)
+            self.begin(Snapshot(float(at.time[0]), dict(walk.motions), tuple(walk.poses)))
+
+    def begin(self, snapshot: Snapshot | None) -> None:
+        """Follow the assembly from a snapshot."""
+        for one in self.followed:
+            one.snapshot = snapshot
+
+    # ---- accelerations ----------------------------------------------------------------------------------------
+
+    def given(self, at: Moment, second: Array) -> Array:
+        """What the motors give, less the brakes, (coordinate, lane)."""
+        found = []
+        for i, drive in enumerate(self.drives.values()):
+            rate = at.rate[i]
+            effort = drive.effort(at.time, rate, second[i], at.integral[i], at.now)
+            sense = np.where(rate != 0.0, np.sign(rate), at.sense)
+            found.append(effort - sense * drive.braking(at.now))
+        return np.array(found).reshape(at.q.shape)
+
+    def demanded(self, back: Backward, shape: tuple[int, ...]) -> Array:
+        """Efforts that a walk demands of the free drivers, (coordinate, lane)."""
+        found = [np.broadcast_to(primal(back.efforts[name]), shape[1:]) for name in self.names]
+        return np.array(found, float).reshape(shape)
+
+    def missing(self, at: Moment, second: Array, zero_slip: Mapping[str, Sense]) -> Array:
+        """E − T, (coordinate, lane)."""
+        back = self.solve(at, second, zero_slip)
+        found: Array = self.demanded(back, at.q.shape) - self.given(at, second)
+        return found
+
+    def accelerate(self, at: Moment, guess: Array | None = None) -> Accelerated:
+        """The accelerations at which every free driver is given what the walk demands; NaN where there are none."""
+        count, lanes = at.q.shape
+        second = np.zeros((count, lanes)) if guess is None else np.array(guess, float)
+        turned, step = np.zeros(lanes, bool), np.full((count, lanes), np.inf)
+        largest = np.maximum(np.max(np.abs(second), axis=0), 0.0)
+        senses = self.beginning(at)
+        for _ in range(ROUNDS):
+            miss, slopes = self._linearised(at, second, senses)
+            turned = _turned(slopes)
+            with np.errstate(all="ignore"):
+                step = -_solved(slopes, miss)
+            second = second + step
+            largest = np.maximum(np.max(np.abs(second), axis=0), 1e-6 * np.min(self.unit))
+            close = SETTLED if not self.affine else CLOSE
+            if np.all(~np.isfinite(step) | (np.abs(step) <= close * largest)) or self.affine:
+                break
+            if np.all(~np.isfinite(step) | (np.abs(step) <= CLOSE * DIFFERENCE * largest)):
+                break
+        converged = np.all(np.isfinite(second) & (self.affine | (np.abs(step) <= 1e-8 * largest)), axis=0)
+        second = np.where(turned, np.nan, second)
+        return Accelerated(second, self.solve(at, second, senses), turned, converged)
+
+    def _linearised(self, at: Moment, second: Array, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
+        """E − T (coordinate, lane) and its derivatives by the accelerations (equation, coordinate, lane)."""
+        count, lanes = at.q.shape
+        steps = self.unit[:, None] + np.zeros((count, lanes))
+        if not self.affine:
+            steps = DIFFERENCE * np.maximum(np.abs(second), 1e-2 * steps)
+        tried = [second] + [second + np.where(np.arange(count)[:, None] == i, steps, 0.0) for i in range(count)]
+        q, rate, integral, bristles = (
+            np.tile(part, (1, count + 1)) for part in (at.q, at.rate, at.integral, at.bristles)
+        )
+        many = Moment(np.tile(at.time, count + 1), q, rate, integral, bristles, at.sense, at.now)
+        wide: dict[str, Sense] = {joint: np.tile(np.asarray(sense), count + 1) for joint, sense in senses.items()}
+        found = self.missing(many, np.concatenate(tried, axis=1), wide).reshape(count, count + 1, lanes)
+        slopes = (found[:, 1:] - found[:, :1]) / steps[None]
+        miss: Array = found[:, 0]
+        return miss, slopes
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """x of A x = b, (equation, coordinate, lane) and (equation, lane)."""
+    if len(matrix) == 1:
+        quotient: Array = right / matrix[0]
+        return quotient
+    found = np.full(right.shape, np.nan)
+    sound = np.all(np.isfinite(matrix), axis=(0, 1)) & np.all(np.isfinite(right), axis=0)
+    stack = np.moveaxis(matrix[..., sound], -1, 0)
+    sound[sound] = np.abs(np.linalg.det(stack)) > 0
+    stack = np.moveaxis(matrix[..., sound], -1, 0)
+    if len(stack):
+        found[:, sound] = np.linalg.solve(stack, right[:, sound].T[..., None])[..., 0].T
+    return found
+
+
+def _turned(slopes: Array) -> NDArray[np.bool_]:
+    """Lanes in which the determinant of ∂E/∂q̈ is not positive, as it is for any mechanism without friction."""
+    with np.errstate(all="ignore"):
+        if len(slopes) == 1:
+            return np.asarray(slopes[0, 0] <= 0.0)
+        sound = np.all(np.isfinite(slopes), axis=(0, 1))
+        found = np.zeros(slopes.shape[-1], bool)
+        found[sound] = np.linalg.det(np.moveaxis(slopes[..., sound], -1, 0)) <= 0.0
+        return found

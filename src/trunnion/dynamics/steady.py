@@ -1,0 +1,49 @@
+"""What is said of a motion that goes round and round: how long it takes to start, and how evenly it then runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.dynamics.integrate import Solution
+from trunnion.dynamics.state import FreeMotion
+from trunnion.results.figure import Figure
+
+__all__ = ["steady_figures"]
+
+Array = NDArray[np.float64]
+
+LOOKED = 40_000  # times at which the motion is looked at
+STARTED = 0.95  # of the mean speed of the last turn: from then on it has started
+FEWEST = 3  # whole turns of which one speaks of a steady one
+
+
+def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
+    """Mean speed, starting time and coefficient of fluctuation of a free coordinate, by its whole turns.
+
+    The mean speed of a turn is 2π over the time it takes; started is where the mean over the turn that ends there first
+    is STARTED of that of the last; fluctuation: (ω_max − ω_min)/ω_mean of the last whole turn. None of a slide, or of
+    less than FEWEST turns.
+    """
+    name = motion.names[i]
+    if not motion.system.turns(name) or not solution.stretches:
+        return []
+    time = np.linspace(0.0, solution.end, LOOKED)
+    rows, _ = solution.at(time)
+    angle, rate = rows[i], rows[solution.layout.coordinates + i]
+    turned = np.abs(angle - angle[0])
+    if turned[-1] < FEWEST * 2 * np.pi or np.any(np.diff(turned) < 0) or solution.stretches[-1].resting:
+        return []
+    last = turned >= turned[-1] - 2 * np.pi
+    before = np.interp(turned - 2 * np.pi, turned, time, left=np.nan)
+    mean = 2 * np.pi / (time - before)
+    steady = float(mean[-1])
+    first = int(np.argmax(np.nan_to_num(mean) >= STARTED * steady))
+    fluctuation = (np.max(np.abs(rate[last])) - np.min(np.abs(rate[last]))) / steady
+    return [
+        Figure(f"{name}.speed_mean", f"speed of {name}", steady, "rad/s", "mean of the last turn"),
+        Figure(
+            f"{name}.starting_time", f"starting time of {name}", time[first], "s", f"to {STARTED:.0%} of that speed"
+        ),
+        Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", fluctuation, "1", "last turn"),
+    ]

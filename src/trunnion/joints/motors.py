@@ -1,0 +1,127 @@
+"""Motors: effort on a free coordinate from its speed and time.
+
+A motor knows nothing of joints: its effort is a torque or a force, by the joint it drives. A new kind is one function
+and one entry of `MOTORS`; the model's schema, its checks, the documentation and the tests read the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["MOTORS", "MotorKind", "constant", "induction", "linear", "speed_control", "table", "transmitted"]
+
+Array = NDArray[np.float64]
+# What a motor states, by key, SI; `points` and the like are arrays.
+Parameters = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class MotorKind:
+    """A kind of motor with what it is stated by and where it comes from.
+
+    function: `(speed, time, parameters, integral) -> effort` at the motor's own shaft, N m or N; speed in rad/s or m/s;
+    integral: of the controller's error over time, 0 of a motor without. error: of a kind with such an integral, its
+    rate `(speed, time, parameters, integral) -> rate`. needs: keys that must be given; takes: keys that may be.
+    """
+
+    function: Callable[[Array, Array, Parameters, Array], Array]
+    needs: tuple[str, ...]
+    takes: tuple[str, ...] = ()
+    source: str = ""
+    validity: str = ""
+    error: Callable[[Array, Array, Parameters, Array], Array] | None = None
+
+
+def constant(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """The same effort at every speed."""
+    found: Array = parameters["effort"] + 0.0 * speed
+    return found
+
+
+def linear(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """Direct-current motor: T = T_s (1 − ω/ω₀), T_s at standstill, ω₀ without load.
+
+    Source: A. Hughes, B. Drury, Electric Motors and Drives, 5th ed., Newnes, 2019, chapter 3.
+    """
+    found: Array = parameters["stall_effort"] * (1.0 - speed / parameters["no_load_speed"])
+    return found
+
+
+def induction(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """Induction motor by Kloss's formula: T = 2 T_k/(s/s_k + s_k/s), s = 1 − ω/ω_s; 0 at the synchronous speed.
+
+    Written as 2 T_k s s_k/(s² + s_k²), which has a value at s = 0 too.
+    Source: M. Kloss, Drehmoment und Schlüpfung des Drehstrommotors, Archiv für Elektrotechnik 5 (1916) 59-87.
+    """
+    slip, most = 1.0 - speed / parameters["synchronous_speed"], parameters["breakdown_slip"]
+    found: Array = 2.0 * parameters["breakdown_effort"] * slip * most / (slip * slip + most * most)
+    return found
+
+
+def table(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """Points (speed or time, effort) joined by straight lines; before the first and after the last the effort stays."""
+    place = time + 0.0 * speed if parameters["over"] == "time" else speed
+    return np.interp(place, parameters["points.place"], parameters["points.effort"])
+
+
+def speed_control(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """Controller of the speed: T = K_p (ω* − ω) + K_i ∫ (ω* − ω) dt, between −limit and limit.
+
+    Source: K. J. Åström, R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press, 2021, chapter 11.
+    """
+    limit = parameters["limit"]
+    return np.clip(_wanted(speed, parameters, integral), -limit, limit)
+
+
+def _wanted(speed: Array, parameters: Parameters, integral: Array) -> Array:
+    found: Array = parameters["proportional"] * (parameters["target"] - speed) + parameters["integral"] * integral
+    return found
+
+
+def control_error(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
+    """Rate of the controller's integral: ω* − ω, and 0 while the limit holds and the error would drive it farther."""
+    error = parameters["target"] - speed
+    wanted = _wanted(speed, parameters, integral)
+    held = (np.abs(wanted) >= parameters["limit"]) & (wanted * error > 0)
+    return np.where(held, 0.0, error)
+
+
+MOTORS: dict[str, MotorKind] = {
+    "constant": MotorKind(constant, ("effort",), validity="a hanging weight, a cylinder at constant pressure"),
+    "linear": MotorKind(
+        linear,
+        ("stall_effort", "no_load_speed"),
+        source="A. Hughes, B. Drury, Electric Motors and Drives, 5th ed., Newnes, 2019, chapter 3",
+        validity="direct-current and permanent-magnet motors at constant voltage",
+    ),
+    "induction": MotorKind(
+        induction,
+        ("breakdown_effort", "breakdown_slip", "synchronous_speed"),
+        source="M. Kloss, Archiv für Elektrotechnik 5 (1916) 59-87",
+        validity="induction motors at constant voltage and frequency; electrical transients are left out",
+    ),
+    "table": MotorKind(table, ("points",), ("over",), validity="a measured characteristic"),
+    "speed-control": MotorKind(
+        speed_control,
+        ("target", "proportional", "limit"),
+        ("integral",),
+        source="K. J. Åström, R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press, 2021, chapter 11",
+        validity="a servo drive whose current loop is fast against the mechanism",
+        error=control_error,
+    ),
+}
+
+
+def transmitted(effort: Array, speed: Array, ratio: float, efficiency: float) -> Array:
+    """Effort on the driven coordinate of an effort at the motor's shaft, through a gear.
+
+    ratio: motor speed over the coordinate's; efficiency: of the gear in the direction in which the power flows, so that
+    a mechanism that drives its motor has to overcome the loss. At rest the gear is taken to drive.
+    """
+    joint = ratio * effort
+    return np.where(joint * speed >= 0.0, joint * efficiency, joint / efficiency)

@@ -1,0 +1,78 @@
+"""Checks of a driver whose motion is found: its motor, and where it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from trunnion.errors import Finding
+from trunnion.joints.motors import MOTORS
+from trunnion.model.parts import Driver
+
+__all__ = ["FREE", "free_motion", "motor_values"]
+
+FREE = ("free", "motor", "initial")  # keys of a driver that no motion law takes
+COMMON = ("kind", "ratio", "efficiency", "inertia", "off", "brake", "brake_from")  # of every kind of motor
+EXAMPLES = {
+    "effort": "4 N m",
+    "stall_effort": "4 N m",
+    "no_load_speed": "1500 rpm",
+    "breakdown_effort": "20 N m",
+    "breakdown_slip": "0.2",
+    "synchronous_speed": "1500 rpm",
+    "points": "[[0 rpm, 4 N m], [1500 rpm, 0 N m]]",
+    "target": "300 rpm",
+    "proportional": "0.5 N m s/rad",
+    "limit": "10 N m",
+}
+
+
+def free_motion(driver: Driver, where: str) -> Iterator[Finding]:
+    """Whether a driver states what its motor needs and nothing else, and whether motion in time can free it."""
+    if driver.initial is not None and not driver.found:
+        what = "'initial' has no effect on a driver whose motion is prescribed"
+        yield Finding(what, f"{where}.initial", "remove it, or state free: true or a motor")
+    if driver.found and driver.law != "constant":
+        what = f"the motion law {driver.law} prescribes a coordinate that is free"
+        yield Finding(what, f"{where}.law", "state speed: … (what all but `simulate` prescribe), or no motor")
+    motor = driver.motor
+    if motor is None:
+        return
+    takes = (*COMMON, *motor.of.needs, *motor.of.takes)
+    for key in sorted(motor.model_fields_set - set(takes)):
+        remedy = f"remove it; the keys of {motor.kind} are {', '.join(takes)}"
+        yield Finding(f"'{key}' has no effect on a motor of the kind {motor.kind}", f"{where}.motor.{key}", remedy)
+    for key in motor.of.needs:
+        if getattr(motor, key) is None:
+            kinds = ", ".join(MOTORS)
+            remedy = f"add {key}: {EXAMPLES[key]}, or state another kind: {kinds}"
+            yield Finding(f"'{key}' is missing", f"{where}.motor", remedy)
+    for key, other in (("brake", "brake_from"), ("brake_from", "brake")):
+        if getattr(motor, key) is not None and getattr(motor, other) is None:
+            yield Finding(f"a brake needs '{other}'", f"{where}.motor.{key}", f"add {other}")
+
+
+ABOVE_0 = ("breakdown_effort", "breakdown_slip", "limit", "efficiency")
+NOT_BELOW_0 = ("inertia", "brake", "proportional", "integral", "off", "brake_from")
+NOT_0 = ("ratio", "no_load_speed", "synchronous_speed")
+
+
+def motor_values(driver: Driver, values: Mapping[str, float], where: str) -> Iterator[Finding]:
+    """Whether the numbers of a motor can be those of one."""
+    where = f"{where}.motor"
+    for keys, limit in ((ABOVE_0, "above 0"), (NOT_BELOW_0, "of at least 0"), (NOT_0, "other than 0")):
+        for key in keys:
+            number = values.get(f"{where}.{key}", np.nan)
+            if {ABOVE_0: number <= 0, NOT_BELOW_0: number < 0, NOT_0: number == 0}[keys]:
+                yield Finding(f"is {number:g}", f"{where}.{key}", f"give a number {limit}")
+    if values.get(f"{where}.efficiency", 1.0) > 1.0:
+        what = f"is {values[f'{where}.efficiency']:g}, above 1"
+        yield Finding(what, f"{where}.efficiency", "give a share of at most 1, such as 0.95")
+    if driver.motor is not None and driver.motor.points is not None:
+        over = driver.motor.over
+        places = [values[f"{where}.points.{k}.place"] for k in range(len(driver.motor.points))]
+        for k in range(1, len(places)):
+            if places[k] <= places[k - 1]:
+                what = f"its {over} {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
+                yield Finding(what, f"{where}.points.{k}", f"sort the points by {over}")

@@ -1,0 +1,43 @@
+"""The flat columns of a motion in time: one row a time, or one an event."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.results.attributes import attribute
+from trunnion.results.tables import cycle
+from trunnion.results.tables.column import Column, column
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["events", "times"]
+
+ENERGY = (
+    *("work_drive", "work_loads", "work_springs", "work_friction", "kinetic_energy", "potential_energy"),
+    *("energy_residual", "resting"),
+)
+
+
+def times(result: xr.Dataset) -> list[Column]:
+    """What a cycle has at a position, with coordinates and rates of the drivers, works and energies."""
+    found = cycle.positions(result)
+    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
+        moves = "rad" if unit == "N m" else "m"
+        for variable, name, own in (("drive_coordinate", "coordinate", moves), ("drive_rate", "rate", f"{moves}/s")):
+            title, _, values = column(result, variable, f"{driver}.{name}", (i,))
+            found.append((title, own, values))
+    return [*found, *(column(result, name, name, ()) for name in ENERGY)]
+
+
+def events(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:
+    """Time, kind, driver and figure of every event."""
+    rows = attribute(result, "events")
+    yield "time", "s", result["event_time"].values
+    yield "event", "", np.array([row[0] for row in rows], dtype=object)
+    yield "driver", "", np.array([row[1] for row in rows], dtype=object)
+    yield "figure", "", np.array([np.nan if row[2] is None else row[2] for row in rows], float)
+    yield "unit", "", np.array([row[3] for row in rows], dtype=object)

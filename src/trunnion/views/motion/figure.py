@@ -1,0 +1,158 @@
+"""A motion in time in figures: speed, effort, reactions and energy over time, with the events marked; phase plot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed
+from trunnion.views.common.cycle import Abscissa, abscissa, names
+from trunnion.views.common.figures import MUTED, PALETTE, along, curve, dress, legend, new, style_of
+from trunnion.views.common.lettering import plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["KINDS", "as_positions", "check_kind", "figure", "sheet"]
+
+PANEL = 2.6  # height, inches
+MOST_MARKED = 12  # events drawn; of more, marks would hide the curves
+WORDS = {"break-away": "starts", "rest": "rests", "lock": "locks"}
+ENERGIES = (
+    ("work_drive", "work of the drivers"),
+    ("work_loads", "work of the loads"),
+    ("work_springs", "work of the springs"),
+    ("work_friction", "lost to friction"),
+    ("kinetic_energy", "kinetic energy"),
+    ("potential_energy", "potential energy"),
+)
+
+
+def as_positions(result: xr.Dataset) -> xr.Dataset:
+    """The result with its times as positions, as the views of a cycle take it."""
+    return result.rename_dims(time="position").drop_vars("time").assign_coords(time=("position", result["time"].values))
+
+
+def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
+    """One figure: of KINDS, or `sheet` with all over time."""
+    check_kind(kind)
+    if kind == "sheet":
+        return sheet(result)
+    title, draw = KINDS[kind]
+    made = new(title, result, height=4.3)
+    _panel(made.subplots(), result, draw)
+    return made
+
+
+def check_kind(kind: str) -> None:
+    """MechanismError if there is no such kind of figure."""
+    if kind not in ("sheet", *KINDS):
+        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use sheet, {', '.join(KINDS)}"))
+
+
+def sheet(result: xr.Dataset) -> Figure:
+    """Everything over time, one panel under the other."""
+    over_time = {kind: one for kind, one in KINDS.items() if kind != "phase"}
+    made = new("Motion in time", result, height=1.0 + PANEL * len(over_time))
+    panels = made.subplots(len(over_time), 1, squeeze=False)[:, 0]
+    for axes, (_, draw) in zip(panels, over_time.values(), strict=True):
+        _panel(axes, result, draw)
+        if axes is not panels[-1]:
+            axes.set_xlabel("")
+    return made
+
+
+def _panel(axes: Axes, result: xr.Dataset, draw: Callable[[Axes, xr.Dataset, Abscissa], None]) -> None:
+    over = abscissa(as_positions(result))
+    draw(axes, result, over)
+    if draw is not _phase:
+        _events(axes, result, over)
+    legend(axes)
+
+
+def _drivers(result: xr.Dataset) -> list[tuple[int, str, str]]:
+    """Number, name and unit of effort of every free driver."""
+    free, units = attribute(result, "free_drivers"), attribute(result, "driver_units")
+    return [(i, name, units[i]) for i, name in enumerate(names(result, "driver")) if name in free]
+
+
+def _speed(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    drivers = _drivers(result)
+    unit = "rad/s" if drivers[0][2] == "N m" else "m/s"
+    along(axes, over, f"speed [{unit}]")
+    for k, (i, name, effort) in enumerate(drivers):
+        own = "rad/s" if effort == "N m" else "m/s"
+        label = name if own == unit else f"{name} [{own}]"
+        curve(axes, over, result["drive_rate"].values[i], label, **style_of(k))
+
+
+def _effort(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    drivers = _drivers(result)
+    factor, label = prefixed(_largest(result["drive_effort"].values), drivers[0][2])
+    along(axes, over, f"drive {'torque' if drivers[0][2] == 'N m' else 'force'} [{label}]")
+    for k, (i, name, _) in enumerate(drivers):
+        curve(axes, over, result["drive_effort"].values[i] * factor, name, **style_of(k))
+
+
+def _reactions(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    sizes = np.sqrt(np.sum(result["reaction_force"].values ** 2, axis=1))
+    factor, label = prefixed(_largest(sizes), "N")
+    along(axes, over, f"reaction [{label}]")
+    for k, joint in enumerate(names(result, "joint")):
+        if _largest(sizes[k]) > 0:
+            curve(axes, over, sizes[k] * factor, joint, **style_of(k))
+
+
+def _energy(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    curves = [(text, result[name].values) for name, text in ENERGIES]
+    curves[-1] = (curves[-1][0], curves[-1][1] - curves[-1][1][0])
+    known = [(text, values) for text, values in curves if _largest(values) > 0]
+    factor, label = prefixed(max((_largest(values) for _, values in known), default=0.0), "J")
+    along(axes, over, f"energy [{label}]")
+    for k, (text, values) in enumerate(known):
+        curve(axes, over, values * factor, text, **style_of(k))
+
+
+def _phase(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    drivers = _drivers(result)
+    turns = drivers[0][2] == "N m"
+    dress(axes, f"coordinate [{'rad' if turns else 'm'}]", f"speed [{'rad/s' if turns else 'm/s'}]")
+    for k, (i, name, _) in enumerate(drivers):
+        q, rate = result["drive_coordinate"].values[i], result["drive_rate"].values[i]
+        axes.plot(q, rate, label=plain(name), linewidth=1.6, **style_of(k))
+        known = np.flatnonzero(np.isfinite(q))
+        axes.plot(q[known[:1]], rate[known[:1]], "o", color=PALETTE[k % len(PALETTE)], label="start" if not k else None)
+
+
+def _largest(values: Any) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))
+
+
+def _events(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+    """Thin lines where something happens, with a word above."""
+    rows, times = attribute(result, "events"), result["event_time"].values
+    if len(rows) > MOST_MARKED or not len(over.values):
+        return
+    factor = over.values[-1] / float(result["time"].values[-1])
+    for (kind, *_), time in zip(rows, times, strict=True):
+        axes.axvline(time * factor, color=MUTED, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1.2)
+        axes.annotate(
+            WORDS.get(kind, kind), (time * factor, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -3),
+            textcoords="offset points", fontsize=7.5, color=MUTED, va="top",
+        )  # fmt: skip
+
+
+# a kind of figure: its title, and what draws it into axes
+KINDS: dict[str, tuple[str, Callable[[Axes, Any, Abscissa], None]]] = {
+    "speed": ("Speed", _speed),
+    "effort": ("Drive effort", _effort),
+    "reactions": ("Reactions", _reactions),
+    "energy": ("Energy account", _energy),
+    "phase": ("Speed over coordinate", _phase),
+}

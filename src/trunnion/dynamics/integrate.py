@@ -345,7 +345,10 @@ class Integration:
         found[n : 2 * n] *= 0.01 * sizes * pace
         found[2 * n : 3 * n] *= sizes
         found[3 * n : 3 * n + self.layout.bristles] *= 1e-9
-        found[-len(WORKS) :] = np.inf  # the works follow the motion; they do not decide its steps
+        turned_over = float(
+            np.max(np.abs(row[-len(WORKS) :]))
+        )  # at the start nothing: the works follow the motion then
+        found[-len(WORKS) :] = self.tolerance * turned_over if turned_over else np.inf
         return found
 
     def _place(self, q: float, sense: float) -> tuple[float, float]:

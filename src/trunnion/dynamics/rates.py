@@ -12,7 +12,7 @@ from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
-__all__ = ["WORKS", "Dynamics", "Layout", "Rates", "direct_rates", "works_of"]
+__all__ = ["WORKS", "Dynamics", "Layout", "Rates", "Walks", "works_of"]
 
 Array = NDArray[np.float64]
 
@@ -65,25 +65,26 @@ class Layout(NamedTuple):
         return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.works])
 
 
-def direct_rates(motion: FreeMotion) -> Dynamics:
+class Walks:
     """The rates by walks through the modules: works for every mechanism, and is what faster ways are held against."""
-    last: list[Array] = []
 
-    def rates(at: Moment) -> Rates:
-        found = motion.accelerate(at, last[0] if last else None)
+    def __init__(self, motion: FreeMotion) -> None:
+        self.motion = motion
+        self._last: Array | None = None
+
+    def __call__(self, at: Moment) -> Rates:
+        """The rates; one lane."""
+        motion = self.motion
+        found = motion.accelerate(at, self._last)
         if np.all(np.isfinite(found.second)):
-            last[:] = [found.second]
+            self._last = found.second
         integral = np.array([
             drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(motion.drives.values())
         ]).reshape(at.q.shape)  # fmt: skip
-        works = works_of(found.back, at)
         sound = bool(np.all(found.converged & ~found.turned))
         locked = any(bool(np.any(np.less(one.share, 1.0))) for one in found.back.settled)
-        return Rates(
-            found.second[:, 0], integral[:, 0], bristle_rates(motion, at, found.back)[:, 0], works, sound, locked
-        )
-
-    return rates
+        memory = bristle_rates(motion, at, found.back)[:, 0]
+        return Rates(found.second[:, 0], integral[:, 0], memory, works_of(found.back, at), sound, locked)
 
 
 def works_of(back: Backward, at: Moment) -> Array:

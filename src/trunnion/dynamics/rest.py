@@ -77,9 +77,10 @@ class Rest:
         if not len(over):
             return until
         low, high = times[over[0]], times[over[0] + 1]
-        at_low, at_high = (float(most(np.array([t]))[0]) for t in (low, high))
-        if not (np.isfinite(at_low) and at_low < 0 < at_high):
+        if not np.isfinite(at_low := float(most(np.array([low]))[0])):
             return float(high)
+        if at_low >= 0.0:  # on the brink when it came to rest
+            return float(np.nextafter(low, high))
         found = brentq(lambda t: float(most(np.array([t]))[0]), low, high, xtol=1e-14)
         # on the far side, so that it does move on
         return float(min(until, found + 1e-13 * max(1.0, abs(found))))

@@ -14,7 +14,7 @@ from trunnion.cycle.written import fill_chunk
 from trunnion.dynamics.checks import refuse
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
-from trunnion.dynamics.rates import direct_rates
+from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
 from trunnion.dynamics.start import initial_row, places
@@ -79,7 +79,7 @@ def simulated(
     _check_numbers(duration, steps, tolerance)
     motion = FreeMotion.of(run)
     known = places(motion)
-    tables, walks = tabulated(motion, known), direct_rates(motion)
+    tables, walks = tabulated(motion, known), Walks(motion)
     rates = walks if tables is None else TabulatedRates(tables, walks)
     integration = Integration(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,

@@ -13,7 +13,7 @@ __all__ = ["steady_figures"]
 
 Array = NDArray[np.float64]
 
-LOOKED = 40_000  # times at which the motion is looked at
+LOOKED, LAST = 2000, 720  # times at which the motion is looked at, and its last turn
 STARTED = 0.95  # of the mean speed of the last turn: from then on it has started
 FEWEST = 3  # whole turns of which one speaks of a steady one
 
@@ -29,17 +29,16 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
     if not motion.system.turns(name) or not solution.stretches:
         return []
     time = np.linspace(0.0, solution.end, LOOKED)
-    rows, _ = solution.at(time)
-    angle, rate = rows[i], rows[solution.layout.coordinates + i]
-    turned = np.abs(angle - angle[0])
+    turned = _turned(solution, time, i)
     if turned[-1] < FEWEST * 2 * np.pi or np.any(np.diff(turned) < 0) or solution.stretches[-1].resting:
         return []
-    last = turned >= turned[-1] - 2 * np.pi
     before = np.interp(turned - 2 * np.pi, turned, time, left=np.nan)
     mean = 2 * np.pi / (time - before)
-    steady = float(mean[-1])
+    fine = np.linspace(before[-1], time[-1], LAST)
+    rate = np.abs(solution.at(fine)[0][solution.layout.coordinates + i])
+    steady = float(turned[-1] - _turned(solution, fine[:1], i)[0]) / (time[-1] - before[-1])
     first = int(np.argmax(np.nan_to_num(mean) >= STARTED * steady))
-    fluctuation = (np.max(np.abs(rate[last])) - np.min(np.abs(rate[last]))) / steady
+    fluctuation = (np.max(rate) - np.min(rate)) / steady
     return [
         Figure(f"{name}.speed_mean", f"speed of {name}", steady, "rad/s", "mean of the last turn"),
         Figure(
@@ -47,3 +46,9 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
         ),
         Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", fluctuation, "1", "last turn"),
     ]
+
+
+def _turned(solution: Solution, time: Array, i: int) -> Array:
+    """How far a coordinate has turned, rad."""
+    found: Array = np.abs(solution.at(time)[0][i] - solution.at(np.zeros(1))[0][i])
+    return found

@@ -9,7 +9,7 @@ A, B, C, D, G are columns that walks through the modules give: unit acceleration
 loads and gravity at rest, unit friction forces. They are smooth in q between the places where a load jumps or bends,
 and are kept as Chebyshev polynomials on panels there, refined until they miss no walk by more than rounding. One
 evaluation sums the polynomials, and settles φ = law(N(r), slip) with q̈ from E = T. Where it is not certain that there
-is one solution the walks are asked (`rates.direct_rates`), which are the oracle of it all.
+is one solution the walks are asked (`rates.Walks`), which are the oracle of it all.
 
 Source of the interpolation: L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapters 4
 and 8.

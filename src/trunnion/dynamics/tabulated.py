@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 ROUNDS = 60
 SETTLED = 1e-13  # of the largest friction
+STALE = 4  # rounds after which the derivative is taken anew
 CONTRACTION = 0.9  # a bound of it from which the walks are asked
 SLOW, FAST = 1e-3, 1e3  # m/s: a law that is the same there depends on the sign of the slip alone
 
@@ -52,6 +53,7 @@ class TabulatedRates:
     tables: Tables
     walks: Dynamics
     _last: Array = field(default_factory=lambda: np.zeros(0))
+    _inverse: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         self._last = np.zeros(len(self.tables.rubs))
@@ -74,6 +76,10 @@ class TabulatedRates:
     @cached_property
     def _pins(self) -> NDArray[np.bool_]:
         return np.array([getattr(rub.load, "across", 0) is None for rub in self.tables.rubs])
+
+    @cached_property
+    def _only_pins(self) -> bool:
+        return bool(self._pins.all())
 
     @cached_property
     def _steady(self) -> list[float | None]:
@@ -146,13 +152,18 @@ class TabulatedRates:
 
     def _settled(self, forces: Forces, mass: float, start: float) -> Array | None:
         """Friction forces that obey their laws."""
-        matrix, per, found = forces.matrix, forces.per, self._last
+        matrix, per = forces.matrix, forces.per
         if not len(per):
             return per
         influence = matrix[1:, FIXED:] - matrix[1:, :1] * (matrix[0, FIXED:] / mass)
         first = matrix[1:, 0] * start + forces.known[1:]
         if not self._bound(per, influence) < CONTRACTION:
             return None
+        return (self._chord if self._planar else self._approximated)(per, first, influence)
+
+    def _approximated(self, per: Array, first: Array, influence: Array) -> Array | None:
+        """By successive approximation, of any kind of contact."""
+        found = self._last
         for _ in range(ROUNDS):
             new = per * self._normals(first + influence @ found)
             change, found = float(np.abs(new - found).max()), new
@@ -161,13 +172,40 @@ class TabulatedRates:
                 return found
         return None
 
+    def _chord(self, per: Array, first: Array, influence: Array) -> Array | None:
+        """By Newton's method with the derivative of an earlier moment, renewed where it is slow; in the plane."""
+        found = self._last
+        for round_ in range(ROUNDS):
+            reaction = first + influence @ found
+            normals = self._normals(reaction)
+            miss = per * normals - found
+            size = float(np.abs(miss).max())
+            if size <= SETTLED * float(np.abs(found).max()):
+                self._last = found
+                return found
+            if not np.isfinite(size):
+                return None
+            if len(self._inverse) != len(per) or round_ % STALE == STALE - 1:
+                slopes = self._slopes(per, reaction, normals, influence)
+                self._inverse = np.asarray(np.linalg.inv(np.eye(len(per)) - slopes), float)
+            found = found + self._inverse @ miss
+        return None
+
+    def _slopes(self, per: Array, reaction: Array, normals: Array, influence: Array) -> Array:
+        """Derivative of the map of the friction forces."""
+        x, y = reaction.reshape(-1, 2).T
+        across = np.abs(x) >= np.abs(y)
+        size = np.where(normals > 0.0, normals, np.inf)
+        gx = np.where(self._pins, x / size, np.sign(x) * across)
+        gy = np.where(self._pins, y / size, np.sign(y) * ~across)
+        return np.asarray(per[:, None] * (gx[:, None] * influence[0::2] + gy[:, None] * influence[1::2]))
+
     def _normals(self, reaction: Array) -> Array:
         """Normal load of every contact, N."""
         if self._planar:
             x, y = reaction.reshape(-1, 2).T
-            if self._pins.all():
-                return np.asarray(np.sqrt(x * x + y * y))
-            return np.where(self._pins, np.sqrt(x * x + y * y), np.maximum(np.abs(x), np.abs(y)))
+            lengths = np.sqrt(x * x + y * y)
+            return lengths if self._only_pins else np.where(self._pins, lengths, np.maximum(np.abs(x), np.abs(y)))
         return np.array([float(rub.load.normal(tuple(reaction[rub.rows]))) for rub in self.tables.rubs])
 
     def _bound(self, per: Array, influence: Array) -> float:

@@ -1,0 +1,278 @@
+"""Motion in time against closed forms and published solutions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from timed import LINEAR, slider_crank, three_posts, wheel
+from trunnion import analyse, read, simulate
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import attribute, summary_of
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def at(result: Any, name: str, time: float, driver: int = 0) -> float:
+    """A number of the result at one of its times."""
+    row = int(np.argmin(np.abs(result["time"].values - time)))
+    assert result["time"].values[row] == pytest.approx(time, abs=1e-12)
+    return float(result[name].values[driver, row])
+
+
+def events(result: Any, kind: str) -> list[float]:
+    rows = attribute(result, "events")
+    return [float(t) for row, t in zip(rows, result["event_time"].values, strict=True) if row[0] == kind]
+
+
+# ---- a flywheel: closed forms of THEORY 8 -----------------------------------------------------------------------
+
+
+def test_a_direct_current_motor_starts_a_flywheel() -> None:
+    """ω = 127.5 (1 − e^(−t/1.875))."""
+    result = simulate(wheel(LINEAR), 5.0, 5, 1e-12)
+    assert at(result, "drive_rate", 1.0) == pytest.approx(52.70260701247094, rel=1e-10)
+    assert at(result, "drive_coordinate", 5.0) == pytest.approx(415.048387557951, rel=1e-10)
+    assert events(result, "break-away") == [0.0]
+
+
+@pytest.mark.parametrize(
+    ("grease", "time", "angle"),
+    [(0.0, 10.625, 107.80260598490099 * 2 * np.pi), (0.004, 7.689820488627919, 440.27692670581223)],
+)
+def test_a_flywheel_runs_down(grease: float, time: float, angle: float) -> None:
+    """Under a constant torque, and under one that grows with the speed as well."""
+    result = simulate(wheel(None, 0.6, grease, initial={"speed": 127.5}), 12.0, 12, 1e-12)
+    assert events(result, "rest") == [pytest.approx(time, rel=1e-10)]
+    assert at(result, "drive_coordinate", 12.0) == pytest.approx(angle, rel=1e-10)
+    assert at(result, "drive_rate", 12.0) == 0.0
+    assert result["resting"].values[-1] == 1
+
+
+def test_an_induction_motor_runs_up_by_kloss() -> None:
+    """Without a load the time to a slip is J ω_s/(2 T_k) ∫ (s/s_k + s_k/s) ds."""
+    motor = {"kind": "induction", "breakdown_effort": 20, "breakdown_slip": 0.2, "synchronous_speed": 50 * np.pi}
+    times = np.array([0.39537521522134894, 0.5344413770648673])
+    for time, slip in zip(times, (0.5, 0.2), strict=True):
+        result = simulate(wheel(motor, drag=0.0), time, 1, 1e-12)
+        assert 1 - at(result, "drive_rate", time) / (50 * np.pi) == pytest.approx(slip, rel=1e-9)
+
+
+def test_a_motor_too_weak_does_not_start() -> None:
+    result = simulate(wheel({**LINEAR, "stall_effort": 0.5}), 1.0, 10)
+    (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.stays_at_rest"]
+    assert finding.figures["given"] == pytest.approx(0.5)
+    assert finding.figures["needed"] == pytest.approx(0.6)
+    assert np.all(result["drive_rate"].values == 0.0)
+    assert np.all(result["resting"].values == 1)
+
+
+def test_a_gear_a_rotor_and_a_loss() -> None:
+    """(J + i² J_r η) ω̇ = i η T − T_f: ω = ω∞ (1 − e^(−t/τ))."""
+    motor = {**LINEAR, "ratio": 3, "efficiency": 0.9, "inertia": 0.002}
+    result = simulate(wheel(motor), 0.5, 1, 1e-12)
+    whole = 0.05 + 9 * 0.002 * 0.9
+    slope, start = 3 * 0.9 * 4 * 3 / 150, 3 * 0.9 * 4 - 0.6
+    assert at(result, "drive_rate", 0.5) == pytest.approx(start / slope * (1 - np.exp(-slope * 0.5 / whole)), rel=1e-10)
+
+
+def test_the_loss_of_a_gear_turns_round_with_the_power() -> None:
+    """Above its no-load speed the motor brakes, through the same gear: the mechanism overcomes the loss as well."""
+    motor = {**LINEAR, "ratio": 1, "efficiency": 0.8}
+    result = simulate(wheel(motor, drag=0.0, initial={"speed": 200.0}), 0.2, 1, 1e-12)
+    slope = 4 / 150 / 0.8
+    wanted = 150 + 50 * np.exp(-slope * 0.2 / 0.05)
+    assert at(result, "drive_rate", 0.2) == pytest.approx(wanted, rel=1e-10)
+
+
+def test_switched_off_and_braked() -> None:
+    """Constant torques: two straight lines in the speed, and a stop at a known time."""
+    motor = {"kind": "constant", "effort": 4, "off": 1.0, "brake": 2.0, "brake_from": 1.5}
+    result = simulate(wheel(motor), 4.0, 8, 1e-11)
+    top = (4 - 0.6) / 0.05
+    later = top - 0.6 / 0.05 * 0.5
+    assert at(result, "drive_rate", 1.0) == pytest.approx(top, rel=1e-10)
+    assert at(result, "drive_rate", 1.5) == pytest.approx(later, rel=1e-10)
+    assert events(result, "rest") == [pytest.approx(1.5 + later * 0.05 / 2.6, rel=1e-9)]
+
+
+def test_a_table_over_time_breaks_a_wheel_away() -> None:
+    """The torque grows evenly; it breaks away where it gets to that of the load."""
+    motor = {"kind": "table", "over": "time", "points": [[0, 0], [2, 4]]}
+    result = simulate(wheel(motor), 1.0, 1, 1e-11)
+    assert events(result, "break-away") == [pytest.approx(0.3, abs=1e-9)]
+    since = 0.7  # ω̇ = 2 (t − 0.3)/0.05
+    assert at(result, "drive_rate", 1.0) == pytest.approx(since**2 / 0.05, rel=1e-7)
+
+
+def test_a_speed_control_holds_the_speed() -> None:
+    """J ω̈ = −K_p ω̇ − K_i (ω − ω*) beside the constant load: known roots, while the limit is not reached."""
+    motor = {"kind": "speed-control", "target": 10, "proportional": 0.5, "integral": 2.0, "limit": 100}
+    result = simulate(wheel(motor), 3.0, 3, 1e-11)
+    matrix = np.array([[0, 1, 0], [0, -10, 40], [0, -1, 0]])  # q, ω, ∫
+    constant = np.array([0, (0.5 * 10 - 0.6) / 0.05, 10])
+
+    def rate(_: float, y: np.ndarray) -> np.ndarray:
+        return np.asarray(matrix @ y + constant)
+
+    wanted = solve_ivp(rate, (0, 3), np.zeros(3), rtol=1e-12, atol=1e-12, method="DOP853")
+    assert at(result, "drive_rate", 3.0) == pytest.approx(wanted.y[1, -1], rel=1e-8)
+
+
+# Andrews' squeezer, from the test set of Mazzia and Magherini: β, Θ, γ, Φ, δ, Ω, ε at the start and at 0.03 s
+START = np.array([
+    -0.0617138900142764496, 0.0, 0.455279819163070380, 0.222668390165885884, 0.487364979543842550,
+    -0.222668390165885884, 1.23054744454982119,
+])  # fmt: skip
+WANTED = np.array([
+    15.81077119629904, -15.75637105984298, 0.04082224013073101, -0.5347301163226948, 0.5244099658805304,
+    0.5347301163226948, 1.048080741042263,
+])  # fmt: skip
+
+
+# ---- linkages: published solutions ----------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_three_posts_pass_poses_with_all_rods_in_line() -> None:
+    """IFToMM A02 by its own equation, 3 θ″ = −3.5 g cos θ (THEORY 8), twice through the singular pose."""
+    result = simulate(three_posts(), 2.0, 2, 1e-11)
+    assert at(result, "drive_coordinate", 1.0) == pytest.approx(-1.7670744763, abs=1e-8)
+    assert at(result, "drive_rate", 1.0) == pytest.approx(-6.8073852409, abs=1e-8)
+    assert at(result, "drive_coordinate", 2.0) == pytest.approx(-4.7702370345, abs=1e-8)
+    assert at(result, "drive_rate", 2.0) == pytest.approx(-1.0189645914, abs=1e-8)
+
+
+def test_andrews_squeezer_in_time() -> None:
+    """Published angles after 0.03 s from rest under 0.033 N m."""
+    data = read(EXAMPLES / "andrews-squeezer.yaml").data()
+    data["drivers"] = {"O": {"speed": 100, "start": "start", "motor": {"kind": "constant", "effort": 0.033}}}
+    result = simulate(Mechanism(**data), 0.03, 1, 1e-12)
+    links = result["link_angle"].sel(link=["K1", "K2", "K3", "K4", "K5", "K6", "K7"]).values
+    beta, theta, gamma, phi, delta, omega, epsilon = WANTED - START
+    # some of the benchmark's angles count from another link: so K2 turns by β + Θ, K4 by δ + Φ, K6 by ε + Ω
+    wanted = [beta, beta + theta, gamma, delta + phi, delta, epsilon + omega, epsilon]
+    turned = (links[:, -1] - links[:, 0]) - np.array(wanted)
+    assert at(result, "drive_coordinate", 0.03) == pytest.approx(WANTED[0], rel=1e-9)
+    assert np.angle(np.exp(1j * turned)) == pytest.approx(0.0, abs=1e-8)
+
+
+# ---- against an integration in maximal coordinates, written here --------------------------------------------------
+
+
+def newton_euler(friction: float, end: float) -> np.ndarray:
+    """The slider-crank of `timed` as four bodies' equations with multipliers, friction by fixed point; ω over time.
+
+    Coordinates: crank angle only as state; accelerations from the constraint equations differentiated twice.
+    """
+    r, length, lever = 0.035, 0.12, 0.01
+    m1, c1, j1, m2, c2, j2, m3 = 1.0, 0.01, 0.02, 0.5, 0.04, 1e-3, 0.6
+    rotor, gravity, guide = 1e-3, 9.81, 0.05
+
+    def rate(_: float, y: np.ndarray) -> list[float]:
+        q, w = y
+        s, c = np.sin(q), np.cos(q)
+        sin_b = r * s / length
+        cos_b = np.sqrt(1 - sin_b**2)
+        b = -np.arcsin(sin_b)
+        wb = -r * c * w / (length * cos_b)
+        slide_rate = -r * s * w - length * np.sin(b) * wb
+        # unknowns: α, β̈, ẍ, Ox, Oy, Px, Py, Qx, Qy, N, M; forces act on the second link of each joint
+        speeds = np.array([w, wb - w, 0 - wb])
+        rub = np.zeros(4)  # friction torques of O, P, Q and friction force of S, on the second link
+        for _round in range(200):
+            a, rhs = np.zeros((11, 11)), np.zeros(11)
+            # crank: m1 a = O − P + m1 g; about its own centre
+            ax1, ay1 = np.array([-c1 * s, -c1 * c * w * w]), np.array([c1 * c, -c1 * s * w * w])
+            a[0, [0, 3, 5]] = [m1 * ax1[0], -1, 1]
+            rhs[0] = -m1 * ax1[1]
+            a[1, [0, 4, 6]] = [m1 * ay1[0], -1, 1]
+            rhs[1] = -m1 * ay1[1] - m1 * gravity
+            motor = 8 * (1 - w / 157)
+            # moment about the centre: O at (−c1), P at (r − c1) with −P
+            ox, oy, px, py = -c1 * c, -c1 * s, (r - c1) * c, (r - c1) * s
+            a[2, [0, 3, 4, 5, 6]] = [j1 + rotor, oy, -ox, -py, px]
+            rhs[2] = motor + rub[0] - rub[1]
+            # rod: centre at P + c2 (cos b, sin b)
+            sb, cb = np.sin(b), np.cos(b)
+            a[3, [0, 1, 5, 7]] = [-m2 * r * s, -m2 * c2 * sb, -1, 1]
+            rhs[3] = m2 * (r * c * w * w + c2 * cb * wb * wb)
+            a[4, [0, 1, 6, 8]] = [m2 * r * c, m2 * c2 * cb, -1, 1]
+            rhs[4] = m2 * (r * s * w * w + c2 * sb * wb * wb) - m2 * gravity
+            gx, gy, hx, hy = -c2 * cb, -c2 * sb, (length - c2) * cb, (length - c2) * sb
+            a[5, [1, 5, 6, 7, 8]] = [j2, gy, -gx, -hy, hx]
+            rhs[5] = rub[1] - rub[2]
+            # piston: Q − load + friction of the guide; N and M of the guide
+            a[6, [2, 7]] = [m3, -1]
+            rhs[6] = -np.sign(slide_rate) * 40.0 + rub[3]
+            a[7, [8, 9]] = [-1, -1]
+            rhs[7] = -m3 * gravity
+            a[8, 10] = -1
+            rhs[8] = rub[2]
+            # loop: x = r cos q + l cos b, 0 = r sin q + l sin b, twice differentiated
+            a[9, [0, 1, 2]] = [r * s, length * sb, 1]
+            rhs[9] = -r * c * w * w - length * cb * wb * wb
+            a[10, [0, 1]] = [r * c, length * cb]
+            rhs[10] = r * s * w * w + length * sb * wb * wb
+            x = np.linalg.solve(a, rhs)
+            loads = np.array([np.hypot(x[3], x[4]), np.hypot(x[5], x[6]), np.hypot(x[7], x[8])])
+            press = max(abs(x[9]), 2 * abs(x[10]) / guide)
+            new = np.append(-friction * lever * loads * np.sign(speeds), -friction * press * np.sign(slide_rate))
+            if np.max(np.abs(new - rub)) <= 1e-13 * max(1.0, np.max(np.abs(new))):
+                break
+            rub = new
+        return [w, float(x[0])]
+
+    found = solve_ivp(rate, (0, end), [0.0, 1e-9], rtol=1e-9, atol=1e-11, method="DOP853", max_step=1e-3)
+    return np.asarray(found.y[:, -1])
+
+
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.1, marks=pytest.mark.slow)])
+def test_a_slider_crank_starts_as_its_bodies_do(friction: float) -> None:
+    """Against the equations of all bodies, from just after the start, which begins at the dead centre."""
+    result = simulate(slider_crank(friction), 0.3, 3, 1e-10)
+    q, w = newton_euler(friction, 0.3)
+    assert at(result, "drive_rate", 0.3) == pytest.approx(w, rel=1e-6)
+    assert at(result, "drive_coordinate", 0.3) == pytest.approx(q, rel=1e-6)
+
+
+# ---- limits -----------------------------------------------------------------------------------------------------
+
+
+def test_a_huge_flywheel_runs_as_the_analysis_prescribes() -> None:
+    """The difference of the efforts of a turn at constant speed falls as 1/J."""
+    data = slider_crank().data()
+    misses = []
+    for inertia in (1e3, 1e4):
+        driver = {"speed": 100, "free": True, "initial": {"speed": 100}}
+        crank = {**data["links"]["crank"], "inertia": inertia}
+        mechanism = Mechanism(**{**data, "links": {**data["links"], "crank": crank}, "drivers": {"O": driver}})
+        turn = 2 * np.pi / 100
+        result = simulate(mechanism, turn, 60, 1e-11)
+        still = analyse(slider_crank(), steps=60)
+        wanted = still["reaction_force"].sel(joint="Q").values
+        wanted = np.append(wanted, wanted[:, :1], 1)
+        sound = np.append(still["status"].values, 1) < 1  # at a dead centre the load is an interval in one of them
+        miss = np.abs(result["reaction_force"].sel(joint="Q").values - wanted)[:, sound]
+        misses.append(float(miss.max() / np.abs(wanted).max()))
+    assert misses[1] < 1e-5
+    assert misses[0] / misses[1] == pytest.approx(10.0, rel=0.05)
+
+
+def test_the_books_of_energy_are_kept() -> None:
+    """Works and energies agree to 1e-8 of the energy turned over, at every time."""
+    result = simulate(slider_crank(), 0.5, 100)
+    turned_over = float(np.abs(result["work_drive"].values).max())
+    assert np.abs(result["energy_residual"].values).max() < 1e-8 * turned_over
+    assert np.abs(result["power_residual"].values).max() < 1e-9 * np.abs(result["drive_power"].values).max()
+
+
+def test_a_summary_says_how_it_starts() -> None:
+    figures = {one.name: one for one in summary_of(simulate(slider_crank(), 1.5, 100))}
+    assert 0.5 < figures["O.starting_time"].value < 2.0
+    assert 0.001 < figures["O.fluctuation"].value < 0.1
+    assert figures["O.speed_mean"].value < 157

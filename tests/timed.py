@@ -1,0 +1,80 @@
+"""Mechanisms whose motion in time is known: shared by tests and benchmarks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from trunnion.model.mechanism import Mechanism
+
+
+def wheel(motor: dict[str, Any] | None = None, drag: float = 0.6, grease: float = 0.0, **driver: Any) -> Mechanism:
+    """A flywheel of 0.05 kg m² on a shaft, with a constant and a viscous loss."""
+    return Mechanism(
+        links={
+            "ground": {"points": {"A": [0, 0]}},
+            "wheel": {"points": {"A": [0, 0]}, "inertia": 0.05},
+        },
+        joints={"A": {"type": "revolute", "links": ["ground", "wheel"]}},
+        drivers={"A": {"speed": 100, **({"motor": motor} if motor else {"free": True}), **driver}},
+        loads={"drag": {"joint": "A", "resisting_torque": drag}} if drag else {},
+        springs={"grease": {"joint": "A", "damping": grease}} if grease else {},
+    )
+
+
+LINEAR = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150}
+
+
+def three_posts() -> Mechanism:
+    """Library of benchmark problems of IFToMM, A02: three posts and two couplers, slender rods of 1 m and 1 kg."""
+    rod = {"mass": 1, "inertia": 1 / 12, "centre": [0.5, 0]}
+
+    def link(first: str, *last: str) -> dict[str, Any]:
+        return {"points": {first: [0, 0], **{key: [1, 0] for key in last}}, **rod}
+
+    ends = {
+        "A0": ["ground", "p1"], "B0": ["ground", "p2"], "C0": ["ground", "p3"],
+        "A": ["p1", "c1"], "B": ["c1", "p2"], "B2": ["p2", "c2"], "C": ["c2", "p3"],
+    }  # fmt: skip
+    return Mechanism(
+        gravity=[0, -9.81],
+        links={
+            "ground": {"points": {"A0": [0, 0], "B0": [1, 0], "C0": [2, 0]}},
+            "p1": link("A0", "A"), "p2": link("B0", "B", "B2"), "p3": link("C0", "C"),
+            "c1": link("A", "B"), "c2": link("B2", "C"),
+        },
+        joints={name: {"type": "revolute", "links": links} for name, links in ends.items()},
+        drivers={"A0": {"speed": 1, "start": np.pi / 2, "free": True, "initial": {"speed": -1}}},
+        assembly={"B": [1, 1], "C": [2, 1]},
+    )  # fmt: skip
+
+
+def slider_crank(friction: float | dict[str, Any] = 0.1, **more: Any) -> Mechanism:
+    """A slider-crank with a motor, masses, a load and friction in its pins and its guide."""
+    data: dict[str, Any] = {
+        "gravity": [0, -9.81],
+        "links": {
+            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+            "crank": {"points": {"O": [0, 0], "P": [0.035, 0]}, "mass": 1.0, "centre": [0.01, 0], "inertia": 0.02},
+            "rod": {"points": {"P": [0, 0], "Q": [0.12, 0]}, "mass": 0.5, "centre": [0.04, 0], "inertia": 1e-3},
+            "piston": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 0.6},
+        },
+        "ground": "frame",
+        "joints": {
+            "O": {"type": "revolute", "links": ["frame", "crank"]},
+            "P": {"type": "revolute", "links": ["crank", "rod"]},
+            "Q": {"type": "revolute", "links": ["rod", "piston"]},
+            "S": {"type": "prismatic", "links": ["frame", "piston"], "guide": {"length": 0.05}},
+        },
+        "joint_defaults": {"pin": {"radius": 0.01}, **({"friction": friction} if friction else {})},
+        "drivers": {
+            "O": {
+                "speed": 100,
+                "motor": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3},
+            }
+        },
+        "loads": {"work": {"joint": "S", "resisting_force": 40}},
+        "assembly": {"Q": [0.155, 0]},
+    }
+    return Mechanism(**{**data, **more})

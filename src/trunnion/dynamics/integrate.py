@@ -148,14 +148,15 @@ class Integration:
         for _ in range(MOST_EVENTS):
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
                 return self.solution
-            until = next(one for one in self.breaks if one > time + CLOSE * self.duration)
+            k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
+            until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else 0.0))
             if self.rest is not None and row[self.layout.coordinates] == 0.0:
-                sense = self.rest.sense(time, row, 0.5 * (time + until))
+                sense = self.rest.sense(time, row, now)
                 if sense == 0.0:
-                    time, row = self._rest(time, row, until)
+                    time, row = self._rest(time, row, until, now)
                     continue
                 self._note(time, "break-away", sense)
-            time, row, step = self._move(time, row, until, sense, step)
+            time, row, step = self._move(time, row, until, sense, now, step)
         self.end("events", time, {"count": float(MOST_EVENTS)})
         return self.solution
 
@@ -181,26 +182,26 @@ class Integration:
 
     # ---- at rest ----------------------------------------------------------------------------------------------
 
-    def _rest(self, time: float, row: Array, until: float) -> tuple[float, Array]:
+    def _rest(self, time: float, row: Array, until: float, now: float) -> tuple[float, Array]:
         """Stay until what drives it leaves the interval, or the next break."""
         assert self.rest is not None
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
-        end = self.rest.until(time, row, until)
+        end = self.rest.until(time, row, until, now)
 
         def held(moments: Array) -> Array:
             return self.rest.held(time, row, moments) if self.rest else np.empty(0)
 
-        self._add(Stretch(time, end, held, 0.0, True, 0.5 * (time + until)))
+        self._add(Stretch(time, end, held, 0.0, True, now))
         return end, held(np.array([end]))[:, 0]
 
     # ---- in motion --------------------------------------------------------------------------------------------
 
     def _move(
-        self, time: float, row: Array, until: float, sense: float, step: float | None
+        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
     ) -> tuple[float, Array, float | None]:
         """Move until the next place where a force jumps or bends, a rest, or the next break."""
-        now, n = 0.5 * (time + until), self.layout.coordinates
+        n = self.layout.coordinates
         between = self._place(float(row[0]), sense or float(np.sign(row[n])))
         rate = self._rate(sense, now, between)
         first = min(step, 0.5 * (until - time)) if step else None

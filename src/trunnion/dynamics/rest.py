@@ -63,9 +63,8 @@ class Rest:
             return 0.0
         return 1.0 if forward >= backward else -1.0
 
-    def until(self, time: float, row: Array, until: float) -> float:
+    def until(self, time: float, row: Array, until: float, now: float) -> float:
         """The time at which it breaks away, or the end of the stretch."""
-        now = 0.5 * (time + until)
         if not self._changes:
             return until
         times = np.linspace(time, until, SCANNED + 1)

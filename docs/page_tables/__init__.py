@@ -10,6 +10,7 @@ __all__ = ["TABLES"]
 
 TABLES: dict[str, Callable[..., str]] = {
     "results": results.results_table,
+    "moving": results.moving_table,
     "sweeps": results.sweeps_table,
     "plays": results.plays_table,
     "tolerances": results.tolerances_table,
@@ -23,6 +24,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "statuses": results.status_table,
     "laws": choices.laws_table,
     "motion": choices.motion_table,
+    "motors": choices.motors_table,
     "pairs": choices.pairs_table,
     "groups": choices.groups_table,
     "plots": results.plots_table,

@@ -108,6 +108,23 @@ def motion_table() -> str:
     return rows_of(head, rows)
 
 
+def motors_table() -> str:
+    """Every kind of motor."""
+    from trunnion.joints.motors import MOTORS
+
+    rows = [
+        (
+            code(name),
+            ", ".join(code(key) for key in kind.needs),
+            ", ".join(code(key) for key in kind.takes),
+            kind.validity,
+            kind.source,
+        )
+        for name, kind in MOTORS.items()
+    ]
+    return rows_of(("`kind`", "needs", "takes", "validity", "source"), rows)
+
+
 def pairs_table() -> str:
     """Every pair of the model file: where it exists and what it needs."""
     from trunnion.joints.clearance import CLEARANCE_MODELS

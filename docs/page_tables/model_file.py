@@ -17,7 +17,7 @@ DOCS = Path(__file__).resolve().parents[1]
 
 
 SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Friction", "JointDefaults",
-            "Misalignment", "Seat", "LoopJoint", "Driver", "Load", "Measure", "Variation", "VariationDefaults",
+            "Misalignment", "Seat", "LoopJoint", "Driver", "Motor", "Initial", "Load", "Measure", "Variation", "VariationDefaults",
             "Correlation", "Cost", "CostOption")  # fmt: skip
 
 

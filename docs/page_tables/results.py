@@ -38,6 +38,18 @@ def _in_order(first: list[str], second: list[str]) -> list[str]:
     return merged
 
 
+def moving_table() -> str:
+    """Every variable of a motion in time beside those of a cycle."""
+    from trunnion.dynamics.result import MOTION
+
+    slides = {"drive_coordinate": "rad or m", "drive_rate": "rad/s or m/s"}
+    rows = [
+        (code(name), ", ".join(one.dims), slides.get(name) or unit(one.units), one.long_name)
+        for name, one in MOTION.items()
+    ]
+    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+
+
 def sweeps_table() -> str:
     """Every figure of a sweep."""
     from trunnion.studies.sweep.study import FIGURES

@@ -43,7 +43,7 @@ class Accessor:
     @property
     def kind(self) -> str:
         """What it is a result of: cycle, sweep, play, assembly, tolerance, allocation, measurement, comparison or
-        identification."""
+        identification, motion."""
         return kind_of(self._result)
 
     @property

@@ -33,6 +33,7 @@ from trunnion.model.parts import (
     Guide,
     Joint,
     Misalignment,
+    Motor,
     Part,
     Pin,
     Seat,
@@ -300,6 +301,10 @@ class Mechanism(Numbers):
             if key == "direction" and below in (["x"], ["y"], ["z"]):
                 return path, (*holder, part, key, "xyz".index(below[0]))
             return None if below or key in ("fit", "direction") else (path, (*holder, part, key))
+        before, found, key = name.rpartition(".motor.")
+        driver = before.removeprefix("drivers.")
+        if found and key in Motor.model_fields and driver in self.drivers and self.drivers[driver].motor is not None:
+            return f"drivers.{driver}.motor.{key}", ("drivers", driver, "motor", key)
         if name == "joint_defaults.friction":  # as a file has it: a plain number is the coefficient
             name += ".coefficient"
         before, found, key = name.rpartition(".friction.")

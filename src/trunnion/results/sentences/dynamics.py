@@ -36,14 +36,14 @@ DYNAMICS: dict[str, Sentence] = {
     "simulate.step": Sentence(
         ERROR,
         "the integration needs steps below rounding at {time:~s} (coordinate {coordinate:.6g}, rate {rate:.6g})",
-        "look at the forces there: one of them jumps or grows without bound",
+        "check the forces there: one of them jumps or grows without bound",
     ),
     "simulate.events": Sentence(
         ERROR,
         "there are {count:.0f} events up to {time:~s}: the motion is not followed farther",
         "ask for a shorter time",
     ),
-    "simulate.stopped": Sentence(WARNING, "stopped at {time:~s}: what was found until then is kept"),
+    "simulate.stopped": Sentence(WARNING, "stopped at {time:~s}: the motion until then is kept"),
     "simulate.locks": Sentence(
         WARNING,
         "the mechanism locks as it runs, at {time:~s}: it stops at once, and loses {energy:~J}",

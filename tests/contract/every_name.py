@@ -39,6 +39,7 @@ def studies(mechanism: trunnion.Mechanism) -> list[xr.Dataset]:
     return [
         trunnion.locking(mechanism, steps=36),
         trunnion.assemble(mechanism, steps=36, uniform="all"),
+        trunnion.simulate(mechanism, 0.1, steps=10),
         trunnion.sweep(mechanism, {"AB": ("1 m", "2 m", 5)}, steps=36),
         trunnion.play(mechanism, ["effort:A"], steps=36),
         trunnion.tolerance(mechanism, methods=("linear",), jobs=1),

@@ -16,6 +16,8 @@ __all__ = ["Places", "initial_row", "places"]
 
 Array = NDArray[np.float64]
 
+CLOSE = 1e-9  # of the way: bends that are one
+
 
 @dataclass(frozen=True)
 class Places:
@@ -56,7 +58,13 @@ def places(motion: FreeMotion) -> Places:
     coordinates = begin + speed * np.append(times, [0.0, cycle.duration][: 0 if cycle.periodic else 2])
     if cycle.periodic:
         period = abs(speed) * cycle.duration
-        return Places(tuple(np.unique(np.mod(coordinates, period))), period)
+        return Places(_apart(np.mod(coordinates, period), period), period)
     ends = begin, begin + speed * cycle.duration
     inside = coordinates[(coordinates > min(ends)) & (coordinates < max(ends))]
-    return Places(tuple(np.unique(inside)), None, (min(ends), max(ends)))
+    return Places(_apart(inside, ends[1] - ends[0]), None, (min(ends), max(ends)))
+
+
+def _apart(coordinates: Array, way: float) -> tuple[float, ...]:
+    """Rising, those that are one but for rounding taken once."""
+    found = np.sort(coordinates)
+    return tuple(float(one) for one in found[np.append(True, np.diff(found) > CLOSE * abs(way))[: len(found)]])

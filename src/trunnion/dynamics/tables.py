@@ -42,7 +42,9 @@ Array = NDArray[np.float64]
 NODES = 12  # of a panel
 PANELS = 32  # of a turn, or of a range, to begin with
 DOUBLINGS = 5
-EXACT = 1e-12  # of the largest of each number over the way
+EXACT = 1e-11  # of the largest of each number over the way
+SMALL = 1e-3  # of the largest number of its kind: of what is below, the share of that counts
+POWERS = 4  # numbers after the columns and slips
 FIXED = 5  # columns before those of the friction forces: q̈, q̇², q̇, loads forward, loads backward
 
 
@@ -110,7 +112,7 @@ def tabulated(motion: FreeMotion, known: Places) -> Tables | None:
             if not error > EXACT:
                 break
             widest *= 0.5
-    if not error <= 1e3 * EXACT:
+    if not error <= 1e2 * EXACT:
         return None
     return Tables(motion, parted, found, known.period, rubs, error)
 
@@ -147,9 +149,21 @@ def _fitted(motion: FreeMotion, rubs: Sequence[Rub], edges: Array) -> tuple[Arra
     exact = _numbers(motion, rubs, (middle[:, None] + half[:, None] * tried).ravel())
     basis = np.cos(np.arange(NODES)[:, None] * np.arccos(tried)[None])
     miss = np.abs(np.einsum("ot,pok->kpt", basis, found).reshape(len(exact), -1) - exact)
-    scale = np.max(np.abs(values), axis=(1, 2))
+    scale = _scale(np.max(np.abs(values), axis=(1, 2)), len(rubs))
     worst = np.max(miss, axis=1) / np.where(scale > 0, scale, 1.0)
     return found, float(np.max(worst))
+
+
+def _scale(largest: Array, count: int) -> Array:
+    """What a miss of each number is measured by: its largest size, if that is no rounding beside others of its kind."""
+    wide = FIXED + count
+    size = 1 + (len(largest) - wide - count - POWERS) // wide
+    found = largest.copy()
+    columns = found[: size * wide].reshape(size, wide)
+    columns[:] = np.maximum(columns, SMALL * columns.max(axis=0))
+    for part in (slice(size * wide, size * wide + count), slice(size * wide + count, None)):
+        found[part] = np.maximum(found[part], SMALL * np.max(found[part], initial=0.0))
+    return found
 
 
 # ---- the numbers, from walks ----------------------------------------------------------------------------------

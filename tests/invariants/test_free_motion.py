@@ -1,0 +1,172 @@
+"""What holds of every motion in time: tables equal walks, rest is kept, energy is kept, bad numbers are refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from timed import LINEAR, slider_crank, wheel
+from trunnion import MechanismError, analyse, read, simulate
+from trunnion.dynamics.rates import Walks
+from trunnion.dynamics.start import places
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.tables import tabulated
+from trunnion.dynamics.tabulated import TabulatedRates
+from trunnion.joints.motors import MOTORS
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import prepare
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LAWS: dict[str, Any] = {
+    "coulomb": 0.1,
+    "stribeck": {"law": "stribeck", "coefficient": 0.08, "static": 0.12, "stribeck_speed": 0.05, "viscous": 0.1},
+    "brown-mcphee": {"law": "brown-mcphee", "coefficient": 0.08, "static": 0.12, "transition_speed": 0.01},
+    "lugre": {
+        "law": "lugre", "coefficient": 0.08, "static": 0.12, "stribeck_speed": 0.05, "stiffness": 1e4, "damping": 0.01,
+    },
+}  # fmt: skip
+
+
+def motored(name: str, driver: dict[str, Any]) -> Mechanism:
+    """An example whose first driver has a motor."""
+    data = read(EXAMPLES / f"{name}.yaml").data()
+    first = next(iter(data["drivers"]))
+    data["drivers"][first] = {**data["drivers"][first], **driver}
+    return Mechanism(**data)
+
+
+def compared(mechanism: Mechanism, lanes: int = 5) -> None:
+    """Tables against walks at random states."""
+    motion = FreeMotion.of(prepare(mechanism))
+    tables = tabulated(motion, places(motion))
+    assert tables is not None
+    assert tables.error < 1e-11
+    walks, rng, pace = Walks(motion), np.random.default_rng(7), float(motion.unit[0]) ** 0.5
+    asked: list[int] = []
+
+    def counted(at: Moment) -> Any:
+        asked.append(1)
+        return walks(at)
+
+    fast = TabulatedRates(tables, counted)
+    for _ in range(lanes):
+        q, v = rng.uniform(-10, 10), rng.normal() * pace
+        bristles = rng.normal(0, 1e-6, (len(motion.bristles), 1))
+        sense = float(np.sign(v)) if motion.sticking else 0.0
+        at = Moment(np.array([0.1]), np.array([[q]]), np.array([[v]]), np.zeros((1, 1)), bristles, sense, 0.1)
+        with np.errstate(all="ignore"):
+            wanted, found = walks(at), fast(at)
+        assert found.second == pytest.approx(wanted.second, rel=1e-9)
+        assert found.bristles == pytest.approx(wanted.bristles, rel=1e-9)
+        size = np.max(np.abs(wanted.works))
+        assert np.abs(found.works - wanted.works).max() < 1e-9 * size
+    assert not asked
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_tables_are_what_walks_find(law: str) -> None:
+    compared(slider_crank(LAWS[law]))
+
+
+@pytest.mark.parametrize("name", ["durango-fourbar", "whitworth-quick-return", "jansen"])
+def test_tables_of_examples_are_what_walks_find(name: str) -> None:
+    """Dyads of several kinds, one behind the other."""
+    driver = next(iter(read(EXAMPLES / f"{name}.yaml").drivers))
+    assert driver
+    compared(motored(name, {"motor": {"kind": "constant", "effort": 5.0}}), lanes=3)
+
+
+def test_slow_motion_is_the_quasi_static_cycle() -> None:
+    """At a crawl, kept up by a huge flywheel, the reactions are those of `analyse` at a crawl."""
+    data = slider_crank().data()
+    crank = {**data["links"]["crank"], "inertia": 1e6}
+    driver = {"O": {"speed": 0.02, "start": 0.5, "free": True, "initial": {"speed": 0.02}}}
+    heavy = Mechanism(**{**data, "links": {**data["links"], "crank": crank}, "drivers": driver})
+    result = simulate(heavy, 60.0, 4, 1e-10)
+    for row in (1, 2, 3, 4):
+        q = float(result["drive_coordinate"].values[0, row])
+        still = analyse(slider_crank(drivers={"O": {"speed": 0.02, "start": q}}), steps=1)
+        wanted = still["reaction_force"].sel(joint="Q").values[:, 0]
+        found = result["reaction_force"].sel(joint="Q").values[:, row]
+        assert np.abs(found - wanted).max() < 1e-6 * np.abs(wanted).max()
+
+
+def test_it_stays_where_friction_holds_it() -> None:
+    """A torque below the friction moves nothing; the reactions are those of one of the possible shares of friction."""
+    motor = {"kind": "constant", "effort": 0.05}
+    result = simulate(slider_crank(0.3, drivers={"O": {"speed": 1, "start": 0.8, "motor": motor}}, loads={}), 1.0, 4)
+    assert np.all(result["drive_coordinate"].values == 0.8)
+    assert result["drive_effort"].values[0] == pytest.approx(0.05, abs=1e-9)
+    assert [one.code for one in result.trunnion.findings] == ["simulate.stays_at_rest"]
+
+
+def test_a_range_ends_the_motion() -> None:
+    motor = {"kind": "constant", "effort": 4}
+    driver = {"A": {"speed": 1, "range": [0, 2], "motor": motor}}
+    data = wheel(LINEAR, drag=0.0).data()
+    result = simulate(Mechanism(**{**data, "drivers": driver}), 1.0, 10, 1e-11)
+    (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.range"]
+    assert finding.figures["time"] == pytest.approx(np.sqrt(2 * 2 * 0.05 / 4), rel=1e-9)
+    assert np.isnan(result["drive_rate"].values[0, -1])
+
+
+@pytest.mark.parametrize(
+    ("driver", "code"),
+    [
+        ({"speed": 1}, "input.drivers"),
+        ({"speed": 1, "motor": {**LINEAR, "inertia": -1}}, "input.drivers"),
+        ({"speed": 1, "motor": {"kind": "table", "points": [[0, 1], [0, 2]]}}, "input.drivers"),
+        ({"speed": 1, "motor": {"kind": "linear", "stall_effort": 1}}, "input.drivers"),
+        ({"speed": 1, "motor": {**LINEAR, "effort": 1}}, "input.drivers"),
+        ({"speed": 1, "motor": {**LINEAR, "efficiency": 1.2}}, "input.drivers"),
+        ({"speed": 1, "motor": {**LINEAR, "ratio": 0}}, "input.drivers"),
+        ({"speed": 1, "motor": {**LINEAR, "brake": 2}}, "input.drivers"),
+        ({"speed": 1, "initial": {"speed": 1}}, "input.drivers"),
+        ({"speed": 1, "motor": {"kind": "steam"}}, "input.drivers"),
+    ],
+)
+def test_a_driver_that_cannot_be_let_move_is_refused(driver: dict[str, Any], code: str) -> None:
+    data = {**wheel(LINEAR).data(), "drivers": {"A": driver}}
+    with pytest.raises(MechanismError) as caught:
+        simulate(Mechanism(**data), 1.0)
+    assert {one.code for one in caught.value.findings} == {code}
+
+
+@pytest.mark.parametrize("options", [{"duration": -1.0}, {"duration": 1.0, "steps": 0}, {"tolerance": 1.0}])
+def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
+    with pytest.raises(MechanismError):
+        simulate(wheel(LINEAR), **options)
+
+
+def test_several_free_drivers_do_not_stick() -> None:
+    data = {**wheel(LINEAR).data()}
+    data["links"] = {**data["links"], "ground": {"points": {"A": [0, 0], "B": [1, 0]}},
+                     "other": {"points": {"B": [0, 0]}, "inertia": 0.1}}  # fmt: skip
+    data["joints"] = {**data["joints"], "B": {"type": "revolute", "links": ["ground", "other"]}}
+    data["drivers"] = {**data["drivers"], "B": {"speed": 1, "free": True}}
+    with pytest.raises(MechanismError) as caught:
+        simulate(Mechanism(**data), 1.0)
+    assert caught.value.findings[0].where == "loads.drag"
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_every_motor_takes_arrays(name: str) -> None:
+    """Contract: an effort for every speed, finite, of the shape of the speeds."""
+    parameters = dict.fromkeys((*MOTORS[name].needs, *MOTORS[name].takes), 2.0)
+    places_, efforts = np.array([0.0, 1.0]), np.array([1.0, 2.0])
+    parameters |= {"points.place": places_, "points.effort": efforts, "over": "speed", "integral": 0.0}
+    speed = np.linspace(-3, 3, 7)
+    found = MOTORS[name].function(speed, np.zeros(7), parameters, np.zeros(7))
+    assert np.shape(found) == (7,)
+    assert np.all(np.isfinite(found))
+
+
+def test_the_digest_of_a_model_without_motors_is_what_it_was() -> None:
+    """What a driver may state for motion in time counts where it is stated alone."""
+    plain = wheel(LINEAR, drag=0.0).data()
+    other = {**plain, "drivers": {"A": {"speed": 100}}}
+    assert Mechanism(**plain).digest != Mechanism(**other).digest
+    assert Mechanism(**other).digest == Mechanism(**{**other, "drivers": {"A": {"speed": 100, "free": False}}}).digest

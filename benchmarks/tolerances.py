@@ -111,6 +111,25 @@ def memory(console: Console) -> None:
     console.print(shown)
 
 
+def whole(samples: int) -> None:
+    """In a fresh process: the study that a user asks for, all of it, on all cores; printed as JSON."""
+    mechanism = Mechanism.read(EXAMPLES / "toleranced-fourbar.yaml")
+    start, busy = time.perf_counter(), time.process_time()
+    trunnion.tolerance(mechanism, samples=samples, steps=36)
+    told = {"seconds": time.perf_counter() - start, "busy": time.process_time() - busy, "bytes": peak_memory()}
+    print(json.dumps(told))
+
+
+def growth(console: Console) -> None:
+    """Peak memory and time of the whole study with the number of samples, by the engine that `auto` takes."""
+    shown = table("toleranced-fourbar, both measures, 36 positions, all cores", "samples", "s", "s of CPU", "MiB")
+    for samples in (10_000, 100_000, 1_000_000, MOST_SAMPLES):
+        command = [sys.executable, "-m", "benchmarks.tolerances", "--whole", str(samples)]
+        told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1])
+        shown.add_row(f"{samples:,}", f"{told['seconds']:.1f}", f"{told['busy']:.1f}", f"{told['bytes'] / 2**20:.0f}")
+    console.print(shown)
+
+
 # ---- the peer -------------------------------------------------------------------------------------------------
 
 
@@ -196,6 +215,7 @@ def accuracy(console: Console) -> None:
 PARTS: dict[str, Callable[[Console], None]] = {
     "workers": lambda console: workers(console, 100_000),
     "memory": memory,
+    "growth": growth,
     "peer": peer,
     "accuracy": accuracy,
 }
@@ -205,7 +225,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="all if none is named")
     parser.add_argument("--alone", nargs=3, type=int, metavar=("SAMPLES", "STEPS", "PART"), help=argparse.SUPPRESS)
+    parser.add_argument("--whole", type=int, metavar="SAMPLES", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.whole:
+        whole(options.whole)
+        return
     if options.alone:
         alone(*options.alone)
         return

@@ -452,6 +452,27 @@ def test_an_analysis_on_the_terminal_needs_few_libraries(name: str) -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["sweep", "durango-fourbar.yaml", "--over", "AB=1.9m,2.0m"],
+        ["tolerance", "toleranced-fourbar.yaml", "--samples", "10"],
+        ["play", "fourbar-with-play.yaml"],
+        ["allocate", "toleranced-fourbar.yaml"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_study_on_the_terminal_draws_nothing(arguments: list[str]) -> None:
+    """Matplotlib is loaded for figures and reports only."""
+    command = ["trunnion", arguments[0], str(EXAMPLES / arguments[1]), *arguments[2:], "--steps", "24"]
+    code = f"import sys; sys.argv = {command}; sys.exit = lambda _: print('matplotlib' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; from trunnion.cli.app import main; main()"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "False"
+
+
 # ---- in space -------------------------------------------------------------------------------------------------
 
 

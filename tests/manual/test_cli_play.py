@@ -14,7 +14,8 @@ import xarray as xr
 import trunnion
 from manual.conftest import Outcome, Run
 from played import four_bar
-from trunnion.views.play.figure import figure, tables
+from trunnion.views.play.figure import figure
+from trunnion.views.play.tables import tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from trunnion.rig.reading.angle import coordinate, seen_edges, smoothed, unresolved
 from trunnion.rig.reading.columns import Column, DataTable
+from trunnion.rig.reading.local_polynomials import by_local_polynomials
 from trunnion.rig.reading.log import Account
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.timebase import Timeline
@@ -33,6 +34,26 @@ def test_steady_pulses_in_step_with_the_sampling(per_turn: int, rate: float) -> 
     off = (found - true)[per_turn:-per_turn]
     assert np.std(off) < 0.06 * STEP
     assert abs(off.mean()) < 1.8 * unresolved(raw - found, STEP)  # a rectangle is √3 wide
+
+
+@pytest.mark.parametrize(
+    ("count", "width", "order"),
+    [(5, 5, 3), (200, 21, 3), (3000, 721, 3), (721, 721, 3), (50, 7, 0)],
+)
+def test_local_polynomials_are_those_of_scipy(count: int, width: int, order: int) -> None:
+    from scipy.signal import savgol_filter
+
+    values = np.cumsum(np.random.default_rng(count).normal(size=count))
+    theirs = savgol_filter(values, width, order)
+    np.testing.assert_allclose(by_local_polynomials(values, width, order), theirs, rtol=0, atol=1e-11 * np.ptp(values))
+
+
+@pytest.mark.parametrize(("count", "width"), [(90, 31), (90_000, 40_001)])
+def test_local_cubics_leave_a_cubic_as_it_is(count: int, width: int) -> None:
+    """However many values there are: that of SciPy gives 0 from some 10⁴ on."""
+    x = np.linspace(-1, 1, count)
+    cubic = x**3 - 0.4 * x**2 + 2 * x + 0.7
+    assert by_local_polynomials(cubic, width, 3) == pytest.approx(cubic, abs=1e-11)
 
 
 @pytest.mark.parametrize("per_sample", [0.97, 1.01, 1.2, 1.5, 2.4])

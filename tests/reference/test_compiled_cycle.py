@@ -152,6 +152,15 @@ def test_kept_code_is_found_without_recording(monkeypatch: pytest.MonkeyPatch, t
     assert len(recorded) == 3
 
 
+@pytest.mark.parametrize("over", [{"AB": [1.9, 2.0]}, {"A.speed": [5.0, 6.0]}], ids=lambda over: "".join(over))
+def test_a_sweep_again_records_nothing(over: dict[str, Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Neither to see whether it can be compiled, nor with times of each mechanism."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    first = trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled")
+    monkeypatch.setattr(VectorKernel, "_recorded", lambda self, inputs: pytest.fail("it was recorded again"))
+    assert trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled").identical(first)
+
+
 def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Another coefficient is the same program, another law is not."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -145,3 +146,22 @@ def test_seed_and_only_the_seed_changes_samples() -> None:
     xr.testing.assert_identical(found[0], found[1])
     assert found[2]["convergence_mean"].values[0, 2] == found[0]["mean"].values[0]
     assert found[3]["mean"].item() != found[0]["mean"].item()
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+def test_memory_does_not_grow_with_the_samples(engine: str) -> None:
+    """Samples are drawn, judged, counted and dropped block by block: four times as many need no more at any time."""
+    if engine == "compiled":
+        pytest.importorskip("llvmlite")
+    found = study(fourbar(loaded=True, tolerances={"l3": "±1 mm"}, measures={"peak": {"effort": "A", "as": "maximum"}}))
+    first = found.sampling("monte-carlo", 1, 5, engine)
+    few, many = (found.sampling("monte-carlo", blocks * first.block_size, 5, engine) for blocks in (3, 12))
+    run(few, threads=True)  # what is worked out once: machine code, tables
+    peaks = []
+    for one in (few, many):
+        tracemalloc.start()
+        run(one, threads=True)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert many.blocks == 4 * few.blocks
+    assert peaks[1] < 1.1 * peaks[0]

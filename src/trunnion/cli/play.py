@@ -59,7 +59,7 @@ def play(
         return figure(whole_peaks(result, uncut))
 
     def show() -> None:
-        from trunnion.views.play.figure import tables
+        from trunnion.views.play.tables import tables
 
         show_tables(mechanism.name, tables(result), apart=False)
 

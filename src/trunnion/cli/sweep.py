@@ -122,8 +122,7 @@ def sweep(
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
     """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
-    from trunnion.views.sweep.figure import check_kind
-    from trunnion.views.sweep.scales import check_axes
+    from trunnion.views.sweep.scales import check_axes, check_kind
 
     check_kind(kind)
     counts = {name: points({name: values}) for name, values in grid.items()}
@@ -139,7 +138,6 @@ def _files(out: Sequence[Path], measures: Sequence[str], image: str) -> dict[Pat
     MechanismError for what cannot be written.
     """
     from trunnion.results.export import FORMATS, check_format
-    from trunnion.views.cycle.plots import check_figure
 
     found: dict[Path, str] = {}
     for path in out:
@@ -153,6 +151,8 @@ def _files(out: Sequence[Path], measures: Sequence[str], image: str) -> dict[Pat
             check_format(path, IMAGES)
             found[path] = ""
         else:
+            from trunnion.views.cycle.plots import check_figure  # with matplotlib
+
             names = [f"{_plain(name)}.{image.lower().lstrip('.')}" for name in measures]
             check_figure(path / names[0])
             found |= {path / name: one for name, one in zip(names, measures, strict=True)}

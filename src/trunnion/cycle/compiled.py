@@ -50,11 +50,13 @@ class _Cells(dict[str, _Row]):
 class CycleKernel:
     """Every variable of a cycle at many positions.
 
-    run: the prepared mechanism, with these values; arrays: those of a result, for their shapes; write: writes a walk
-    into them. Raises MechanismError as `CompiledKernel` does.
+    run: the prepared mechanism, with these values; time: one that will be asked for, s; arrays: those of a result, for
+    their shapes; write: writes a walk into them. Raises MechanismError as `CompiledKernel` does.
     """
 
-    def __init__(self, run: Run, values: Values, arrays: Arrays, write: Write, method: FrictionMethod) -> None:
+    def __init__(
+        self, run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, write: Write, method: FrictionMethod
+    ) -> None:
         self._write, self._arrays = write, arrays
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
@@ -69,7 +71,7 @@ class CycleKernel:
             undefined=[name for name, (variable, _) in self._names.items() if variable in UNDEFINED],
             described="cycle",
         )
-        self._kernel.check(values)
+        self._kernel.check(values, time)
 
     def fill(
         self, arrays: Arrays, values: Values, time: NDArray[np.float64]

@@ -79,7 +79,7 @@ class Many:
         """Variables by name, and the condition of every module."""
         arrays = _allocated(self.run.system, shape, {*wanted, "status"}, parts)
         known = frozenset(literals(values).items())  # what is 0 with these is left out
-        kernel = self._kernel(arrays, values, method, (frozenset(wanted), tuple(parts), method, known))
+        kernel = self._kernel(arrays, values, time, method, (frozenset(wanted), tuple(parts), method, known))
         if kernel is None:
             fill_chunk(arrays, self.run.solve(time, values, method), time, slice(None))
             return arrays
@@ -91,12 +91,14 @@ class Many:
             fill_lanes(arrays, self.run.solve(times, some, method), times, (row, column))
         return arrays
 
-    def _kernel(self, arrays: Arrays, values: Values, method: FrictionMethod, key: object) -> CycleKernel | None:
+    def _kernel(
+        self, arrays: Arrays, values: Values, time: NDArray[np.float64], method: FrictionMethod, key: object
+    ) -> CycleKernel | None:
         if not self.compiled:
             return None
         if key not in self._kernels:
             try:
-                self._kernels[key] = CycleKernel(self.run, values, arrays, write, method)
+                self._kernels[key] = CycleKernel(self.run, values, time, arrays, write, method)
             except MechanismError:
                 if self.engine == "compiled":
                     raise

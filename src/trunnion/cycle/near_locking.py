@@ -299,21 +299,28 @@ class Locking:
         return [critical_figure(run, *decides, f"at {dial.at(self.first)}")]
 
 
-def look(run: Run, time: Array, margin: Array, method: FrictionMethod) -> Locking:
-    """Look at no more than LOOKED times of a cycle. margin: of every position analysed, NaN where unknown."""
+def look(run: Run, time: Array, margin: Array, method: FrictionMethod, walked: Backward | None = None) -> Locking:
+    """Look at no more than LOOKED times of a cycle.
+
+    margin: of every position analysed, NaN where unknown; walked: the walk through all of them by the method, if it is
+    there, which is not taken again.
+    """
     times = run.cycle.times(min(len(time), LOOKED))
     plain = replace(method, name="newton", margin_up_to=0.0)
+    same = walked is not None and len(times) == len(time) and method.name == plain.name
     if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
         locked, more = np.ones(len(times), bool), np.zeros(len(times))
         behind = reverse(run, run.walk(times), plain)
     else:
-        locked, more, behind = run.once(("both ways", len(times), plain), lambda: _both_ways(run, times, plain))
+        known = walked if same else None
+        key = "both ways", len(times), plain
+        locked, more, behind = run.once(key, lambda: _both_ways(run, times, plain, known))
     first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
     critical: dict[str, float] = {}
     if first is not None:
         worst, most = time[[first]], method.margin_up_to
-        key = "critical", float(worst[0]), plain, most
-        critical = run.once(key, lambda: _critical(run, worst, plain, most))
+        there = "critical", float(worst[0]), plain, most
+        critical = run.once(there, lambda: _critical(run, worst, plain, most))
     return Locking(times, locked, first, critical, more, behind)
 
 
@@ -323,9 +330,11 @@ def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dic
     return {joint: float(multiple[0]) for joint, multiple in at.items()}
 
 
-def _both_ways(run: Run, times: Array, method: FrictionMethod) -> tuple[NDArray[np.bool_], Array, Reverse]:
-    """Where it locks, other solutions, and the way back."""
-    back = run.solve(times, method=method)
+def _both_ways(
+    run: Run, times: Array, method: FrictionMethod, walked: Backward | None
+) -> tuple[NDArray[np.bool_], Array, Reverse]:
+    """Where it locks, other solutions, and the way back. walked: the walk through these times, if it is there."""
+    back = walked or run.solve(times, method=method)
     return locks(back), others(back), reverse(run, back.walk, method)
 
 

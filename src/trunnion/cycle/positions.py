@@ -14,6 +14,7 @@ from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
+from trunnion.cycle.near_locking import LOOKED
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers, write
 from trunnion.errors import Finding, MechanismError, Status
@@ -47,7 +48,8 @@ def check_steps(steps: int) -> None:
 class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
-    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact.
+    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
+    one walk that they all came of, where it was one and pins lie in no seats.
     """
 
     arrays: Arrays
@@ -58,6 +60,7 @@ class Positions:
     means: Means
     ideal: Means | None
     losses: list[contact_loss.Loss]
+    walked: Backward | None = None
 
 
 def positions(
@@ -85,12 +88,14 @@ def positions(
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
     done = compiles(engine, run, steps) and _fill_compiled(arrays, ideal, run, time, method, causes, engine == "auto")
+    back = None
     for low in range(0, 0 if done else steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
         if run.erring:
-            _fill_as_built(arrays, ideal, run, time, window, method, causes)
+            back = _fill_as_built(arrays, ideal, run, time, window, method, causes)
         else:
-            fill_chunk(arrays, run.solve(time[window], method=method), time[window], window, causes)
+            back = run.solve(time[window], method=method)
+            fill_chunk(arrays, back, time[window], window, causes)
         if progress:
             progress(window.stop)
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
@@ -100,7 +105,8 @@ def positions(
 
     means = _means(run, arrays, quick) if averaged else still(arrays)
     meant = (_means(run, ideal, quick, ideal=True) if averaged else still(ideal)) if run.erring else None
-    return Positions(arrays, labels, time, method, causes, means, meant, losses)
+    walked = back if steps <= LOOKED and not run.seats else None
+    return Positions(arrays, labels, time, method, causes, means, meant, losses, walked)
 
 
 def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
@@ -162,8 +168,8 @@ def _fill_as_built(
     window: slice,
     method: FrictionMethod,
     causes: diagnosis.Causes,
-) -> None:
-    """One chunk of a mechanism with errors beside the ideal one."""
+) -> Backward:
+    """One chunk of a mechanism with errors beside the ideal one; the walk it came of."""
     part, quick = time[window], replace(method, margin_up_to=0.0)
     labels = fill_of(run.system).labels(run.system)
     seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
@@ -178,15 +184,18 @@ def _fill_as_built(
         array[..., window] = scratch[name]
     if run.seats:
         seated = settle(run, seen, method, meant)
+        back = seated.back
         causes.note_seats(seated.offsets, seated.sticks, window.start)
-        fill_chunk(arrays, seated.back, part, window, causes)
+        fill_chunk(arrays, back, part, window, causes)
         fill_seats(arrays, run.seats, seated, window)
         status = arrays["status"][window]
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     else:
-        fill_chunk(arrays, run.solve(part, method=method), part, window, causes)
+        back = run.solve(part, method=method)
+        fill_chunk(arrays, back, part, window, causes)
     fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
+    return back
 
 
 def _fill_compiled(
@@ -200,7 +209,7 @@ def _fill_compiled(
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
     try:
-        own = CycleKernel(run, run.values, arrays, write, method)
+        own = CycleKernel(run, run.values, time, arrays, write, method)
     except MechanismError:
         if or_not:
             return False
@@ -210,7 +219,7 @@ def _fill_compiled(
         quick, system = replace(method, margin_up_to=0.0), run.system
         labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
         meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
-        other = CycleKernel(run, run.ideal_values, meant, write, quick)
+        other = CycleKernel(run, run.ideal_values, time, meant, write, quick)
         _fill_rest(meant, other.fill(meant, run.ideal_values, time)[1], run.ideal, time, quick)
         ideal |= {name: meant[name] for name in ideal}
         fill_errors(arrays, meant, link_numbers(system), slice(None))

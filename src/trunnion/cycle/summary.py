@@ -27,7 +27,6 @@ from trunnion.results.figure import Figure
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
-from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated
 from trunnion.solve.system import Dial, System, rubbing
 
@@ -104,7 +103,7 @@ def result_of(run: Run, found_positions: Positions) -> Result:
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
     """What is to be known of a mechanism at some positions of its cycle, and how near to locking it is."""
-    near = _near_locking(run, at.arrays, at.time, at.method)
+    near = _near_locking(run, at)
     return [
         *run.once("notes", lambda: model_notes(run.system.mechanism, run.system)),
         *run.chosen.findings,
@@ -328,14 +327,12 @@ def _rounding(arrays: Arrays, variable: str) -> float:
     return 1e-11 * max(_peak(arrays[variable]), _peak(arrays["drive_effort"]), 1e-300)
 
 
-def _near_locking(
-    run: Run, arrays: Arrays, time: NDArray[np.float64], method: FrictionMethod
-) -> near_locking.Locking | None:
+def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
     """What is to know of locking, if there is friction and a driver."""
     if not rubbing(run.system) or not run.system.mechanism.drivers:
         return None
     with np.errstate(all="ignore"):
-        return near_locking.look(run, time, arrays["locking_margin"], method)
+        return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked)
 
 
 def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> dict[str, Any]:

@@ -144,6 +144,7 @@ _PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as pint
 _M, _RAD, _S = {"meter": Fraction(1)}, {"radian": Fraction(1)}, {"second": Fraction(1)}
 _NEWTON = {"gram": Fraction(1), "meter": Fraction(1), "second": Fraction(-2)}
 _PASCAL = {"gram": Fraction(1), "meter": Fraction(-1), "second": Fraction(-2)}
+_VOLT = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
 # of the units in most models: name and root as pint has them, factor to SI; a test holds them against pint
 _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "mm": ("millimeter", Fraction(1, 1000), _M),
@@ -152,6 +153,7 @@ _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "um": ("micrometer", Fraction(1, 10**6), _M),
     "µm": ("micrometer", Fraction(1, 10**6), _M),
     "deg": ("degree", _PI / 180, _RAD),
+    "turn": ("turn", 2 * _PI, _RAD),
     "rad": ("radian", Fraction(1), _RAD),
     "rpm": ("revolutions_per_minute", _PI / 30, {"radian": Fraction(1), "second": Fraction(-1)}),
     "kg": ("kilogram", Fraction(1), {"gram": Fraction(1)}),
@@ -159,29 +161,38 @@ _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "s": ("second", Fraction(1), _S),
     "ms": ("millisecond", Fraction(1, 1000), _S),
     "N": ("newton", Fraction(1), _NEWTON),
+    "mN": ("millinewton", Fraction(1, 1000), _NEWTON),
     "kN": ("kilonewton", Fraction(1000), _NEWTON),
     "MPa": ("megapascal", Fraction(10**6), _PASCAL),
     "bar": ("bar", Fraction(10**5), _PASCAL),
+    # of the settings of a test rig
+    "V": ("volt", Fraction(1), _VOLT),
+    "mV": ("millivolt", Fraction(1, 1000), _VOLT),
+    "Hz": ("hertz", Fraction(1), {"second": Fraction(-1)}),
+    "kHz": ("kilohertz", Fraction(1000), {"second": Fraction(-1)}),
+    "%": ("percent", Fraction(1, 100), {}),
 }
-_FACTOR = re.compile(r"([^\W\d]+)(?:\^(-?[1-9]))?")
+_FACTOR = re.compile(r"([^\W\d]+|%)(?:\^(-?[1-9]))?")
 _PRODUCT_OF_COMMON = re.compile(rf"(?:1 ?/ ?)?{_FACTOR.pattern}(?: ?[ */] ?{_FACTOR.pattern})*")
 
 
 def _common(spaced: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]] | None:
     """`root` of a product of the units in `_COMMON`, each once, without pint; None of any other."""
     spaced = spaced[1:-1] if re.fullmatch(r"\([^()]*\)", spaced) else spaced
+    if found := re.fullmatch(r"([^()]*/) ?\(([^()/^]*)\)", spaced):  # mV/(N m) is mV/N/m
+        spaced = found[1] + re.sub(r" ?[ *] ?", "/", found[2].strip())
     if not _PRODUCT_OF_COMMON.fullmatch(spaced):
         return None
     total, exponents, names = Fraction(1), dict[str, Fraction](), list[str]()
-    for found in _FACTOR.finditer(spaced):
-        if found[1] not in _COMMON:
+    for one in _FACTOR.finditer(spaced):
+        if one[1] not in _COMMON:
             return None
-        name, factor, base = _COMMON[found[1]]
-        power = int(found[2] or 1) * (-1 if spaced[: found.start()].rstrip().endswith("/") else 1)
+        name, factor, base = _COMMON[one[1]]
+        power = int(one[2] or 1) * (-1 if spaced[: one.start()].rstrip().endswith("/") else 1)
         total *= factor**power
         names.append(name)
-        for one, exponent in base.items():
-            exponents[one] = exponents.get(one, Fraction(0)) + power * exponent
+        for symbol, exponent in base.items():
+            exponents[symbol] = exponents.get(symbol, Fraction(0)) + power * exponent
     if len(set(names)) < len(names):
         return None
     return total, {one: exponent for one, exponent in exponents.items() if exponent}, tuple(names)

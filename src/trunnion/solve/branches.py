@@ -139,12 +139,16 @@ def _kept(frames: tuple[Any, ...], lanes: Number) -> tuple[Any, ...]:
 
 
 class Decision(NamedTuple):
-    """Assembly of a module, how many there were, whether a name or hint decides, and what there is to say."""
+    """Assembly of a module, how many there were, whether a name or hint decides, and what there is to say.
+
+    pose: of the module in it at all times, where it was needed to decide.
+    """
 
     assembly: Any
     ways: int
     decided: bool
     findings: Sequence[Finding] = ()
+    pose: Any = None
 
 
 @dataclass(frozen=True)
@@ -178,7 +182,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
                 decision = _track(walk, number, group, drive, times, cycle.periodic)
             else:
                 decision = _branch(walk, number, times)
-            assembly, count, decided, said = decision
+            assembly, count, decided, said, pose = decision
             findings += said
             if count > 1 and not decided:
                 findings.append(_unstated(walk, module, count))
@@ -189,9 +193,12 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
                 findings.append(_never(system, module))
             if isinstance(assembly, Track) and len(assembly.again):
                 findings.append(_anew(module, system.dial(values, times), assembly.again))
-            pose = pose_of(walk, number, assembly, times)
+            closed = module.rank > 1 and group.BRANCHES
+            if not closed and number == len(system.plan.modules) - 1:  # nothing stands on it
+                continue
+            pose = pose_of(walk, number, assembly, times) if pose is None else pose
             walk.stand(number, pose)  # an assembly is a matter of places
-            if module.rank > 1 and group.BRANCHES:
+            if closed:
                 meeting = change_points.find(walk, number, assembly, times, pose)
                 findings += [change_points.finding(system, values, module, meeting)] if meeting else []
     return Chosen(tuple(chosen), tuple(counts), tuple(findings))
@@ -259,23 +266,24 @@ def _branch(walk: Forward, number: int, times: Array) -> Decision:
     if len(branches) == 1 or not hints(walk, module):
         named = named_way(walk.system, module, len(branches))
         return Decision(branches[named or 0], len(branches), named is not None)
-    placed, decided = _placed(walk, number, times)
+    poses = [pose_of(walk, number, branch, times) for branch in branches]
+    placed, decided = _placed(walk, number, times, poses)
     named = named_way(walk.system, module, len(branches))
+    way = branches.index(placed)
     if named is None:
-        return Decision(placed, len(branches), decided)
-    told = told_twice(walk, module, named, branches.index(placed) if decided else None)
-    return Decision(branches[named], len(branches), True, told)
+        return Decision(placed, len(branches), decided, pose=poses[way])
+    told = told_twice(walk, module, named, way if decided else None)
+    return Decision(branches[named], len(branches), True, told, poses[named])
 
 
-def _placed(walk: Forward, number: int, times: Array) -> tuple[int, bool]:
-    """+1 or −1 by the hints, and whether they decide it.
+def _placed(walk: Forward, number: int, times: Array, poses: Sequence[Any]) -> tuple[int, bool]:
+    """+1 or −1 by the hints, and whether they decide it. poses: in either assembly at all times.
 
     It is the nearer at the start; where it does not close there, the side the hint lies on; where both assemblies
     meet there, in a dead centre, the nearer at the first position at which they do not.
     """
     module = walk.system.plan.modules[number]
     branches = walk.system.groups[number].BRANCHES
-    poses = [pose_of(walk, number, branch, times) for branch in branches]
     distances = [distance(walk, module, pose.frames, first, first) for pose in poses]
     if not np.all(np.isfinite(distances)) and module.kind == "RRR":
         return _side(walk, number), True

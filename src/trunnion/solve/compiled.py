@@ -88,8 +88,11 @@ class CompiledKernel(ABC):
         """Load the engine; MechanismError if it is not installed."""
 
     @abstractmethod
-    def check(self, values: Values) -> None:
-        """MechanismError if this mechanism cannot be compiled, found without compiling it."""
+    def check(self, values: Values, time: Array | None = None) -> None:
+        """MechanismError if this mechanism cannot be compiled, found without compiling it.
+
+        time: one that it will be asked for, s, by whose shape what is known already is found.
+        """
 
     @abstractmethod
     def fill(self, values: Values, time: Array, found: Lanes) -> None:

@@ -55,9 +55,9 @@ class VectorKernel(CompiledKernel):
         self._recording = Lock()
         self._graphs: dict[tuple[Any, ...], tuple[Graph, list[int]]] = {}
 
-    def check(self, values: Values) -> None:
+    def check(self, values: Values, time: Array | None = None) -> None:
         """See `CompiledKernel.check`."""
-        inputs = _inputs(values, np.zeros(1))
+        inputs = _inputs(values, np.zeros(1) if time is None else time)
         if self._known(inputs) is None:
             self._graphs[inputs.structure] = self._recorded(inputs)
 

@@ -18,6 +18,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.angle_steps import stated_as, unstated_step
 from trunnion.rig.reading.columns import DataTable
+from trunnion.rig.reading.local_polynomials import by_local_polynomials
 from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.mapping import AngleSource
 from trunnion.rig.reading.pulses import by_index, index_times, pulses_of
@@ -310,15 +311,13 @@ def smoothed(values: Array, off: float, per_turn: float, over: Array | None = No
     found, spans = values.copy(), np.zeros(values.size)
     if off <= 0:
         return found, spans
-    from scipy.signal import savgol_filter  # brings scipy.stats: longer to import than all the rest
-
     over = np.arange(values.size, dtype=np.float64) if over is None else over
     trend = values[0] + (values[-1] - values[0]) * (over - over[0]) / (over[-1] - over[0])
     for span in SPANS:
         width = 2 * int(span * per_turn / 2) + 1
         if width < FEWEST or width > values.size:
             continue
-        fitted = trend + savgol_filter(values - trend, width, ORDER)
+        fitted = trend + by_local_polynomials(values - trend, width, ORDER)
         left = np.abs(values - fitted)
         even = np.sqrt(np.maximum(uniform_filter1d(left**2, width, mode="mirror"), 0.0)) <= EVEN * off
         good = minimum_filter1d(((left <= BOUND * off) & even).astype(np.int8), width, mode="mirror") > 0

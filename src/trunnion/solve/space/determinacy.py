@@ -26,7 +26,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Given, backward
 from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
 from trunnion.solve.branches import Chosen
-from trunnion.solve.forward import forward
+from trunnion.solve.forward import forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates
 
@@ -62,7 +62,9 @@ class _Module:
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determinacy:
     """What the rank says of every module that closes a loop and could be assembled."""
-    walk = forward(system, values, chosen.assembly, cycle.times(LOOKED) if cycle.duration else np.zeros(1))
+    # places alone decide the rank, but a link that may spin is looked at as it moves
+    walked = forward if system.plan.passive else posed
+    walk = walked(system, values, chosen.assembly, cycle.times(LOOKED) if cycle.duration else np.zeros(1))
     found = []
     for number, module in enumerate(system.plan.modules):
         group = cast(SpatialGroup, system.groups[number])
@@ -82,8 +84,11 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         ranks = np.linalg.matrix_rank(table[lanes], rtol=RANK) if table.size else np.zeros(len(lanes))
         rank, best = int(np.max(ranks)), int(lanes[np.argmax(ranks)])
         rows, columns = table.shape[1:]
-        one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
-        joints, links = _strained(one, table[best]), _loose(one, table[best])
+        joints: tuple[str, ...] = ()
+        links: tuple[str, ...] = ()
+        if rank < max(rows, columns):
+            one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
+            joints, links = _strained(one, table[best]), _loose(one, table[best])
         found.append(ModuleDeterminacy(number, rows - rank, columns - rank, joints, links))
     return Determinacy(system, tuple(found), *_spins(walk))
 

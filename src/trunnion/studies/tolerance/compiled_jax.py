@@ -38,7 +38,7 @@ class JaxKernel(CompiledKernel):
         """Where it runs: cpu, gpu or tpu."""
         return str(self._jax.default_backend())
 
-    def check(self, values: Values) -> None:
+    def check(self, values: Values, time: Array | None = None) -> None:
         """See `CompiledKernel.check`."""
         with self._wide():
             self._jax.eval_shape(self.pure(dict(values)), {}, np.zeros(1))

@@ -7,19 +7,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from trunnion.errors import Finding, MechanismError
-from trunnion.model.names import nearest
 from trunnion.views.sweep import curves as sweep_curves
 from trunnion.views.sweep import map as sweep_map
 from trunnion.views.sweep.panels import board, field
+from trunnion.views.sweep.scales import KINDS, check_kind
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 __all__ = ["KINDS", "check_kind", "figure"]
-
-KINDS = ("curves", "map")
 
 
 def figure(
@@ -42,9 +39,3 @@ def figure(
     shown = board(result, told, f"{told.title} over {over}", upward)
     (sweep_map.draw if mapped else sweep_curves.draw)(shown, told)
     return shown.sheet
-
-
-def check_kind(kind: str) -> None:
-    """MechanismError for a kind of figure that there is not."""
-    if kind not in KINDS:
-        raise MechanismError(Finding(f"there is no kind of figure '{kind}'", "--kind", nearest(kind, KINDS)))

@@ -24,9 +24,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Arrangement", "Scale", "arrange", "arranged", "cause", "check_axes", "check_measure", "grid", "meaning", "scales",
-    "statuses", "thinned", "written",
+    "KINDS", "Arrangement", "Scale", "arrange", "arranged", "cause", "check_axes", "check_kind", "check_measure",
+    "grid", "meaning", "scales", "statuses", "thinned", "written",
 ]  # fmt: skip
+
+KINDS = ("curves", "map")  # of figures
 
 CAUSES = {
     Status.NOT_CONVERGED: "not converged",
@@ -122,6 +124,12 @@ def arrange(result: xr.Dataset, x: str = "", family: str = "") -> Arrangement:
         tuple(one for one in rest if one.varies),
         tuple(one for one in rest if not one.varies),
     )
+
+
+def check_kind(kind: str) -> None:
+    """MechanismError for a kind of figure that there is not."""
+    if kind not in KINDS:
+        raise MechanismError(Finding(f"there is no kind of figure '{kind}'", "--kind", nearest(kind, KINDS)))
 
 
 def check_axes(counts: Mapping[str, int], x: str = "", family: str = "") -> tuple[str, str]:

@@ -13,13 +13,22 @@ from trunnion.statistics import intervals
 from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, dress, legend
 from trunnion.views.common.lettering import plain
-from trunnion.views.tolerance.readings import OUTER, MeasureReading, failures, share, share_interval, share_parts
+from trunnion.views.tolerance.readings import (
+    OUTER,
+    MeasureReading,
+    failures,
+    outer,
+    rss_label,
+    share,
+    share_interval,
+    share_parts,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
 
-__all__ = ["convergence", "envelope", "histogram", "outer", "rss_label"]
+__all__ = ["convergence", "envelope", "histogram"]
 
 WITHIN, BEYOND, LIMIT = PALETTE[0], PALETTE[1], "#a1260d"
 LIMITED: dict[str, Any] = {"color": LIMIT, "linewidth": 1.3, "linestyle": (0, (1, 1.5))}
@@ -140,16 +149,6 @@ def _lines(axes: Axes, read: MeasureReading, shift: float) -> None:
             upright(end, None if k else text, color=MUTED, linewidth=1.0, linestyle=(0, (2, 1.5)))
 
 
-def outer(read: MeasureReading) -> tuple[float, float] | None:
-    """Ends of the range of 99.73 %."""
-    if not read.has("quantile_value"):
-        return None
-    known = np.asarray(read.result["quantile"].values, float)
-    row = read.row("quantile_value")
-    found = [float(row[np.argmin(np.abs(known - one))]) for one in OUTER if np.abs(known - one).min() < 1e-9]
-    return (found[0], found[1]) if len(found) == 2 else None
-
-
 def _left_out(axes: Axes, read: MeasureReading, low: float, high: float) -> None:
     """How many samples lie outside the picture."""
     counts, edges = read.row("histogram"), read.row("edge")
@@ -201,11 +200,6 @@ def envelope(parent: FigureBase, read: MeasureReading) -> None:
     axes.margins(y=0.07)
     # beside two other figures "RSS, uncorrelated" is cut off at the end of one row
     legend(axes, most=4, room=75 if read.correlated else 90)
-
-
-def rss_label(read: MeasureReading) -> str:
-    """RSS, with what it leaves out."""
-    return "RSS, uncorrelated" if read.correlated else "RSS"
 
 
 def _closed(over: Abscissa, values: Array, more: float = 0.0) -> Array:

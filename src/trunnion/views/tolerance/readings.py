@@ -28,7 +28,9 @@ __all__ = [
     "fixed",
     "limits_text",
     "methods",
+    "outer",
     "readings",
+    "rss_label",
     "share",
     "share_interval",
     "share_parts",
@@ -386,3 +388,18 @@ def methods(result: xr.Dataset) -> Sequence[str]:
     """Names of the methods that were run."""
     found: Any = attribute(result, "methods")
     return [str(one) for one in found]
+
+
+def outer(read: MeasureReading) -> tuple[float, float] | None:
+    """Ends of the range of 99.73 %."""
+    if not read.has("quantile_value"):
+        return None
+    known = np.asarray(read.result["quantile"].values, float)
+    row = read.row("quantile_value")
+    found = [float(row[np.argmin(np.abs(known - one))]) for one in OUTER if np.abs(known - one).min() < 1e-9]
+    return (found[0], found[1]) if len(found) == 2 else None
+
+
+def rss_label(read: MeasureReading) -> str:
+    """RSS, with what it leaves out."""
+    return "RSS, uncorrelated" if read.correlated else "RSS"

@@ -11,13 +11,14 @@ import numpy as np
 from trunnion.results.quantities import number, scaled
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
-from trunnion.views.tolerance.plots import outer, rss_label
 from trunnion.views.tolerance.readings import (
     ContributionRow,
     MeasureReading,
     failures,
     fixed,
+    outer,
     readings,
+    rss_label,
     share,
     share_interval,
     share_parts,

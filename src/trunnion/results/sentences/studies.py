@@ -354,7 +354,7 @@ ALLOCATION = {
         "require that yield instead, which uses distributions, means and correlations as stated",
     ),
     "yield.narrowest": Sentence(
-        ERROR, "with all tolerances at their least the yield is {share:.6g}, below {target:g}", WIDER
+        ERROR, "with all tolerances at their least the yield {of} is {share:.6g}, below {target:g}", WIDER
     ),
     "yield.not_normal": Sentence(
         NOTE,

@@ -85,9 +85,13 @@ def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None
     assert figures["course.max"].value == pytest.approx(np.max(slide[valid]))
     for name, pick in (("minimum", np.min), ("maximum", np.max)):
         assert figures[name].value == pytest.approx(pick(slide[valid]), rel=1e-5)  # valid, next to the stretch
+    found = {one.where: one for one in result.trunnion.findings if one.code == "measure.contact_lost"}
     for name in ("low", "swing", "there"):
         assert figures[name].value is None
         assert "loses contact" in figures[name].note
+        told = found[f"measures.{name}"].figures["at"]  # where, for a place or a window beside it
+        assert told.endswith("°")
+        assert told in figures[name].note
         assert np.isnan(result["measure_figure"].sel(measure=name))
     assert figures["mean"].value is not None
     assert "loses contact at " in figures["mean"].note

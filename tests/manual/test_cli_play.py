@@ -134,6 +134,16 @@ def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
     assert findings["play.no_effect"].figures["measure"] == "held"
 
 
+def test_what_a_guide_holds_is_no_matter_of_the_driver() -> None:
+    """The piston's angle: no pin turns it, and no other driver would make one do so."""
+    result = trunnion.play(trunnion.read(SLIDER), ["angle:piston"], steps=12)
+    findings = {one.code: one for one in result.trunnion.findings}
+    assert "play.no_effect" not in findings
+    figures = findings["play.held"].figures
+    assert set(figures["joints"]) | set(figures["holding"]) == set(result["joint"].values.tolist())
+    assert not findings["play.held"].remedy
+
+
 def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: Path) -> None:
     """To first order an extreme changes as the course does at its place."""
     model = tmp_path / "model.yaml"

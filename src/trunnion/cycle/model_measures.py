@@ -17,6 +17,7 @@ from trunnion.measures.positions import plan
 from trunnion.results.attributes import encoded
 from trunnion.results.dataset import Variable, described
 from trunnion.results.figure import Figure
+from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -107,13 +108,16 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
             _fill(run, measures, time, method, (values, figures))
     valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
     notes: dict[str, str] = {}
+    dial = run.system.dial(run.values, time)
     for i, measure in enumerate(measures if not np.all(valid) else ()):
         if measure.rule == "deviation":
             continue
         there = _resting_on(run, measure, values[i], time)
         lost = ~valid[there]
         if measure.rule in OF_PLACES and np.any(lost):
-            figures[i], notes[measure.name] = np.nan, "not valid: a pin loses contact at its place"
+            at = " and ".join(dial.at(int(k)) for k in there[lost])
+            figures[i], notes[measure.name] = np.nan, f"not valid: a pin loses contact at its place, {at}"
+            findings.append(finding_for("measure.contact_lost", f"measures.{measure.name}", at=at))
         elif np.any(lost):
             notes[measure.name] = f"a pin loses contact at {np.count_nonzero(lost)} of its {len(lost)} positions"
     return Watched(run, measures, values, figures, findings, valid, notes)

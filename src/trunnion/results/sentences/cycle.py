@@ -60,6 +60,11 @@ def _impact(part: str, least: float, peak: float, at: str, number: float | None,
 
 
 CYCLE: dict[str, Sentence] = {
+    "measure.contact_lost": Sentence(
+        NOTE,
+        "the measure has no figure: a pin loses contact at its place, {at}",
+        "state another place or window of the measure, by at: or over:",
+    ),
     "model.gravity": Sentence(
         NOTE,
         "gravity is not stated and taken as zero, although {links} have mass",

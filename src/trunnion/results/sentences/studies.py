@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from trunnion.errors import counted
+from trunnion.errors import agreeing, counted
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["STUDIES"]
@@ -71,6 +71,13 @@ PLAY = {
         NOTE,
         "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
         "drive the joint that is driven in the machine",
+    ),
+    "play.held": Sentence(
+        NOTE,
+        lambda joints, measure, holding: (
+            f"the play of {', '.join(joints)} has no effect on {measure}, which does not change over the cycle"
+            + (f": {', '.join(holding)} {agreeing(len(holding), 'holds', 'hold')} it" if holding else "")
+        ),
     ),
     "play.left_out": Sentence(
         WARNING, "the play of {joints} is left out ({kinds} joints)", "play is modelled in {modelled} joints"
@@ -318,13 +325,36 @@ ALLOCATION = {
         "{low:.6g} to {high:.6g}",
         "take more samples, or require a higher yield",
     ),
+    "yield.by_estimate": Sentence(
+        NOTE,
+        "accepted by its estimate, not by the lower end of the interval: fresh samples have {share:.6g}, 95 % "
+        "confidence interval {low:.6g} to {high:.6g}, required are {target:g}",
+        "to be surer take more samples, or require a higher yield",
+    ),
+    "yield.unresolved": Sentence(
+        WARNING,
+        "even with all tolerances at their least the samples have a yield of {share:.6g} (95 % confidence interval "
+        "{low:.6g} to {high:.6g}), too close to {target:g} to tell from it; the choice rests on first order and normal "
+        "deviations, which have {normal:.6g}",
+        "take more samples, widen a limit, or ask for a lower yield",
+    ),
+    "yield.alone": Sentence(
+        WARNING,
+        lambda fails, permitted, largest: (
+            f"with all tolerances that have a cost at their least {fails:.3%} of normal deviations still break this "
+            f"limit, {fails / permitted:.0%} of the {permitted:.3%} that may break any"
+        ),
+        lambda fails, permitted, largest: (
+            "widen the limit" + (f", or first narrow '{largest}', which has no cost" if largest else "")
+        ),
+    ),
     "yield.below_rss": Sentence(
         WARNING,
         "the yield of the samples is {share:.6g}; an RSS within the limits implies {target:g}",
         "require that yield instead, which uses distributions, means and correlations as stated",
     ),
     "yield.narrowest": Sentence(
-        ERROR, "with all tolerances at their least the yield is {share:.6g}, below {target:g}", WIDER
+        ERROR, "with all tolerances at their least the yield {of} is {share:.6g}, below {target:g}", WIDER
     ),
     "yield.not_normal": Sentence(
         NOTE,

@@ -8,7 +8,6 @@ they stay the same. Then the mechanism is analysed with the tolerances found: wo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -367,7 +366,7 @@ def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows
     """Whether the rows at the tolerances found take as much of their room as those they were found with."""
     if len(ahead.measure) != len(rows.measure):
         return False
-    before, after = (replace(problem, effects=one.effects).used(tolerances) for one in (rows, ahead))
+    before, after = (problem.with_effects(one.effects).used(tolerances) for one in (rows, ahead))
     still = ~rows.moving
     return bool(np.all(np.abs(after - before)[still] <= SAME) and np.all(after[rows.moving] <= 1 + SAME))
 

@@ -23,6 +23,7 @@ __all__ = ["findings_of", "summary"]
 
 TWICE = 2.0  # so many rejects as an RSS stands for are an error
 SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
+MOST = 0.5  # of the permitted failures: what one limit may use up whatever is bought
 ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 
 
@@ -67,6 +68,8 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         yield from _promised(known)
     if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
         yield from _yielded(found, known)
+    if found.asked.criterion == "yield":
+        yield from _alone(found)
     kept = [factor for factor, one in found.offers if one.found]
     if len(kept) < len(found.offers):
         points, least = len(found.offers), min(kept, default=None)
@@ -101,10 +104,31 @@ def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     """That the samples have less than the yield asked for: an error if it is not within their interval."""
     target, any_other = found.asked.target, any(one.where == "yield" for one in found.answer.findings)
     share, low, high = (float(known[f"yield_all{end}"]) for end in ("", "_low", "_high"))
-    if high < target and not any_other:
+    checked = found.answer.checked
+    if any_other:
+        return
+    if high < target:
         yield finding_for("yield.short", "yield", share=share, target=target)
-    elif share < target <= high:
+    elif share < target:
         yield finding_for("yield.uncertain", "yield", share=share, target=target, low=low, high=high)
+    elif checked and checked.low < target:
+        yield finding_for("yield.by_estimate", "yield", **checked._asdict(), target=target)
+
+
+def _alone(found: Allocated) -> Iterator[Finding]:
+    """Measures that with all that is bought at its narrowest still use up most of the permitted failures."""
+    permitted, effects = 1 - found.asked.target, found.rows.effects
+    if any(one.code == "yield.not_normal" for one in found.answer.findings):
+        return
+    for label, fails in found.answer.alone.items():
+        if not fails > MOST * permitted:
+            continue
+        rows = np.flatnonzero(np.array(effects.labels) == label)
+        spread = np.max(np.abs(effects.sigma()[rows] * found.answer.tolerances), axis=0)
+        fixed = [one.fixed for one in found.answer.problem.contributions]
+        largest = int(np.argmax(np.where(fixed, spread, 0.0)))
+        name = found.answer.problem.contributions[largest].name if np.any(spread[fixed] > 0) else None
+        yield finding_for("yield.alone", label, fails=fails, permitted=permitted, largest=name)
 
 
 def _promised(known: xr.Dataset) -> Iterator[Finding]:

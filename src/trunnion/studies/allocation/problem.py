@@ -19,6 +19,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
 
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.results.quantities import drawn_in, signed
@@ -45,6 +46,7 @@ CRITERIA: dict[Criterion, str] = {
     "yield": "the stated share of mechanisms keeps every limit",
 }
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
+FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
 PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
 
 
@@ -141,7 +143,8 @@ class RowEffects:
 class AllocationProblem:
     """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for.
 
-    ratios: what z is multiplied by for each row, (row,); all 1 if None.
+    ratios: what z is multiplied by for each row, (row,); all 1 if None. caps: the largest margin that each row can have
+    beside all others, (row,), infinite or None where there is no end to it: see `margins`.
     """
 
     contributions: tuple[Contribution, ...]
@@ -149,10 +152,22 @@ class AllocationProblem:
     criterion: Criterion = "worst-case"
     z: float = 3.0
     ratios: Array | None = None
+    caps: Array | None = None
 
     def margins(self) -> Array:
-        """Standard deviations of room that `yield` asks of each row, (row,)."""
-        return self.z * (np.ones(len(self.effects.worst)) if self.ratios is None else self.ratios)
+        """Standard deviations of room that `yield` asks of each row, (row,).
+
+        What a row fails at its cap nobody can mend, so it is permitted beside what z and its ratio permit:
+        Q(margin) = Q(z · ratio) + Q(cap), Q the normal tail. However large z, there are half widths with such margins.
+        """
+        asked = self.z * (np.ones(len(self.effects.worst)) if self.ratios is None else self.ratios)
+        return asked if self.caps is None else beside(asked, self.caps)
+
+    def with_effects(self, effects: RowEffects) -> AllocationProblem:
+        """The same with other effects of its rows, or of the first ones of them alone."""
+        count = len(effects.worst)
+        ratios, caps = (None if one is None else one[:count] for one in (self.ratios, self.caps))
+        return replace(self, effects=effects, ratios=ratios, caps=caps)
 
     def check(self) -> None:
         """Raise `MechanismError` with all that makes it no problem."""
@@ -249,6 +264,7 @@ class Answer:
     saved: float = np.nan
     floor: float = np.nan
     excess: float = np.nan
+    alone: dict[str, float] = field(default_factory=dict)
 
     @property
     def found(self) -> bool:
@@ -338,6 +354,13 @@ def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) ->
     return finding_for(
         "allocation.impossible", effects.label(row), phrases=phrases, limit=limit, takes=over, largest=largest.name
     )
+
+
+def beside(asked: Array, caps: Array) -> Array:
+    """Margins that fail as often as the margins asked for and the caps do together; those asked for without a cap."""
+    near = caps < FAR
+    both = ndtr(-np.clip(asked, 0.0, FAR)) + ndtr(-np.where(near, caps, FAR))
+    return np.where(near, np.minimum(np.maximum(-ndtri(np.minimum(both, 0.5)), 0.0), asked), asked)
 
 
 def _norm(parts: Array, correlation: Array | None) -> Array:

@@ -20,9 +20,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.studies.allocation.normal import by_measure
 from trunnion.studies.allocation.problem import AllocationProblem, Answer
 
-__all__ = ["measures_of", "split"]
+__all__ = ["split"]
 
 Array = NDArray[np.float64]
 ROUNDS = 12
@@ -36,12 +37,6 @@ SMALL = 1e-3  # standard deviations: a step that ends it
 HALVINGS = 5  # of a step that costs more
 
 
-def measures_of(problem: AllocationProblem) -> list[NDArray[np.intp]]:
-    """Rows that share one margin: those of one label; all, where rows have no labels."""
-    labels = np.array(problem.effects.labels or [""] * len(problem.effects.worst))
-    return [np.flatnonzero(labels == name) for name in dict.fromkeys(labels.tolist())]
-
-
 def split(
     start: Answer, expected: Callable[[AllocationProblem], Answer], share: Callable[[AllocationProblem, Array], float]
 ) -> Answer:
@@ -49,7 +44,7 @@ def split(
 
     expected: the cheapest answer of a problem with its `ratios` that meets the yield; share: the yield of half widths.
     """
-    groups = measures_of(start.problem)
+    groups = list(by_measure(start.problem).values())
     if len(groups) < 2 or not start.found or not np.all(np.isfinite(start.price)):
         return start
     best = start
@@ -97,7 +92,8 @@ def _step(
     if np.sum(concerned) < 2 or not np.any(gained) or not np.any(asked):
         return None
     used = np.array([float(np.max(answer.used[own])) for own in groups])
-    margins = np.array([float(problem.margins()[own[0]]) for own in groups])
+    asks = problem.z * (np.ones(len(problem.effects.worst)) if problem.ratios is None else problem.ratios)
+    margins = np.array([float(asks[own[int(np.argmax(answer.used[own]))]]) for own in groups])
     margins = np.where(concerned, margins / np.clip(used, 1 / FREE, 1.0), margins)  # what limits nothing has more
     tiny = np.finfo(float).tiny
     part = np.log(np.maximum(asked / np.sum(asked), tiny)) - np.log(np.maximum(gained / np.sum(gained), tiny))

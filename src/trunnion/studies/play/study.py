@@ -382,13 +382,25 @@ def _places(run: Run, effect: Effect) -> Iterator[Finding]:
 
 
 def _idle(run: Run, effect: Effect) -> Iterator[Finding]:
-    """Joints whose play does nothing to a measure: likely another joint is driven in the machine."""
-    for measure, rows in zip(effect.measures, effect.worst_case, strict=True):
+    """Joints whose play does nothing to a measure.
+
+    Of a measure that moves, likely another joint is driven in the machine; of one that stays as it is over the cycle
+    the other joints hold it, whatever is driven.
+    """
+    for measure, rows, course in zip(effect.measures, effect.worst_case, effect.value, strict=True):
         largest = [float(np.nanmax(row, initial=0.0)) for row in rows]
         idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= IDLE * max(largest)]
-        if idle:
-            drivers = list(run.system.mechanism.drivers)
+        if not idle:
+            continue
+        known = course[np.isfinite(course)]
+        if len(known) > 1 and np.ptp(known) <= IDLE * max(float(np.max(np.abs(known))), 1.0):
+            holding = [joint for joint in effect.plays if joint not in idle]
             yield finding_for(
-                "play.no_effect", f"measures.{measure.name}", joints=idle, measure=measure.name, drivers=drivers,
-                count=len(drivers),
-            )  # fmt: skip
+                "play.held", f"measures.{measure.name}", joints=idle, measure=measure.name, holding=holding
+            )
+            continue
+        drivers = list(run.system.mechanism.drivers)
+        yield finding_for(
+            "play.no_effect", f"measures.{measure.name}", joints=idle, measure=measure.name, drivers=drivers,
+            count=len(drivers),
+        )  # fmt: skip

@@ -169,7 +169,7 @@ def test_header_of_any_length(columns: Columns, tmp_path: Path, encoding: str) -
     wide = {key: one[:2500] for key, one in columns.items()}
     wide = {**{f"Temperatur des Gehäuses, Stelle {k}": np.zeros(2500) for k in range(2500)}, **wide}
     wide["Übertemperatur"] = np.ones(2500)
-    text = pd.DataFrame(wide).to_csv(index=False, sep=";", decimal=",")
+    text = text_of(wide, ";", ",")
     assert len(text.split("\n", 1)[0]) > 1 << 16
     (tmp_path / "run.csv").write_bytes(text.encode(encoding))
     found = read_table(tmp_path / "run.csv", ["t", "T1", "Übertemperatur"]).columns

@@ -29,13 +29,13 @@ def times(a: Number, b: Number) -> Number:
 
 def plus(a: Number, b: Number) -> Number:
     """a + b."""
-    if is_zero(a):
+    if isinstance(a, float) and a == 0.0:  # `is_zero` written out: a call costs as much as a sum of few numbers
         return b
-    return a if is_zero(b) else a + b
+    return a if isinstance(b, float) and b == 0.0 else a + b
 
 
 def less(a: Number, b: Number) -> Number:
     """a − b."""
-    if is_zero(b):
+    if isinstance(b, float) and b == 0.0:
         return a
-    return -b if is_zero(a) else a - b
+    return -b if isinstance(a, float) and a == 0.0 else a - b

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded, text_of

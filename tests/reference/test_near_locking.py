@@ -87,7 +87,9 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
         for k, position in enumerate(at):
             assert (status[k] == Status.LOCKED).tolist() == [False, True], (joint, position, multiple[position])
             checked += 2
-        if len(at) and checked == 2 * len(at):  # what was solved together is what the analysis of a model by itself says
+        if len(at) and checked == 2 * len(
+            at
+        ):  # what was solved together is what the analysis of a model by itself says
             for factor in range(2):
                 whole["joints"][joint]["friction"] = float(stated[0, factor])
                 alone = trunnion.analyse(Mechanism(**whole), steps)["status"].values

@@ -7,7 +7,10 @@ BIN := $(VENV)/bin
 OUT ?= out
 EXAMPLE ?= examples/durango-fourbar.yaml
 
-.PHONY: demo test test-all bench docs clean
+.PHONY: demo test test-all bench docs clean types pages
+
+# What is imported is compiled once, not by each of the hundreds of processes that tests start.
+unexport PYTHONDONTWRITEBYTECODE
 
 # The main job on a real example: a table on the screen, and report, CSV and figures in $(OUT).
 demo: $(VENV)/.base
@@ -16,14 +19,21 @@ demo: $(VENV)/.base
 	$(BIN)/trunnion plot $(EXAMPLE) --out $(OUT)
 	@echo "open $(OUT)/four-bar.html in a browser"
 
-# Lint, types, layer rule, tests, the text and links of the documentation: some minutes.
+# Lint, types, layer rule, the text and links of the documentation, tests: some minutes.
 test: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(MAKE) --no-print-directory --jobs=2 types pages
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+
+types: $(VENV)/.dev
+	$(BIN)/mypy
+
+# Beside the types: layers, the text of the documentation, and finding the tests, which compiles them for both processes.
+pages: $(VENV)/.dev
+	$(BIN)/lint-imports
 	NO_MKDOCS_2_WARNING=1 TRUNNION_DOCS=text $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
+	@$(BIN)/python -m pytest --collect-only -qq > $(VENV)/tests-found 2>&1 || { cat $(VENV)/tests-found; exit 1; }
 
 # What `make test` leaves out: every example, long counts, further oracles, every page of the documentation.
 test-all: $(VENV)/.dev

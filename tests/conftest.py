@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections import defaultdict
+from collections.abc import Callable
+from functools import cache, lru_cache
 from typing import Any
 
 import pytest
@@ -19,6 +22,10 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Modules and cases of all tests live to the end: looking through them for what is left over, again and again, took a
+# quarter of the time of finding the tests and a twentieth of running them.
+gc.set_threshold(50_000, 20, 50)
+
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(
     "trunnion",
@@ -29,6 +36,29 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 settings.load_profile("trunnion")
+
+
+def pytest_collection_finish() -> None:
+    """What was found is no longer looked through for what is left over, and what many tests ask for is made once."""
+    gc.collect()
+    gc.freeze()
+    _keep_what_is_asked_for_again()
+
+
+def _keep_what_is_asked_for_again() -> None:
+    """The nodes of more model files than a verb reads, and the verbs, which Typer makes anew for every call of them."""
+    import typer.main as maker
+
+    from trunnion.model import file, rewrite
+
+    file.composed = rewrite.composed = lru_cache(maxsize=64)(file.composed.__wrapped__)
+    made: Callable[[Any], Any] = maker.get_command
+
+    @cache
+    def kept(app: Any, verbs: int) -> Any:
+        return made(app)
+
+    maker.get_command = lambda app: kept(app, len(app.registered_commands))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -161,7 +161,7 @@ def started(data: Data, home: dict[str, Frame]) -> Drawn:
     ranges = {name: driver["range"] for name, driver in data["drivers"].items()}
     for share in np.linspace(0.5, 0.0, 11):
         drive = {name: Drive(low + share * (high - low)) for name, (low, high) in ranges.items()}
-        frames = {link: motion.frame for link, motion in linkage.move(frames, drive).items()}
+        frames = linkage.placed_by(frames, drive)
     hints: Data = {}
     for link, frame in frames.items():
         for name, at in data["links"][link]["points"].items():

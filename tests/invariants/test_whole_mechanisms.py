@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import trunnion
-from mechanisms import MODELS, Data, analyse, build, law_named, model, reverse_links, transformed
+from brief import brief
+from mechanisms import MODELS, Data, build, law_named, model, reverse_links, transformed
 from trunnion import FrictionMethod, Mechanism, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.solve.run import prepare
@@ -39,7 +40,7 @@ def unchanged(name: str) -> Any:
 @pytest.mark.parametrize("name", MODELS)
 def test_power_balance(name: str, friction: float | None) -> None:
     """drive + loads + inertia − friction = 0 to 1e-12 of the peak drive power, and friction never gives power."""
-    result = analyse(MODELS[name](), 90, friction=friction)
+    result = brief(build(MODELS[name](), friction=friction), 90)
     peak = float(np.abs(result["drive_power"]).max())
     assert np.all(result["status"] <= Status.ZERO_SLIP)
     assert np.abs(result["power_residual"]).max() < 1e-12 * peak
@@ -94,7 +95,7 @@ def test_change_of_frame(name: str, shift: tuple[float, float]) -> None:
     """A turned and shifted drawing is the same machine; 1e4 m away four digits fewer are left of the position."""
     turn = 0.83
     data = model(MODELS[name]())
-    plain, other = unchanged(name), trunnion.analyse(Mechanism(**transformed(data, turn, shift)), STEPS)
+    plain, other = unchanged(name), brief(Mechanism(**transformed(data, turn, shift)), STEPS)
     tolerance = 1e-10 * max(1.0, np.hypot(*shift))
     c, s = np.cos(turn), np.sin(turn)
     np.testing.assert_array_equal(other["status"], plain["status"])
@@ -112,7 +113,7 @@ def test_change_of_frame(name: str, shift: tuple[float, float]) -> None:
 def test_mirror(name: str) -> None:
     """Mirrored in x: y components, angles and moments change sign, powers do not."""
     data = model(MODELS[name]())
-    plain, other = unchanged(name), trunnion.analyse(Mechanism(**transformed(data, mirror=True)), STEPS)
+    plain, other = unchanged(name), brief(Mechanism(**transformed(data, mirror=True)), STEPS)
     np.testing.assert_array_equal(other["status"], plain["status"])
     flip = np.array([1.0, -1.0])[:, None]
     for variable in VECTORS:
@@ -202,7 +203,7 @@ def test_order_of_links_in_pins(name: str) -> None:
         name for name, joint in data["joints"].items() if joint["type"] == "revolute" and name not in data["drivers"]
     ]
     reverse_links(other, flipped)
-    plain, turned = unchanged(name), trunnion.analyse(Mechanism(**other), STEPS)
+    plain, turned = unchanged(name), brief(Mechanism(**other), STEPS)
     np.testing.assert_array_equal(turned["status"], plain["status"])
     for variable in ("point_position", "point_acceleration", "drive_effort", "drive_power", "friction_power"):
         same(turned[variable], plain[variable], variable)
@@ -219,7 +220,7 @@ def test_order_of_links_in_ideal_joints(name: str) -> None:
     other = copy.deepcopy(data)
     flipped = [joint for joint in data["joints"] if joint not in data["drivers"]]
     reverse_links(other, flipped)
-    plain, turned = (trunnion.analyse(Mechanism(**d), STEPS) for d in (data, other))
+    plain, turned = (brief(Mechanism(**d), STEPS) for d in (data, other))
     sign = np.array([-1.0 if joint in flipped else 1.0 for joint in plain["joint"].values])
     same(turned["reaction_force"], plain["reaction_force"].values * sign[:, None, None], "reaction_force")
     same(turned["drive_effort"], plain["drive_effort"], "drive_effort")
@@ -242,7 +243,7 @@ def test_order_of_the_file_does_not_matter(name: str) -> None:
     other = copy.deepcopy(data)
     for section in ("links", "joints", "loads"):
         other[section] = dict(reversed(other[section].items()))
-    plain, turned = unchanged(name), trunnion.analyse(Mechanism(**other), STEPS)
+    plain, turned = unchanged(name), brief(Mechanism(**other), STEPS)
     turned = turned.sel(joint=plain["joint"], link=plain["link"], point=plain["point"])
     for variable in ("point_position", "reaction_force", "drive_effort", "friction_power"):
         same(turned[variable], plain[variable], variable, 1e-9)
@@ -257,7 +258,7 @@ def test_reversed_drive_without_friction(name: str) -> None:
         driver["speed"] *= -1
         if "range" in driver:
             driver["range"].reverse()
-    plain, back = (trunnion.analyse(Mechanism(**model(d, friction=None)), 24) for d in (data, other))
+    plain, back = (brief(Mechanism(**model(d, friction=None)), 24) for d in (data, other))
     order = np.arange(24)[::-1] if any("range" in d for d in data["drivers"].values()) else -np.arange(24) % 24
     for variable in ("point_position", "point_acceleration", "reaction_force", "drive_effort"):
         same(back[variable].values[..., order], plain[variable].values, variable)
@@ -269,7 +270,7 @@ def test_driving_forward_and_backward_brackets_the_ideal_effort() -> None:
     other = copy.deepcopy(data)
     other["drivers"]["A"]["speed"] *= -1
     efforts = [
-        analyse(d, 24, friction=f)["drive_effort"].values[0] for d, f in ((data, None), (data, 0.2), (other, 0.2))
+        brief(build(d, friction=f), 24)["drive_effort"].values[0] for d, f in ((data, None), (data, 0.2), (other, 0.2))
     ]
     ideal, forward, backward = efforts[0], efforts[1], efforts[2][-np.arange(24) % 24]
     assert np.all(forward > ideal)
@@ -301,7 +302,7 @@ def test_every_law_in_a_mechanism(name: str, law: str) -> None:
     """Friction is what the law says of load and slip, it only takes power, and both methods find it."""
     friction, radius = law_named(law), 0.02
     parameters = {key: value for key, value in friction.items() if key != "law"}
-    result = analyse(MODELS[name](), 40, friction=friction, radius=radius)
+    result = brief(build(MODELS[name](), friction=friction, radius=radius), 40)
     peak = float(np.abs(result["drive_power"]).max())
     assert np.all(result["status"] <= Status.ZERO_SLIP)
     assert np.abs(result["power_residual"]).max() < 1e-12 * peak
@@ -315,7 +316,6 @@ def test_every_law_in_a_mechanism(name: str, law: str) -> None:
         expected = radius * FRICTION_LAWS[law].function(load, slip, **parameters)
         found = result["friction_torque"].sel(joint=joint).values
         np.testing.assert_allclose(found[slipping], expected[slipping], rtol=0, atol=1e-8 * np.abs(expected).max())
-    named = analyse(
-        MODELS[name](), 40, FrictionMethod("successive-approximation", 1e-11), friction=friction, radius=radius
-    )
+    method = FrictionMethod("successive-approximation", 1e-11)
+    named = brief(build(MODELS[name](), friction=friction, radius=radius), 40, method)
     same(named["drive_effort"], result["drive_effort"], "drive_effort", 1e-9)

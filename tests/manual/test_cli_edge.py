@@ -101,7 +101,7 @@ def test_a_full_disk_is_a_finding(end: str, tmp_path: Path) -> None:
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
-    words = ["analyse", str(FOUR_BAR), "--steps", "5000", "--out", str(tmp_path / f"r.{end}")]
+    words = ["analyse", str(FOUR_BAR), "--steps", "1000", "--out", str(tmp_path / f"r.{end}")]
     done = subprocess.run(
         [sys.executable, "-m", "trunnion", *words], capture_output=True, text=True, check=False, preexec_fn=limited
     )

@@ -74,7 +74,8 @@ def test_nothing_to_draw_without_friction(program: Run, tmp_path: Path) -> None:
     ],
 )
 def test_a_place_in_plots(program: Run, tmp_path: Path, place: str, code: int, part: str) -> None:
-    done = program("plot", PRESS, "--steps", 24, "--kind", "torque", "--at", place, "--out", "t.svg")
+    options = ("--friction", "off", "--steps", 24, "--kind", "torque")  # places are those of the motion
+    done = program("plot", PRESS, *options, "--at", place, "--out", "t.svg")
     assert done.code == code
     assert part in done.err
     assert (tmp_path / "t.svg").exists() == (code == 0)

@@ -30,9 +30,9 @@ def retired() -> list[str]:
 
 def written(path: Path) -> Iterator[tuple[int, str]]:
     """Line and text of every string of a module that is not its documentation; {…} where an f-string has a value."""
-    tree = ast.parse(path.read_text("utf-8"))
+    nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
     parts: set[int] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             parts.add(id(node.value))
         if isinstance(node, ast.JoinedStr):
@@ -41,7 +41,7 @@ def written(path: Path) -> Iterator[tuple[int, str]]:
                 node.lineno,
                 "".join(str(part.value) if isinstance(part, ast.Constant) else "{…}" for part in node.values),
             )
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts:
             yield node.lineno, node.value
 

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded
+from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError
 from trunnion.model.units import KINDS
 from trunnion.rig.reading.channels import resolution
@@ -372,7 +371,7 @@ def test_a_file_may_have_a_zero_of_its_own(clean: Columns, tmp_path: Path) -> No
     """The encoder was mounted 20° further in the second file; the first keeps the zero of `angle`."""
     moved = {**clean, "deg": (clean["deg"] - 20) % 360}
     for name, columns in (("first.csv", clean), ("second.csv", moved)):
-        pd.DataFrame(columns).to_csv(tmp_path / name, index=False)
+        (tmp_path / name).write_text(text_of(columns), "utf-8")
     stated = mapping({"angle": {"from": "column", "column": "deg", "unit": "deg"}})
     files: list[dict[str, Any]] = [{"file": "first.csv"}, {"file": "second.csv", "angle": {"zero": "20 deg"}}]
     path = tmp_path / "rig.json"

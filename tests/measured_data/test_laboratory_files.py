@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, RootObject, TdmsWriter
 
-from measured_data.recording import Columns, mapping, off, recorded
+from measured_data.recording import Columns, mapping, off, recorded, text_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
@@ -33,7 +33,7 @@ def _read(
     encoding: str = "utf-8",
 ) -> Measurement:
     """As a German logger writes it: semicolons and decimal commas."""
-    text = pd.DataFrame(columns).rename(columns=names or {}).to_csv(index=False, sep=";", decimal=",")
+    text = text_of({(names or {}).get(name, name): one for name, one in columns.items()}, ";", ",")
     (folder / "run.csv").write_bytes(text.encode(encoding))
     return read_measured(mapping(changes), [folder / "run.csv"])
 
@@ -114,7 +114,7 @@ def test_times_that_cannot_be_told(columns: Columns, tmp_path: Path, form: Calla
 
 @pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
 def test_units_of_a_german_laboratory(columns: Columns, tmp_path: Path, encoding: str) -> None:
-    lines = pd.DataFrame(columns).to_csv(index=False, sep=";", decimal=",").split("\n", 1)[1]
+    lines = text_of(columns, ";", ",").split("\n", 1)[1]
     head = "Prüfzeit;T1;T2;n1;n2;Drehgeber;Winkel\nSek.;V;Nm;1/min;U/min;-;°\n"
     (tmp_path / "run.csv").write_bytes((head + lines).encode(encoding))
     changes = {
@@ -169,7 +169,7 @@ def test_header_of_any_length(columns: Columns, tmp_path: Path, encoding: str) -
     wide = {key: one[:2500] for key, one in columns.items()}
     wide = {**{f"Temperatur des Gehäuses, Stelle {k}": np.zeros(2500) for k in range(2500)}, **wide}
     wide["Übertemperatur"] = np.ones(2500)
-    text = pd.DataFrame(wide).to_csv(index=False, sep=";", decimal=",")
+    text = text_of(wide, ";", ",")
     assert len(text.split("\n", 1)[0]) > 1 << 16
     (tmp_path / "run.csv").write_bytes(text.encode(encoding))
     found = read_table(tmp_path / "run.csv", ["t", "T1", "Übertemperatur"]).columns

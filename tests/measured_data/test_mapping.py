@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from manual.conftest import Run, program
-from measured_data.recording import Columns, mapping, off, read, recorded
+from measured_data.recording import Columns, mapping, off, read, recorded, text_of
 from trunnion.errors import MechanismError, Severity
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.mapping import read_mapping
@@ -151,7 +150,7 @@ def test_files_of_the_command_line_keep_what_was_set(tmp_path: Path, columns: Co
     """By the file, else by its name; and it is told which, and which do not."""
     (tmp_path / "elsewhere").mkdir()
     for name in ("run.csv", "new.csv", "elsewhere/run.csv", "elsewhere/two.csv"):
-        pd.DataFrame(columns).to_csv(tmp_path / name, index=False)
+        (tmp_path / name).write_text(text_of(columns), "utf-8")
     path, files = tmp_path / "m.json", [{"file": "run.csv", "set": {"beta": "15 deg"}}, {"file": "two.csv"}]
     path.write_text(json.dumps(mapping({"files": files, "set": {"gamma": "1 deg"}})), encoding="utf-8")
 

@@ -13,7 +13,7 @@ import xarray as xr
 
 import trunnion
 from manual.conftest import Run, program
-from measured_data.recording import mapping, recorded
+from measured_data.recording import mapping, recorded, text_of
 from trunnion.errors import MechanismError
 from trunnion.rig.reading.measurement import dataset
 from trunnion.rig.reading.tables import read_table
@@ -23,7 +23,7 @@ __all__ = ["program"]  # a fixture
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Path:
-    pd.DataFrame(recorded()).to_csv(tmp_path / "a.csv", index=False)
+    (tmp_path / "a.csv").write_text(text_of(recorded()), "utf-8")
     entry = {"file": "a.csv", "set": {"beta": "15 deg"}}
     text = json.dumps(mapping({"files": [entry], "set": {"input.speed": {"mean": "speed-in"}}}))
     (tmp_path / "rig.json").write_text(text, encoding="utf-8")
@@ -65,7 +65,7 @@ def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
 def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
     columns = recorded()
     columns["T2"] *= -1
-    pd.DataFrame(columns).to_csv(tmp_path / "b.csv", index=False)
+    (tmp_path / "b.csv").write_text(text_of(columns), "utf-8")
     code, out, err = program("data", "rig.json", "a.csv", "b.csv")
     assert code == 1
     assert "beta 15 deg" in out  # the other condition has its file for a name
@@ -91,7 +91,7 @@ def test_faults_and_bad_input(program: Run, rig: Path, tmp_path: Path) -> None:
 def test_many_files(program: Run, rig: Path, tmp_path: Path) -> None:
     """Conditions of many files: names that tell them apart, sentences once."""
     for k in range(3):
-        pd.DataFrame(recorded(turns=4 + k, seed=k)).to_csv(tmp_path / f"r{k}.csv", index=False)
+        (tmp_path / f"r{k}.csv").write_text(text_of(recorded(turns=4 + k, seed=k)), "utf-8")
     code, out, _ = program("data", "rig.json", "r0.csv", "r1.csv", "r2.csv")
     assert code == 0
     assert "3 to 5 whole turns in each of 3 conditions" in out
@@ -101,7 +101,7 @@ def test_many_files(program: Run, rig: Path, tmp_path: Path) -> None:
 
 
 def test_nothing_was_set(tmp_path: Path) -> None:
-    pd.DataFrame(recorded(turns=3)).to_csv(tmp_path / "a.csv", index=False)
+    (tmp_path / "a.csv").write_text(text_of(recorded(turns=3)), "utf-8")
     found = dataset(trunnion.rig.read(mapping(), [tmp_path / "a.csv"]))
     assert found["set"].shape == (1, 0)
     trunnion.save(found, tmp_path / "c.csv")
@@ -125,7 +125,7 @@ def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_
 
 def test_no_text_of_a_table_is_a_formula(tmp_path: Path) -> None:
     """Names of conditions and of what was set come from files; a spreadsheet must not execute them."""
-    pd.DataFrame(recorded(turns=3)).to_csv(tmp_path / "=cmd|calc!A1.csv", index=False)
+    (tmp_path / "=cmd|calc!A1.csv").write_text(text_of(recorded(turns=3)), "utf-8")
     changes = {"set": {"@beta": "-15 deg"}, "files": None}
     found = trunnion.rig.read(mapping({"set": {}}), [tmp_path / "=cmd|calc!A1.csv"])
     trunnion.save(dataset(found), tmp_path / "one.csv")

@@ -175,6 +175,21 @@ class Linkage:
             found.append((off[0] if kind == "prismatic" else wrapped(off[0]), off[1], off[2]))
         return found
 
+    def placed_by(self, guess: Mapping[str, Frame], drive: Mapping[str, Drive]) -> dict[str, Frame]:
+        """Position alone, by Newton from a guess of the links' frames."""
+        count, frames = 6 * len(self.moving), dict(guess)
+        for last in range(30):
+            still = {link: Motion(frames[link], *np.zeros((4, 3))) for link in self.moving}
+            value, _, _ = self.equations(still, drive, {})
+            jacobian = self.jacobian(frames)
+            if jacobian.shape != (count, count):
+                raise ValueError(f"{jacobian.shape[0]} equations for {count} coordinates: not determinate")
+            step = np.linalg.solve(jacobian, -value)
+            frames = {link: stepped(frames[link], step[6 * k : 6 * k + 6]) for k, link in enumerate(self.moving)}
+            if np.max(np.abs(step)) < 1e-14 or (last > 8 and np.max(np.abs(step)) < 1e-12):
+                return frames
+        raise AssertionError("not assembled")
+
     def move(
         self,
         guess: Mapping[str, Frame],
@@ -185,20 +200,7 @@ class Linkage:
 
         spin: rate and its derivative of the links whose spin is free, about the line of their ball joints.
         """
-        spin, count = spin or {}, 6 * len(self.moving)
-        frames = dict(guess)
-        for last in range(30):
-            still = {link: Motion(frames[link], *np.zeros((4, 3))) for link in self.moving}
-            value, _, _ = self.equations(still, drive, spin)
-            jacobian = self.jacobian(frames)
-            if jacobian.shape != (count, count):
-                raise ValueError(f"{jacobian.shape[0]} equations for {count} coordinates: not determinate")
-            step = np.linalg.solve(jacobian, -value)
-            frames = {link: stepped(frames[link], step[6 * k : 6 * k + 6]) for k, link in enumerate(self.moving)}
-            if np.max(np.abs(step)) < 1e-14 or (last > 8 and np.max(np.abs(step)) < 1e-12):
-                break
-        else:
-            raise AssertionError("not assembled")
+        spin, frames = spin or {}, self.placed_by(guess, drive)
         jacobian, none = self.jacobian(frames), np.zeros((4, 3))
         _, rate, _ = self.equations({n: Motion(frames[n], *none) for n in self.moving}, drive, spin)
         twists = np.linalg.solve(jacobian, -rate).reshape(-1, 2, 3)
@@ -215,7 +217,9 @@ class Linkage:
             moving = [link for link in joint["links"] if link != "ground"]
             still = {link: Motion(frames[link], *np.zeros((4, 3, 1))) for link in moving}
             still["ground"] = Motion(REST.frame, *np.zeros((4, 3, 1)))
-            block = np.zeros((len(self.rows(name, still, drive)), 6 * len(self.moving)))
+            kind = joint["type"]
+            count = len(GAPS.get(kind, (0, 1, 2))) + len(SQUARE[kind]) + (kind == "helical") + (name in drive)
+            block = np.zeros((count, 6 * len(self.moving)))
             for link in moving:  # its six unit twists at once
                 motions = {**still, link: Motion(frames[link], *TWISTS, *np.zeros((2, 3, 1)))}
                 first = 6 * self.moving.index(link)

@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 
 import trunnion
+from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
 from reference.maximal_space import Data, Drive, Frame, unrolled
 
@@ -48,7 +49,7 @@ def stated(name: str) -> Data:
 def test_agrees_with_mujoco(name: str) -> None:
     """Motion and forces to 1e-11 of the largest of their kind."""
     data = stated(name)
-    result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), steps=STEPS)
+    result = brief(trunnion.Mechanism(trunnion=1, **data), STEPS)
     engine = Engine(unrolled(data) if "loop" in data else data)
     for i in range(STEPS):
         here = result.isel(position=i)

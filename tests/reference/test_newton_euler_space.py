@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
 from reference.maximal_space import Array, Data, Drive, Frame, Motion, unrolled
 from reference.newton_euler_space import Solution
@@ -62,7 +63,7 @@ class Compared:
     """Trunnion's result of a model, and the oracle's motion at each of its positions."""
 
     def __init__(self, data: Data, steps: int = STEPS) -> None:
-        self.result = trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), steps=steps)
+        self.result = brief(trunnion.Mechanism(trunnion=1, **data), steps)
         self.oracle = Oracle(unrolled(data) if "loop" in data else data)
         self.positions = range(self.result.sizes["position"])
         assert set(self.result.status.values) <= {0, 1, 2}

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import trunnion
+from brief import brief
 from mechanisms import MODELS, Data, build, model
 from trunnion.solve.run import prepare
 
@@ -68,8 +69,8 @@ def raised(data: Data) -> Data:
 def test_planar_mechanism_in_space(name: str, friction: float | None) -> None:
     """Motion to 1e-10, forces to 1e-8 of the largest; nothing across the plane."""
     data = model(MODELS[name](), friction=friction)
-    flat = trunnion.analyse(build(MODELS[name](), friction=friction), steps=STEPS)
-    space = trunnion.analyse(trunnion.Mechanism(trunnion=1, **raised(data)), steps=STEPS)
+    flat = brief(build(MODELS[name](), friction=friction), STEPS)
+    space = brief(trunnion.Mechanism(trunnion=1, **raised(data)), STEPS)
     np.testing.assert_array_equal(flat.status.values, space.status.values)
     points = [p for p in flat.point.values if p in space.point.values]
     for what, limit in (("position", 1e-10), ("velocity", 1e-9), ("acceleration", 1e-8)):

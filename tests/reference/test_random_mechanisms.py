@@ -14,6 +14,7 @@ import pytest
 import test_newton_euler as oracle
 
 import trunnion
+from brief import brief
 from mechanisms import KIND, Data, transformed
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status
@@ -184,7 +185,7 @@ def test_random_mechanism(seed: int) -> None:
         found = [float(np.ravel(n)[0]) for n in frame]
         np.testing.assert_allclose(found, [x, y, np.cos(angle), np.sin(angle)], rtol=0, atol=1e-9, err_msg=link)
 
-    result = trunnion.analyse(mechanism, 12)
+    result = brief(mechanism, 12)
     status = result["status"].values
     assert np.all(status != Status.NOT_ASSEMBLED) or np.any(result["condition"].values > 30), status
     solved = status < Status.NOT_CONVERGED
@@ -193,7 +194,7 @@ def test_random_mechanism(seed: int) -> None:
     assert np.all(np.abs(result["power_residual"].values[solved]) < 1e-11 * flow)
     assert np.all(result["friction_power"].values[:, solved] >= -1e-14 * flow)
 
-    named = trunnion.analyse(mechanism, 12, FrictionMethod("successive-approximation", 1e-10, 400))
+    named = brief(mechanism, 12, FrictionMethod("successive-approximation", 1e-10, 400))
     both = solved & (named["status"].values < Status.NOT_CONVERGED)
     assert np.all(both[solved] | (result["friction_contraction"].values[solved] > 0.9))
     for variable in ("reaction_force", "drive_effort"):
@@ -235,9 +236,9 @@ def test_random_mechanism_against_newton_euler(seed: int) -> None:
 def test_random_mechanism_elsewhere(seed: int) -> None:
     """Turned, and 1e4 m away, where four digits fewer are left of each position: the same machine."""
     data, _ = grown(seed)
-    plain = trunnion.analyse(Mechanism(**data), 6)
+    plain = brief(Mechanism(**data), 6)
     for shift, tolerance in (((0.0, 0.0), 1e-9), ((1e4, -2e4), 1e-6)):
-        other = trunnion.analyse(Mechanism(**transformed(data, 0.6, shift)), 6)
+        other = brief(Mechanism(**transformed(data, 0.6, shift)), 6)
         np.testing.assert_array_equal(other["status"], plain["status"])
         for variable in ("drive_effort", "friction_power", "link_angle_acceleration"):
             scale = 1 + float(np.nan_to_num(np.abs(plain[variable])).max())

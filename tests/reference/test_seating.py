@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy import optimize
 
 import trunnion
+from brief import brief
 from mechanisms import four_bar, model, slider_crank, transformed
 from mechanisms_parts import body, revolute
 from mechanisms_space import cardan, closed, rssr
@@ -44,7 +45,7 @@ def loaded(name: str, friction: float = 0.0, rho: float = 2e-4, guide: float | N
 
 
 def analysed(data: Data, steps: int) -> xr.Dataset:
-    return trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), steps=steps)
+    return brief(trunnion.Mechanism(trunnion=1, **data), steps)
 
 
 def offsets_of(run: Run, result: xr.Dataset) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""Motion of spatial mechanisms against closed forms and published numbers, through `trunnion.analyse`."""
+"""Motion of spatial mechanisms, as `trunnion.analyse` has it, against closed forms and published numbers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import trunnion
+from brief import brief
 from mechanisms_space import cardan
 from reference.maximal_space import Array, Data, Frame, rotation, unrolled
 from trunnion.algebra.dual import derivative, seed
@@ -18,7 +19,7 @@ SPEED = 2.0
 
 
 def analysed(data: Data, steps: int) -> xr.Dataset:
-    return trunnion.analyse(trunnion.Mechanism(trunnion=1, **data), steps=steps)
+    return brief(trunnion.Mechanism(trunnion=1, **data), steps)
 
 
 def loop(

@@ -43,9 +43,9 @@ def test_every_figure_of_every_spatial_result(name, spatial, tmp_path):
             PLOTS[name](result, None)
         return
     figure = PLOTS[name](result, result)
-    for suffix in ("png", "svg"):
-        path = save(figure, tmp_path / f"figure.{suffix}")
-        assert 5_000 < path.stat().st_size < 3_000_000
+    # in one format each: every figure comes up in both, and so does every result
+    suffix = ("png", "svg")[([*PLOTS].index(name) + [*SPATIAL].index(kind)) % 2]
+    assert 5_000 < save(figure, tmp_path / f"figure.{suffix}").stat().st_size < 3_000_000
 
 
 def _texts(figure):

@@ -29,7 +29,7 @@ def times(a: Number, b: Number) -> Number:
 
 def plus(a: Number, b: Number) -> Number:
     """a + b."""
-    if isinstance(a, float) and a == 0.0:  # `is_zero` in so many words: a call costs as much as a short sum
+    if isinstance(a, float) and a == 0.0:  # `is_zero` written out: a call costs as much as a sum of few numbers
         return b
     return a if isinstance(b, float) and b == 0.0 else a + b
 

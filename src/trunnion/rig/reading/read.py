@@ -146,7 +146,8 @@ def _unused_zero(mapped: Mapped, entries: Sequence[File]) -> list[Finding]:
 
 def _says(*entries: File) -> str:
     """What entries state of their files."""
-    return " and ".join(f"`{key}`" for key in ("set", "over", "angle") if any(getattr(one, key) for one in entries))
+    keys = ("set", "over", "angle", "channels")
+    return " and ".join(f"`{key}`" for key in keys if any(getattr(one, key) for one in entries))
 
 
 def _some(paths: Sequence[Path]) -> str:
@@ -191,6 +192,7 @@ class _File:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
         self.lag, self.step = 0.0, 0.0
+        self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
@@ -272,7 +274,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.step = found.lag, found.step
+        self.lag, self.step, self.angle = found.lag, found.step, found.values
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"
@@ -365,7 +367,8 @@ class _File:
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
         begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
         low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
-        span = faults.FaultSpan(low, high, begin, end)
+        start, cycle = float(mapping.start.evaluate()), float(mapping.cycle.evaluate())
+        span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit)
         readings = self.readings.pop(name)
         self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
         speed = channel.measures.startswith("rate:")

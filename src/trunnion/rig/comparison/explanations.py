@@ -9,21 +9,25 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
-from trunnion.rig.comparison.assessment import Verdict
-from trunnion.rig.comparison.error_sources import KINDS, Cause
+from trunnion.rig.comparison.assessment import Verdict, difference
+from trunnion.rig.comparison.error_sources import KINDS, STATED, Cause, beyond_stated
 from trunnion.rig.comparison.wording import extent, in_which, percent, said
+from trunnion.rig.reading.arcs import concentration
+from trunnion.rig.reading.log import few_digits
+from trunnion.rig.reading.units_taken import read_as
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
 
-__all__ = ["explained"]
+__all__ = ["explained", "hides_friction"]
 
+Members = Sequence[tuple["Compared", "ChannelComparison"]]
+STANDS_OUT = 2.0  # times the median of the conditions
+MUCH = 0.5  # of a mean square, that an offset would explain, to be spoken of
 FAR = 0.5  # of a gain: told as a factor from here on
 
 
-def explained(
-    name: str, measures: str, kind: str, members: Sequence[tuple[Compared, ChannelComparison]], of: int
-) -> Finding:
+def explained(name: str, measures: str, kind: str, members: Members, of: int) -> Finding:
     """A channel that is not within, with what would explain it."""
     where = in_which([one.condition.name for one, _ in members], of)
     worst = min(pair.judged.within for _, pair in members)
@@ -39,17 +43,81 @@ def explained(
             corrected_percent=100 * after,
         )  # fmt: skip
     remedy = "see the residual over the cycle; `trunnion identify` fits parameters of the model to the data"
-    phrases = {"cases": where, "rms_told": said(rms, unit), "explained": "", "remedy": remedy}
+    phrases = {"cases": where, "rms_told": f"{said(rms, unit)}{_most(members)}", "explained": "", "remedy": remedy}
     figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}
-    if kind:
+    if not kind:
+        phrases["explained"], place = _where(members)
+        figures |= place
+    else:
         sizes = [_size(pair, kind) for _, pair in members]
         least = min(cause.explains for cause in sizes)
         story, phrases["remedy"] = _story(name, measures, kind, sizes, members)
         alike = {other.kind for _, pair in members for other in pair.others} - {kind}
         also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
-        phrases["explained"] = f"; {story} explains {percent(least)} of its mean square{also}"
+        offset = _offset_beside(members) if kind == "friction" and "zero" not in alike else ""
+        phrases["explained"] = f"; {story} explains {percent(least)} of its mean square{also}{offset}"
         figures["explains"] = least
     return finding_for("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
+
+
+def _most(members: Members) -> str:
+    """The condition whose residual stands out among those of a finding; empty if none does."""
+    sizes = [pair.judged.rms for _, pair in members]
+    if len(sizes) < 2 or max(sizes) < STANDS_OUT * float(np.median(sizes)):
+        return ""
+    return f" in {members[int(np.argmax(sizes))][0].condition.name}"
+
+
+def _where(members: Members) -> tuple[str, dict[str, float]]:
+    """In which part of the cycle most of a residual lies, with its figures; of the condition with the largest."""
+    one, pair = max(members, key=lambda case: case[1].judged.rms)
+    residual = np.where(pair.comparable, difference(pair.course.mean, pair.model), np.nan)
+    found = concentration(residual, one.model.run.cycle.periodic)
+    if found is None:
+        return "", {}
+    start, end = float(one.model.drive[found.first]), float(one.model.drive[found.last])
+    first, last = said(start, one.model.unit), said(end, one.model.unit)
+    place = f"at {first}" if found.first == found.last else f"from {first} to {last}"
+    of = f" in {one.condition.name}" if len(members) > 1 else ""
+    return f"; {percent(found.share)} of its mean square{of} lies {place}", {
+        "start": start,
+        "end": end,
+        "share": found.share,
+    }
+
+
+def _offset_beside(members: Members) -> str:
+    """What a constant offset would explain where friction explains more: who takes it off hides the friction."""
+    sizes = [_size(pair, "zero") for _, pair in members]
+    if min(one.explains for one in sizes) < MUCH:
+        return ""
+    told = extent([one.size for one in sizes], members[0][1].course.unit)
+    share = percent(min(one.explains for one in sizes))
+    return f"; a constant offset of {told}{_remarks(_beyond(sizes, members))} would explain {share}"
+
+
+def _beyond(sizes: Sequence[Cause], members: Members) -> str:
+    """How far an error of zero or gain is beyond what is stated of the sensor; empty if that may be."""
+    accuracies = [pair.course.accuracy for _, pair in members]
+    rows = zip(sizes, accuracies, strict=True)
+    times = [beyond_stated(one, accuracy.zero, accuracy.gain) for one, accuracy in rows]
+    if not min(times, default=0.0) > STATED:  # NaN where nothing is stated
+        return ""
+    low, high = few_digits(min(times)), few_digits(max(times))
+    several = low if low == high else f"{low} to {high}"
+    return f"{several} times the stated standard uncertainty of the {sizes[0].kind}"
+
+
+def _remarks(*told: str) -> str:
+    """What there is to remark, in brackets."""
+    some = "; ".join(one for one in told if one)
+    return f" ({some})" if some else ""
+
+
+def hides_friction(pair: ChannelComparison) -> bool:
+    """Whether friction explains a residual that an offset explains too, which is more than the zero of the sensor."""
+    zero = pair.course.accuracy.zero
+    return pair.cause is not None and pair.cause.kind == "friction" and 0 < STATED * zero < abs(pair.judged.bias)
 
 
 def _size(pair: ChannelComparison, kind: str) -> Cause:
@@ -66,14 +134,19 @@ REMEDIES = {
     "zero": "check the zero of the channel, and whether the model lacks a load",
     "gain": "check gain and unit of the channel, and dimensions, friction and loads of the model",
     "shift": "check the zero of the angle, also of single files, and delays of the channel",
+    "friction": "`trunnion identify` fits the friction of the model; a zero that is corrected instead hides it",
     "zero and gain": "check zero and gain of the channel, and dimensions, friction and loads of the model",
+}
+BEYOND = {
+    "zero": "that is hardly the zero: check friction and loads of the model, which act alike, and fit them with "
+    "`trunnion identify`; a zero that is corrected instead hides them",
+    "gain": "that is hardly the sensor: check unit and range of its amplifier in these files, and dimensions, friction "
+    "and loads of the model",
 }
 MODEL = "it differs between conditions: check dimensions, friction and loads of the model, not the sensor"
 
 
-def _story(
-    name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]
-) -> tuple[str, str]:
+def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Members) -> tuple[str, str]:
     """What would explain it, with its size, and what to do about it."""
     first, pair = members[0]
     unit, values = pair.course.unit, [one.size for one in sizes]
@@ -89,23 +162,27 @@ def _story(
         alike = pair.judged.correlation
         story = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
     elif kind == "zero":
-        story = f"a constant offset of {extent(values, unit)}"
+        story = f"a constant offset of {extent(values, unit)}{_remarks(_beyond(sizes, members))}"
     elif kind == "gain":
         story = f"a gain {_times(values)}" if _times(values) else f"a gain error of {_percent(values)}"
+        story += _remarks(read_as([1 + one for one in values], *pair.course.shown), _beyond(sizes, members))
     elif kind == "flat":
         story = f"a constant reading of {extent(values, unit, False)}"
     elif kind == "shift":
         story = _ahead(values, [one for one, _ in members])
+    elif kind == "friction":
+        low, high = f"{min(values):.3g}", f"{max(values):.3g}"
+        story = f"friction {low if low == high else f'{low} to {high}'} times that of the model"
     elif kind == "mirror":
         story = KINDS[kind]
     else:
         story = f"an offset of {extent(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
-    return story, MODEL if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members) else REMEDIES[
-        kind
-    ]
+    if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members):
+        return story, MODEL
+    return story, BEYOND[kind] if kind in BEYOND and _beyond(sizes, members) else REMEDIES[kind]
 
 
-def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]) -> bool:
+def _differ(kind: str, sizes: Sequence[Cause], members: Members) -> bool:
     """Whether an offset or a gain changes with the condition by more than its uncertainty, as no sensor's does."""
     if kind == "zero and gain":
         gains = [one._replace(size=one.gain) for one in sizes]

@@ -19,7 +19,7 @@ from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
-from trunnion.rig.comparison.explanations import explained
+from trunnion.rig.comparison.explanations import explained, hides_friction
 from trunnion.rig.comparison.wording import extent, in_which, said
 from trunnion.rig.reading.measurement import zeros_of_files
 
@@ -110,9 +110,8 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
         if (pair.judged.stretch is None or pair.cause is not None) and verdict in (Verdict.NOT, Verdict.OFFSET):
             kind = pair.cause.kind if pair.cause else ""
             if not (kind == "shift" and shifted):  # it is said once for all channels
-                by_cause.setdefault("zero" if verdict is Verdict.OFFSET and kind != "sign" else kind, []).append(
-                    (one, pair)
-                )
+                of_offset = verdict is Verdict.OFFSET and kind != "sign" and not hides_friction(pair)
+                by_cause.setdefault("zero" if of_offset else kind, []).append((one, pair))
     for kind, members in by_cause.items():
         yield explained(name, measures, kind, members, len(cases))
     yield from _biased(name, cases)

@@ -67,7 +67,7 @@ def read_measured(
         name,
         tuple(_distinct(conditions)),
         tuple(findings),
-        (_averaged(conditions, sum(one.recorded for one in accounts)), *told(accounts)),
+        (_averaged(conditions, accounts), *told(accounts)),
     )
 
 
@@ -78,14 +78,17 @@ def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]
     return [mapping, *named]
 
 
-def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
+def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> str:
     """How many turns there are, and of how many if some are not used."""
+    recorded, lost = sum(one.recorded for one in accounts), sum(one.left_out for one in accounts)
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
     if sum(counts) < recorded - 2 * len(counts):
         where += f", {sum(counts):,}" if len(counts) > 1 else ""
         where += f" of {recorded:,.0f} recorded"
+    elif lost:
+        where += f", {lost:,} more left out as the findings say"
     return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
@@ -187,6 +190,11 @@ class _File:
         table = _table(path, mapping, entry)
         for note in table.notes:
             account.say(note)
+        for number, text in table.ends.items():
+            what = f"the line below the numbers is left out: '{text[:60]}'"
+            account.findings.append(
+                Finding(what, "", "", Severity.NOTE, file=account.file, line=number, code="data.rows.end")
+            )
         self.line: Timeline = timeline(table, mapping.time, account)
         if mapping.filter is not None:
             self._check_filter(table)

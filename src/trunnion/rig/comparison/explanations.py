@@ -54,8 +54,8 @@ def explained(name: str, measures: str, kind: str, members: Members, of: int) ->
         story, phrases["remedy"] = _story(name, measures, kind, sizes, members)
         alike = {other.kind for _, pair in members for other in pair.others} - {kind}
         also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
-        offset = _offset_beside(members) if kind == "friction" and "zero" not in alike else ""
-        phrases["explained"] = f"; {story} explains {percent(least)} of its mean square{also}{offset}"
+        beside = _offset_beside(members) if kind == "friction" and "zero" not in alike else ""
+        phrases["explained"] = f"; {story} explains {percent(least)} of its mean square{also}{beside}"
         figures["explains"] = least
     return finding_for("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
 

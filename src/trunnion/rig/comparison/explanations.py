@@ -53,7 +53,7 @@ def explained(name: str, measures: str, kind: str, members: Members, of: int) ->
         least = min(cause.explains for cause in sizes)
         story, phrases["remedy"] = _story(name, measures, kind, sizes, members)
         alike = {other.kind for _, pair in members for other in pair.others} - {kind}
-        also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
+        also = f"; {_others(alike, members)} would explain as much" if alike else ""
         beside = _offset_beside(members) if kind == "friction" and "zero" not in alike else ""
         phrases["explained"] = f"; {story} explains {percent(least)} of its mean square{also}{beside}"
         figures["explains"] = least
@@ -94,6 +94,13 @@ def _offset_beside(members: Members) -> str:
     told = extent([one.size for one in sizes], members[0][1].course.unit)
     share = percent(min(one.explains for one in sizes))
     return f"; a constant offset of {told}{_remarks(_beyond(sizes, members))} would explain {share}"
+
+
+def _others(kinds: set[str], members: Members) -> str:
+    """Kinds that explain as much, of an offset with how far it is beyond what is stated."""
+    zeros = [_size(pair, "zero") for _, pair in members]
+    remarks = {"zero": _remarks(_beyond(zeros, members))}
+    return " or ".join(f"{name}{remarks.get(kind, '')}" for kind, name in KINDS.items() if kind in kinds)
 
 
 def _beyond(sizes: Sequence[Cause], members: Members) -> str:

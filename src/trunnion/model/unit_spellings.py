@@ -11,7 +11,7 @@ from typing import Final
 
 from trunnion.model.names import nearest
 
-__all__ = ["READ", "USUAL", "plain", "remedy_for", "strange_sign", "words"]
+__all__ = ["READ", "USUAL", "plain", "pound_feet", "remedy_for", "strange_sign", "words"]
 
 # prefixes of each symbol; an angle has none but in mrad and µrad, so that Grad is no giga-radian
 _SYMBOLS: Final = {
@@ -76,6 +76,8 @@ _PHRASES: Final = {  # whole units, without their spaces
 }
 _TORQUE = re.compile(r"(?<![\w])((?:[mkMcµμu]|da)?)N(mm|cm|m)(?!\w)([\^*]?)")
 _TURNS = re.compile(r"(?<![\w])(?:U|Umdr\.?)\s?/\s?(?=(?:min|s)(?!\w))")
+_POUND_FEET = re.compile(r"(?<!\w)(?:(ft|in)-(lb|oz)[fs]?|(lb|oz)[fs]?-(ft|in))(?!\w)")
+_POUND_FEET_ALONE = re.compile(r"(?:(ft|in)[ .·⋅*]?(lb|oz)[fs]?|(lb|oz)[fs]?[ .·⋅*]?(ft|in))")
 _SECOND = re.compile(r"(?<![\w])[Ss]ek\b\.?|(?<![\w])[Ss]ec\.")
 _WORD = re.compile(r"[^\W\d]\w*|°\w*|%|‰|ε")
 _SIGN = re.compile(r"[\s\d.*/^()·⋅+-]")
@@ -89,6 +91,19 @@ def plain(text: str) -> str:
     spaced = _TORQUE.sub(_torque, text)
     spaced = _SECOND.sub("s", _TURNS.sub("rev/", spaced))
     return spaced.replace("·", "*").replace("⋅", "*")
+
+
+def pound_feet(text: str) -> str:
+    """A unit of a sensor with its torques of pounds and feet written out: `lbf ft` for `ft-lb`, `ft lb` and `lb-ft`.
+
+    Not of a model's: a minus may stand there, and `lb ft` is a mass times a length. No sensor measures that.
+    """
+
+    def product(found: re.Match[str]) -> str:
+        return f"({found[2] or found[3]}f {found[1] or found[4]})"
+
+    alone = _POUND_FEET_ALONE.fullmatch(text.strip())
+    return product(alone) if alone else _POUND_FEET.sub(product, text)
 
 
 def _torque(found: re.Match[str]) -> str:

@@ -217,7 +217,15 @@ IDENTIFY = {
         NOTE,
         "the conditions disagree: the estimates from single conditions vary {times_told} times as much as expected "
         "from the scatter between turns; the interval is widened accordingly",
-        "look for differences between conditions: settings, speed, temperature, the zero of each file",
+        "{remedy}",
+    ),
+    "fit.stands_out": Sentence(
+        WARNING,
+        "{subject}: {rms_told}, {times_told} times what the scatter explains{others_told}{place}",
+        lambda condition, several, **_: (
+            "check the readings there (range, gain and zero in this file, clipping, stops) and the model"
+            + (f"; --hold-out '{condition}' leaves the condition out of the fit" if several else "")
+        ),
     ),
     "fit.not_repeated": Sentence(
         WARNING,

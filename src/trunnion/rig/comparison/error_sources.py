@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ENOUGH", "KINDS", "Cause", "best", "causes"]
+__all__ = ["ENOUGH", "KINDS", "STATED", "Cause", "best", "beyond_stated", "causes"]
 
 Array = NDArray[np.float64]
 ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain
@@ -20,6 +20,8 @@ ROUGH, NEAR = (
 )  # where the best leaves more, as of a wrong model, those explain it too that explain nearly as much
 BOTH = 4.0  # an offset and a gain together are to leave so much less than one of them
 FLAT = 0.05  # of the variation of the model: a reading that varies less, and not like it, is flat
+STATED = 3.0  # standard uncertainties: an error of zero or gain beyond so many of those stated is hardly the sensor's
+ACTS = 1e-6  # of the model, that its friction has to amount to
 FEWEST = 12  # positions from which a shift is looked for
 GRID = 180
 
@@ -31,14 +33,15 @@ KINDS = {
     "gain": "a wrong gain",
     "shift": "a shift of the crank angle",
     "mirror": "a crank angle with the wrong sign",
+    "friction": "other friction than the model's",
     "zero and gain": "an offset and a wrong gain",
 }
 
 
 class Cause(NamedTuple):
     """One explanation. size: of a zero in the unit of the course, of a gain the relative error, of a shift the share of
-    the cycle by which the measured course is ahead, of a mirror too, run backwards, of what is flat the reading; gain:
-    that of a zero and gain; explains: share of the mean square.
+    the cycle by which the measured course is ahead, of a mirror too, run backwards, of what is flat the reading, of
+    friction how many times that of the model; gain: that of a zero and gain; explains: share of the mean square.
     """
 
     kind: str
@@ -69,11 +72,19 @@ class _Pair:
         return 1.0 - float(np.mean((self.measured - model) ** 2)) / before if before > 0 else 0.0
 
 
-def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning: bool = False) -> list[Cause]:
+def causes(
+    measured: Array,
+    model: Array,
+    phase: Array,
+    *,
+    closed: bool,
+    turning: bool = False,
+    without: Array | None = None,
+) -> list[Cause]:
     """Every explanation that can be fitted, in the order of KINDS; finite values only.
 
     closed: the cycle ends where it starts; turning: the course is an angle, of which a sign or a shift says nothing
-    that a zero does not.
+    that a zero does not; without: the model without its friction, if that is to be among them.
     """
     pair, found = _Pair(measured, model), []
     square = float(np.sum(model**2))
@@ -91,6 +102,7 @@ def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning
         found.append(Cause("gain", gain - 1.0, pair.explained(gain * model)))
     if closed and len(phase) >= FEWEST:
         found += [*_shift(pair, phase, 1), *_shift(pair, phase, -1)]
+    found += _friction(pair, without)
     around = model - np.mean(model)
     if float(np.sum(around**2)) > 1e-6 * square:  # of a flat course the two cannot be told apart
         slope = float(np.sum(measured * around) / np.sum(around**2))
@@ -98,6 +110,27 @@ def causes(measured: Array, model: Array, phase: Array, *, closed: bool, turning
         if slope > 0:
             found.append(Cause("zero and gain", offset, pair.explained(slope * model + offset), slope - 1.0))
     return found
+
+
+def _friction(pair: _Pair, without: Array | None) -> list[Cause]:
+    """How many times the friction of the model fits best: measured = without + size · (model − without).
+
+    To first order: friction changes the reactions that it depends on.
+    """
+    if without is None or not np.isfinite(without).all():
+        return []
+    part = pair.model - without
+    square = float(np.sum(part**2))
+    if square <= (ACTS**2) * float(np.sum(pair.model**2)) or square == 0:
+        return []
+    size = float(np.sum((pair.measured - without) * part)) / square
+    return [Cause("friction", size, pair.explained(without + size * part))] if size > 0 else []
+
+
+def beyond_stated(one: Cause, zero: float, gain: float) -> float:
+    """How many standard uncertainties an error of zero or gain is off; NaN of others, and where none is stated."""
+    known = {"zero": zero, "gain": gain}.get(one.kind, 0.0)
+    return abs(one.size) / known if known > 0 else float("nan")
 
 
 def best(found: list[Cause], noise: float = 0.0) -> tuple[Cause | None, list[Cause]]:

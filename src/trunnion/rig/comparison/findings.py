@@ -12,23 +12,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.cycle.summary import inputs, model_notes
-from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.errors import Finding, Severity, Status
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
-from trunnion.rig.comparison.error_sources import KINDS, Cause
+from trunnion.rig.comparison.explanations import explained, hides_friction
+from trunnion.rig.comparison.wording import extent, in_which, said
 from trunnion.rig.reading.measurement import zeros_of_files
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
+    from trunnion.rig.comparison.error_sources import Cause
     from trunnion.rig.reading.measurement import Condition
 
-__all__ = ["findings_of", "gathered", "other_speed", "said", "speed_unit", "units_set"]
+__all__ = ["findings_of", "gathered", "other_speed", "speed_unit", "units_set"]
 
-FAR = 0.5  # of a gain: told as a factor from here on
 SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
 AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
@@ -91,29 +92,6 @@ def gathered(findings: Iterable[Finding]) -> list[Finding]:
     return found
 
 
-def said(value: float, unit: str, signed: bool = False) -> str:
-    """A number with its unit; angles in degrees."""
-    factor, shown = (180 / math.pi, "deg") if unit == "rad" else (1.0, "" if unit == "1" else unit)
-    return f"{value * factor + 0.0:{'+' if signed else ''}.3g} {shown}".strip()
-
-
-def _range(values: Sequence[float], unit: str, signed: bool = True) -> str:
-    low, high = said(min(values), unit, signed), said(max(values), unit, signed)
-    return low if low == high else f"{low.partition(' ')[0]} to {high}"
-
-
-def _share(value: float) -> str:
-    return f"{100 * value:.0f} %"
-
-
-def _in(names: Sequence[str], of: int) -> str:
-    """In which conditions."""
-    if len(names) == of:
-        return "in every condition" if of > 1 else f"in {names[0]}"
-    first = "; ".join(names[:3]) + ("; …" if len(names) > 3 else "")
-    return f"in {len(names)} of {counted(of, 'condition')} ({first})"
-
-
 def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, ChannelComparison]]:
     return [(one, one.pairs[name]) for one in found if name in one.pairs]
 
@@ -132,11 +110,10 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
         if (pair.judged.stretch is None or pair.cause is not None) and verdict in (Verdict.NOT, Verdict.OFFSET):
             kind = pair.cause.kind if pair.cause else ""
             if not (kind == "shift" and shifted):  # it is said once for all channels
-                by_cause.setdefault("zero" if verdict is Verdict.OFFSET and kind != "sign" else kind, []).append(
-                    (one, pair)
-                )
+                of_offset = verdict is Verdict.OFFSET and kind != "sign" and not hides_friction(pair)
+                by_cause.setdefault("zero" if of_offset else kind, []).append((one, pair))
     for kind, members in by_cause.items():
-        yield _explained(name, measures, kind, members, len(cases))
+        yield explained(name, measures, kind, members, len(cases))
     yield from _biased(name, cases)
     unknown = [len(pair.course.turns) for _, pair in cases if pair.judged.verdict is Verdict.UNKNOWN]
     once = "measured in one turn only"
@@ -148,7 +125,7 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
     ):  # fmt: skip
         names = [one.condition.name for one, pair in cases if pair.judged.verdict is verdict]
         if names:
-            phrases = {"cases": _in(names, len(cases)), "once": once}
+            phrases = {"cases": in_which(names, len(cases)), "once": once}
             yield finding_for(code, f"channels.{name}", severity=None, phrases=phrases, **figures)
 
 
@@ -162,7 +139,7 @@ def _local(name: str, cases: Sequence[tuple[Compared, ChannelComparison]], of: i
     shown, size = pair.course.shown if pair.course.unit == "rad/s" else (pair.course.unit, 1.0)
     start, end = (float(one.model.drive[k]) for k in (stretch.positions[0], stretch.positions[-1]))
     phrases = {
-        "cases": _in([case.condition.name for case, _ in cases], of),
+        "cases": in_which([case.condition.name for case, _ in cases], of),
         "most": f", the most in {one.condition.name}" if len(cases) > 1 else "",
         "place": f"{said(start, one.model.unit)} to {said(end, one.model.unit)}",
         "mean_told": said(stretch.mean / size, shown, True),
@@ -203,7 +180,7 @@ def _biased(name: str, cases: Sequence[tuple[Compared, ChannelComparison]]) -> I
     often = len(beyond) > max(1.0, BY_CHANCE * len(ratios))
     shown, size = pair.course.shown if pair.course.unit == "rad/s" else (pair.course.unit, 1.0)
     phrases = {
-        "cases": _in([row[1].condition.name for row in beyond], len(cases)),
+        "cases": in_which([row[1].condition.name for row in beyond], len(cases)),
         "most": f", the most in {one.condition.name}" if len(beyond) > 1 else "",
         "bias_told": said(pair.judged.bias / size, shown, True),
         "wide_told": said(pair.judged.bias_expanded / size, shown),
@@ -220,124 +197,7 @@ BY_CHANCE = 0.1  # of the conditions, in which the bias of a true model is beyon
 PLAINLY = 1.5  # times its U, from which a bias is one in any case
 
 
-def _explained(
-    name: str, measures: str, kind: str, members: Sequence[tuple[Compared, ChannelComparison]], of: int
-) -> Finding:
-    """A channel that is not within, with what would explain it."""
-    where = _in([one.condition.name for one, _ in members], of)
-    worst = min(pair.judged.within for _, pair in members)
-    rms = max(pair.judged.rms for _, pair in members)
-    unit = members[0][1].course.unit
-    offset = all(pair.judged.verdict is Verdict.OFFSET for _, pair in members)
-    if offset and kind == "zero":
-        story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
-        phrases = {"cases": where, "story": story, "remedy": remedy}
-        after = min(pair.judged.within_unbiased for _, pair in members)
-        return finding_for(
-            "compare.offset", f"channels.{name}", phrases=phrases, within_percent=100 * worst,
-            corrected_percent=100 * after,
-        )  # fmt: skip
-    remedy = "see the residual over the cycle; `trunnion identify` fits parameters of the model to the data"
-    phrases = {"cases": where, "rms_told": said(rms, unit), "explained": "", "remedy": remedy}
-    figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}
-    if kind:
-        sizes = [_size(pair, kind) for _, pair in members]
-        least = min(cause.explains for cause in sizes)
-        story, phrases["remedy"] = _story(name, measures, kind, sizes, members)
-        alike = {other.kind for _, pair in members for other in pair.others} - {kind}
-        also = f"; {' or '.join(KINDS[one] for one in KINDS if one in alike)} would explain as much" if alike else ""
-        phrases["explained"] = f"; {story} explains {_share(least)} of its mean square{also}"
-        figures["explains"] = least
-    return finding_for("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
-
-
-def _size(pair: ChannelComparison, kind: str) -> Cause:
-    if pair.cause is not None and pair.cause.kind == kind:
-        return pair.cause
-    judged = pair.judged  # an offset that is less than nearly all of the residual
-    return Cause("zero", judged.bias, (judged.bias / judged.rms) ** 2)
-
-
-REMEDIES = {
-    "flat": "check the sensor, its cable, and the column in the mapping",
-    "mirror": "state angle: {sign: -1} in the mapping, or remove it, and check the zero of the angle",
-    "sign": "state sign: -1 for the channel in the mapping, or remove it",
-    "zero": "check the zero of the channel, and whether the model lacks a load",
-    "gain": "check gain and unit of the channel, and dimensions, friction and loads of the model",
-    "shift": "check the zero of the angle, also of single files, and delays of the channel",
-    "zero and gain": "check zero and gain of the channel, and dimensions, friction and loads of the model",
-}
-MODEL = "it differs between conditions: check dimensions, friction and loads of the model, not the sensor"
-
-
-def _story(
-    name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]
-) -> tuple[str, str]:
-    """What would explain it, with its size, and what to do about it."""
-    first, pair = members[0]
-    unit, values = pair.course.unit, [one.size for one in sizes]
-    subject = measures.removeprefix("rate:")
-    driver = first.model.run.system.mechanism.drivers.get(subject)
-    if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
-        shown, size = pair.course.shown
-        speed = float(np.nanmean(pair.course.mean)) / size
-        story = _range([one / size for one in values], shown) if kind == "zero" else _percent(values)
-        remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping uses the measured speed"
-        return f"another speed of the driver, measured {said(speed, shown)} ({KINDS[kind]} of {story})", remedy
-    if kind == "sign":
-        alike = pair.judged.correlation
-        story = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
-    elif kind == "zero":
-        story = f"a constant offset of {_range(values, unit)}"
-    elif kind == "gain":
-        story = f"a gain {_times(values)}" if _times(values) else f"a gain error of {_percent(values)}"
-    elif kind == "flat":
-        story = f"a constant reading of {_range(values, unit, False)}"
-    elif kind == "shift":
-        story = _ahead(values, [one for one, _ in members])
-    elif kind == "mirror":
-        story = KINDS[kind]
-    else:
-        story = f"an offset of {_range(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
-    return story, MODEL if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members) else REMEDIES[
-        kind
-    ]
-
-
-def _differ(kind: str, sizes: Sequence[Cause], members: Sequence[tuple[Compared, ChannelComparison]]) -> bool:
-    """Whether an offset or a gain changes with the condition by more than its uncertainty, as no sensor's does."""
-    if kind == "zero and gain":
-        gains = [one._replace(size=one.gain) for one in sizes]
-        return _differ("zero", sizes, members) or _differ("gain", gains, members)
-    values = [one.size for one in sizes]
-    spread = max(values) - min(values)
-    known = [pair.judged.bias_expanded for _, pair in members]
-    typical = [max(float(np.sqrt(np.nanmean(pair.course.mean**2))), 1e-300) for _, pair in members]
-    wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
-    return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
-
-
-def _times(values: Sequence[float]) -> str:
-    """A gain that is far off, as a factor; empty of others."""
-    if max(abs(one) for one in values) < FAR:
-        return ""
-    low, high = f"{1 + min(values):.3g}", f"{1 + max(values):.3g}"
-    return f"{low if low == high else f'{low} to {high}'} times its true value"
-
-
-def _percent(values: Sequence[float]) -> str:
-    low, high = f"{100 * min(values):+.2g}", f"{100 * max(values):+.2g}"
-    return f"{low} %" if low == high else f"{low} to {high} %"
-
-
 # ---- the crank angle ------------------------------------------------------------------------------------------
-
-
-def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
-    spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
-    late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
-    angle, delay = _range(spans, found[0].model.unit), _range(late, "ms", False)
-    return f"an error of {angle} in the crank angle, or a delay of {delay},"
 
 
 def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:
@@ -366,13 +226,13 @@ def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
     ahead = [cause.size * one.model.span for _, one, cause in cases]
     unit, mean = cases[0][1].model.unit, float(np.mean(ahead))
     names = ", ".join(dict.fromkeys(name for name, _, _ in cases))
-    where = _in(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
+    where = in_which(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
     least = min(cause.explains for _, _, cause in cases)
     remedy = f"add {said(mean, unit, True)} to the zero of the angle in the mapping"
     conditions = [one.condition for one in {id(one): one for _, one, _ in cases}.values()]
     if all(one.own_zero for one in conditions) and (entries := zeros_of_files(conditions, [mean] * len(conditions))):
         remedy = f"correct the zeros that the files state: files: [{entries}]"
-    phrases = {"cases": where, "channels": names, "range": _range(ahead, unit), "remedy": remedy}
+    phrases = {"cases": where, "channels": names, "range": extent(ahead, unit), "remedy": remedy}
     yield finding_for("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
 
 
@@ -386,15 +246,15 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
     if off:
         one, of = max(off, key=lambda case: abs(case[1].measured - case[1].model))
         most = f"; the most in {one.condition.name}" if len(off) > 1 else ""
-        phrases = {"cases": _in([case.condition.name for case, _ in off], len(known)), "most": most}
+        phrases = {"cases": in_which([case.condition.name for case, _ in off], len(known)), "most": most}
         figures = {"measured": of.measured, "expanded": of.expanded, "model": of.model}
         yield finding_for("compare.efficiency", "efficiency", severity=None, phrases=phrases, **figures)
     for missing in dict.fromkeys(one.unmeasured for one in found if one.unmeasured):
-        where = _in([one.condition.name for one in found if one.unmeasured == missing], len(found))
+        where = in_which([one.condition.name for one in found if one.unmeasured == missing], len(found))
         phrases = {"cases": where}
         yield finding_for("compare.efficiency_unmeasured", "efficiency", phrases=phrases, missing=list(missing))
     for reason in dict.fromkeys(of.reason for _, of in known if of.reason[0]):
-        where = _in([one.condition.name for one, of in known if of.reason == reason], len(known))
+        where = in_which([one.condition.name for one, of in known if of.reason == reason], len(known))
         phrases = {"cases": where, "reason": reason[0], "remedy": reason[1]}
         yield finding_for("compare.efficiency_unknown", "efficiency", phrases=phrases)
 
@@ -427,7 +287,7 @@ def other_speed(
     if off:
         _, measured, theirs = off[0]
         phrases = {
-            "cases": _in([row[0] for row in off], of), "key": as_key(f"{driver}.speed"),
+            "cases": in_which([row[0] for row in off], of), "key": as_key(f"{driver}.speed"),
             "measured_told": said(measured / size, unit), "model_told": said(theirs / size, unit),
         }  # fmt: skip
         figures = {"measured": measured, "model": theirs, "driver": driver}
@@ -444,7 +304,7 @@ def _answers(found: Sequence[Compared]) -> Iterator[Finding]:
         if cases:
             first, count = cases[0]
             values = " ".join(f"--set {name}={value:.6g}" for name, value in first.condition.values.items())
-            where = _in([one.condition.name for one, _ in cases], len(found))
+            where = in_which([one.condition.name for one, _ in cases], len(found))
             phrases = {"cases": where, "analyse": f"run analyse {values}".rstrip()}
             size = len(first.condition.phase)
             yield finding_for("compare.no_answer", phrases=phrases, count=count, positions=size, status=code.text)

@@ -7,10 +7,12 @@ of its own here: what its numbers are uncertain by is not in the verdict.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError, Status
@@ -18,7 +20,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.rig.comparison.assessment import Verdict, judge, uncertainty_of
 from trunnion.rig.comparison.comparison import ChannelComparison, Compared, Efficient, unmeasured
-from trunnion.rig.comparison.error_sources import best, causes
+from trunnion.rig.comparison.error_sources import STATED, best, beyond_stated, causes
 from trunnion.rig.comparison.result import dataset
 from trunnion.rig.modelled import Modelled, check_settings, modelled
 from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["compare"]
+
+Array = NDArray[np.float64]
 
 
 @renamed(friction="friction_method")
@@ -65,7 +69,8 @@ def compare(
         powers = pairs_of(condition, joints)
         also = _of_powers(powers) if powers else {}
         model = modelled(mechanism, condition, there, method, also)
-        pairs = {name: _pair(condition, model, name, coverage) for name in there}
+        without = _Frictionless(mechanism, condition, there, method)
+        pairs = {name: _pair(condition, model, name, coverage, without) for name in there}
         missing = unmeasured(mechanism, condition) if powers else ()
         whole = powers is not None and not missing and also.keys() <= model.courses.keys()
         efficiency = _efficiency(condition, model, joints, coverage) if whole else None
@@ -100,7 +105,31 @@ def _channels(measurement: Measurement, wanted: Sequence[str] | None) -> dict[st
     return known if wanted is None else {name: known[name] for name in dict.fromkeys(wanted)}
 
 
-def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) -> ChannelComparison:
+@dataclass
+class _Frictionless:
+    """The model of a condition without its friction, analysed where a channel asks for it."""
+
+    mechanism: Mechanism
+    condition: Condition
+    channels: Mapping[str, str]
+    method: FrictionMethod
+
+    @cached_property
+    def courses(self) -> Mapping[str, Array]:
+        """By channel; none where the model has no friction, or has no answer without it."""
+        stated = self.mechanism.with_values(dict(self.condition.values))
+        try:
+            free = stated.with_friction("off")
+            if free.data() == stated.data():
+                return {}
+            return modelled(free, replace(self.condition, values={}), self.channels, self.method).courses
+        except MechanismError:
+            return {}
+
+
+def _pair(
+    condition: Condition, model: Modelled, channel: str, coverage: float, frictionless: _Frictionless
+) -> ChannelComparison:
     course, theirs = condition.courses[channel], model.courses[channel]
     comparable = model.comparable(channel)
     judged = judge(course, theirs, comparable, coverage, model.run.cycle.periodic)
@@ -108,10 +137,13 @@ def _pair(condition: Condition, model: Modelled, channel: str, coverage: float) 
     if judged.verdict not in (Verdict.NOT, Verdict.OFFSET):
         return pair
     where = comparable & np.isfinite(course.mean) & np.isfinite(theirs)
+    free = None if model.measures[channel].of_motion else frictionless.courses.get(channel)
     found = causes(
-        course.mean[where], theirs[where], np.asarray(condition.phase)[where],
-        closed=model.run.cycle.periodic, turning=model.measures[channel].turning(model.run.system),
+        course.mean[where], theirs[where], np.asarray(condition.phase)[where], closed=model.run.cycle.periodic,
+        turning=model.measures[channel].turning(model.run.system), without=None if free is None else free[where],
     )  # fmt: skip
+    stated = course.accuracy.zero, course.accuracy.gain
+    found.sort(key=lambda one: beyond_stated(one, *stated) > STATED)  # such a sensor only where nothing else explains
     random = uncertainty_of(course).random[where]
     noise = float(np.nanmean(random**2)) / judged.rms**2 if np.isfinite(random).any() and judged.rms > 0 else 0.0
     cause, others = best(found, noise)

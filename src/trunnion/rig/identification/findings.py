@@ -11,13 +11,17 @@ from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
 from trunnion.rig.comparison.findings import other_speed, speed_unit
+from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
 from trunnion.rig.identification.misfit import MisfitCause, OwnSize
 from trunnion.rig.identification.number_text import amount, share
+from trunnion.rig.identification.outstanding import Outstanding, outstanding
 from trunnion.rig.identification.uncertainty import RANDOM, quantile
+from trunnion.rig.reading.log import few_digits
 from trunnion.rig.reading.measurement import zeros_of_files
+from trunnion.rig.reading.units_taken import read_as
 
 __all__ = ["sentences"]
 
@@ -85,12 +89,19 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
             "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
         )
         yield from _causes(judged)
+    odd = outstanding(judged) if test.misfit else None
+    if odd is not None:
+        yield _stands_out(odd)
     apart = judged.found.spread.apart
     for p in np.flatnonzero((apart > 1) & ~judged.lost[: problem.count]):
         if any(not one.own for one in judged.found.causes):  # which explain this, too
             break
         where, times = f"parameter {problem.model.unknowns[p].name}", np.sqrt(apart[p])
-        severity, phrases = Severity.WARNING if times > MUCH else None, {"times_told": _times(times)}
+        severity = Severity.WARNING if times > MUCH else None
+        remedy = "look for differences between conditions: settings, speed, temperature, the zero of each file"
+        if odd is not None and odd.others:
+            remedy = f"see {odd.channel} in {odd.condition}, whose residual stands out"
+        phrases = {"times_told": _times(times), "remedy": remedy}
         yield finding_for("fit.conditions_disagree", where, severity=severity, phrases=phrases, times=times)
     single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
@@ -103,6 +114,27 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
     if follows > 2 / np.sqrt(max(pairs, 1)):
         yield finding_for("fit.turns_alike", "data", correlation=follows)
+
+
+def _stands_out(odd: Outstanding) -> Finding:
+    """The condition that a misfit lies in, and where in the cycle."""
+    others = f", in the others up to {few_digits(odd.others)} times" if odd.others else ""
+    figures: dict[str, Any] = {"rms": odd.rms, "expected": odd.expected, "others": odd.others}
+    place = ""
+    if odd.place is not None:
+        start, end = (np.degrees(one) for one in odd.place)
+        place = f"; {share(odd.share)} of its mean square lies from {start:.0f}° to {end:.0f}° of the driver"
+        figures |= {"start": odd.place[0], "end": odd.place[1], "share": odd.share}
+    subject = f"the residual of {odd.channel} in {odd.condition}"
+    phrases = {
+        "subject": f"{subject} stands out" if odd.others else subject,
+        "rms_told": f"RMS {said(odd.rms, odd.unit)}", "times_told": few_digits(odd.times),
+        "others_told": others, "place": place,
+    }  # fmt: skip
+    return finding_for(
+        "fit.stands_out", "fit", phrases=phrases, channel=odd.channel, condition=odd.condition,
+        several=bool(odd.others), **figures,
+    )  # fmt: skip
 
 
 def _causes(judged: Assessment) -> Iterator[Finding]:
@@ -171,12 +203,15 @@ def _story(judged: Assessment, one: MisfitCause) -> str:
     if what is None:
         return f"{KINDS[one.kind]} of {one.channel}"
     if not one.own and one.kind == "gain" and abs(one.size) >= FACTOR:
-        return f"a gain of {one.channel} {amount(1 + one.size, one.expanded, '1')} times its true value"
+        value, as_of = amount(1 + one.size, one.expanded, "1"), _read_as(judged, one)
+        return f"a gain of {one.channel} {value} times its true value{as_of and f' ({as_of})'}"
+    as_of = _read_as(judged, one)
     if not one.own:
-        return f"{what} of {_sized(judged, one, one.size, one.expanded)}"
+        return f"{what} of {_sized(judged, one, one.size, one.expanded)}{as_of and f' ({as_of})'}"
     odd, others = _apart(one)
     told = [f"{_condition(judged, own)}: {_sized(judged, one, own.size, own.expanded)}" for own in odd[:MOST_TOLD]]
     told += [f"{len(odd) - MOST_TOLD} more conditions"] * (len(odd) > MOST_TOLD)
+    told += [as_of] * bool(as_of)
     rest = "the other" if len(others) == 1 else "the others"
     beyond = [abs(own.size) for own in others if abs(own.size) > own.expanded]
     if beyond:
@@ -187,12 +222,23 @@ def _story(judged: Assessment, one: MisfitCause) -> str:
     return f"{what} {alone} ({'; '.join(told)})"
 
 
+def _read_as(judged: Assessment, one: MisfitCause) -> str:
+    """The unit that another was taken for, where a wrong gain is near the ratio of the two; else empty."""
+    course = next((block.course for block in judged.problem.blocks if block.channel == one.channel), None)
+    if one.kind != "gain" or course is None:
+        return ""
+    sizes = [own.size for own in _apart(one)[0]] if one.own else [one.size]
+    return read_as([1 + size for size in sizes], *course.shown)
+
+
 def _sized(judged: Assessment, one: MisfitCause, size: float, expanded: float | None) -> str:
     """A size of a cause with its U and unit."""
     unit, factor = {"shift": ("rad", 1.0), "delay": ("ms", 1e3), "gain": ("%", 100.0)}.get(
         one.kind, (_unit_of(judged, one.channel), 1.0)
     )
-    return amount(size * factor, None if expanded is None else expanded * factor, unit).replace(" °", "°")
+    if expanded is None:
+        return f"{few_digits(np.degrees(size))}°" if unit == "rad" else f"{few_digits(size * factor)} {unit}"
+    return amount(size * factor, expanded * factor, unit).replace(" °", "°")
 
 
 def _speeds(judged: Assessment) -> Iterator[Finding]:

@@ -63,6 +63,15 @@ class Clock:
         clock._pieces.append((days[places], within[places]))
         return clock
 
+    def known(self) -> NDArray[np.bool_]:
+        """Which cells are times."""
+        return np.concatenate([within != NOT for _, within in self._pieces])
+
+    def cut(self, rows: int) -> None:
+        """Keep the first rows only."""
+        days, within = (np.concatenate(part)[:rows] for part in zip(*self._pieces, strict=True))
+        self._pieces = [(days, within)]
+
     def seconds(self) -> NDArray[np.float64]:
         """Seconds since the first, NaN where there is none; ValueError, in words, where the dates tell no order.
 

@@ -40,13 +40,15 @@ class Column:
 class DataTable:
     """The columns of a file that were asked for, all of one length.
 
-    interval: (start, step) of evenly spaced samples in s, if the file itself tells; line: of the first row of a text.
+    interval: (start, step) of evenly spaced samples in s, if the file itself tells; ends: lines of text below the last
+    row of numbers, by their number in the file.
     """
 
     file: str
     columns: Mapping[str, Column]
     interval: tuple[float, float] | None = None
     notes: Sequence[str] = field(default_factory=tuple)
+    ends: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:

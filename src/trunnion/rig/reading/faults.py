@@ -5,6 +5,7 @@ left out, except where nothing tells for certain; what comes back in the same pl
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.special import bdtrc
 
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.rig.reading.arcs import arcs
 from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.log import Account, counted, places, runs
 
@@ -27,17 +29,27 @@ FAR = 12.0  # robust standard deviations from it
 NEAR = 0.01  # of a turn: what recurs that close is in the same place
 CHANCE = 0.025
 FEW = 4  # turns from which what comes back can be told from faults
+JUMP = 0.25  # of the same span: a signal that comes to its extreme by such steps is not clipped there
+MOST_ARCS = 3  # ranges of the angle named
 SEEN = 0.1  # of the span from the 1st to the 99th percentile, that a spike or a fall to zero exceeds
 
 
 @dataclass(frozen=True)
 class FaultSpan:
-    """The rows in which the drive runs, and when its turns begin and end there, s."""
+    """The rows in which the drive runs, and when its turns begin and end there, s.
+
+    angle: coordinate of the driver by row of the file, rad, None where the cycle is a time; start, cycle: rad; unit: of
+    the readings.
+    """
 
     low: int
     high: int
     begin: Array
     end: Array
+    angle: Array | None = None
+    start: float = 0.0
+    cycle: float = 2 * np.pi
+    unit: str = ""
 
     @property
     def turns(self) -> int:
@@ -103,8 +115,7 @@ def signal(
         _clipped(where, part, time, limit, account)
     _zeros(where, part, time, wide, span, account)
     _stuck(where, part, time, span, account)
-    if limit is None:
-        _plateaus(where, part, time, account)
+    _plateaus(where, part, time, wide, span, limit, account)
     _spikes(where, part, time, wide, span, account)
 
 
@@ -161,31 +172,57 @@ def _clipped(where: str, part: Array, time: Array, limit: float, account: Accoun
         _leave_out(part, mask)
 
 
-def _plateaus(where: str, part: Array, time: Array, account: Account) -> None:
-    """Readings that gather at the largest or least one, as they do at an end of the range that nobody stated."""
+def _plateaus(
+    where: str, part: Array, time: Array, wide: float, span: FaultSpan, limit: float | None, account: Account
+) -> None:
+    """Readings that gather at the largest or least one, as at an end of the range that is not the one stated."""
     finite = part[np.isfinite(part)]
     if not finite.size:
         return
     for end in (float(finite.max()), float(finite.min())):
-        at = int(np.count_nonzero(finite == end))
-        if end == 0 or at < max(5, 2e-4 * finite.size):
-            continue
         mask = part == end
-        _, lengths = runs(mask)
-        others = finite[finite != end]
-        if not others.size:  # the rest was left out as something else
+        at = int(np.count_nonzero(mask))
+        if end == 0 or at < max(5, 2e-4 * finite.size) or not _gathers(part, mask, wide, finite):
             continue
-        beside = others.max() if end == finite.max() else others.min()
-        if lengths.max() >= 3 and at > 5 * np.count_nonzero(others == beside) and np.mean(lengths) > 1.5:
-            what = (
-                f"seems clipped at {end:.6g} in the unit of the readings: {at:,} of {part.size:,}, {places(mask, time)}"
-            )
-            account.warn(
-                "data.readings.plateau",
-                where,
-                what,
-                "state range: if it is the end of the sensor's, and use a larger one",
-            )
+        value = f"{end:.6g} {span.unit}" if span.unit else f"{end:.6g} in the unit of the readings"
+        what = f"seems clipped at {value}: {at:,} of {part.size:,}, {places(mask, time)}{_angles(mask, span)}"
+        channel, own = where.removeprefix("channels."), f"{abs(end):.6g} {span.unit}".strip()
+        remedy = "state range: if it is the end of the sensor's, and use a larger one"
+        if limit is not None:
+            stated = f"{limit:.6g} {span.unit}".strip()
+            entry = f"files: [{{file: {Path(account.file).name}, channels: {{{channel}: {{range: {own}}}}}}}]"
+            remedy = f"the range: of {stated} is not reached; if the amplifier ended here, state {entry}"
+        account.warn("data.readings.plateau", where, what, remedy)
+
+
+def _gathers(part: Array, mask: Mask, wide: float, finite: Array) -> bool:
+    """Whether far more readings are at an extreme than beside it, in a row, and the signal does not jump to it.
+
+    A load that changes its sign at once jumps from one extreme to the other, and is not clipped.
+    """
+    end = float(part[mask][0])
+    others = finite[finite != end]
+    if not others.size:  # the rest was left out as something else
+        return False
+    beside = others.max() if end == finite.max() else others.min()
+    starts, lengths = runs(mask)
+    if lengths.max() < 3 or np.mean(lengths) <= 1.5 or np.count_nonzero(mask) <= 5 * np.count_nonzero(others == beside):
+        return False
+    around = np.concatenate([starts[starts > 0] - 1, (starts + lengths)[starts + lengths < part.size]])
+    steps = np.abs(part[around] - end)
+    steps = steps[np.isfinite(steps)]
+    return not steps.size or float(np.median(steps)) < JUMP * wide
+
+
+def _angles(mask: Mask, span: FaultSpan) -> str:
+    """At which angles of the driver a mask is true, in words; empty where the cycle is a time or it is all around."""
+    if span.angle is None:
+        return ""
+    found = arcs(span.angle[span.low : span.high][mask], span.start, span.cycle)
+    if not found or found == [(span.start, span.start + span.cycle)] or len(found) > MOST_ARCS:
+        return ""
+    told = " and ".join(f"{np.degrees(low):.0f}° to {np.degrees(high):.0f}°" for low, high in found)
+    return f", with the driver at {told}"
 
 
 def _zeros(where: str, part: Array, time: Array, wide: float, span: FaultSpan, account: Account) -> None:

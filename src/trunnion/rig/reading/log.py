@@ -18,12 +18,16 @@ FILES = 4  # named in a sentence
 
 @dataclass
 class Account:
-    """Findings about one data file, and what was done to its data. recorded: turns that the driver goes through."""
+    """Findings about one data file, and what was done to its data.
+
+    recorded: turns that the driver goes through; left_out: whole ones that are not used.
+    """
 
     file: str
     findings: list[Finding] = field(default_factory=list)
-    done: dict[str, list[float]] = field(default_factory=dict)
+    done: dict[str, list[float | str]] = field(default_factory=dict)
     recorded: float = 0.0
+    left_out: int = 0
 
     def warn(self, code: str, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
         """A fault of the data."""
@@ -37,7 +41,7 @@ class Account:
         """Why there is no result of this part."""
         self.warn(code, where, what, remedy, Severity.ERROR)
 
-    def say(self, sentence: str, value: float | None = None) -> None:
+    def say(self, sentence: str, value: float | str | None = None) -> None:
         """Something that was done; `{}` in the sentence stands for a value, which may differ from file to file."""
         self.done.setdefault(sentence, []).extend([] if value is None else [value])
 
@@ -53,13 +57,22 @@ def told(accounts: Sequence[Account]) -> list[str]:
     found = []
     for sentence in sentences:
         said = [one for one in accounts if sentence in one.done]
-        values = [value for one in said for value in one.done[sentence]]
-        low, high = (few_digits(limit(values)) for limit in (min, max)) if values else ("", "")
+        values = [(value, Path(one.file).name) for one in said for value in one.done[sentence]]
+        low, high = _ends(values) if values else ("", "")
         text = sentence.replace("{}", low if low == high else f"{low} to {high}")
         names = [Path(one.file).name for one in said]
         most = ", ".join(names[:FILES]) + (f" and {len(names) - FILES} more" if len(names) > FILES else "")
         found.append(text if len(said) == len(accounts) else f"{most}: {text}")
     return found
+
+
+def _ends(values: Sequence[tuple[float | str, str]]) -> tuple[str, str]:
+    """The least and the largest of numbers; the first and the last of texts, with their files where they differ."""
+    numbers = [value for value, _ in values if not isinstance(value, str)]
+    if len(numbers) == len(values):
+        return few_digits(min(numbers)), few_digits(max(numbers))
+    (first, file), (last, other) = values[0], values[-1]
+    return (str(first), str(last)) if first == last else (f"{first} in {file}", f"{last} in {other}")
 
 
 def runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

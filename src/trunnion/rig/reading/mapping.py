@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
+from pydantic_core import PydanticCustomError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part, forms, problem
@@ -93,20 +94,6 @@ class FileAngle(Part):
     """The angle in one data file: its zero, in place of that of `angle`."""
 
     zero: FixedAngle
-
-
-class File(Part):
-    """A data file, what was set while it was recorded, the stretch of time that is used, its zero of the angle."""
-
-    file: str = Field(min_length=1)
-    set: Mapping[str, Setting] = {}
-    over: tuple[Number, Number] | None = None
-    angle: FileAngle | None = None
-
-    @model_validator(mode="after")
-    def _ordered(self) -> File:
-        _check_spans([self.over] if self.over else [])
-        return self
 
 
 class TimeBase(Part):
@@ -193,6 +180,12 @@ class Zero(Part):
         return self
 
 
+ChannelZero = Annotated[
+    Annotated[Zero, Tag(":group")] | Annotated[Number, Tag(":value")],
+    forms("a number with its unit, or {over: [0 s, 0.5 s]}"),
+]
+
+
 class Accuracies(Part):
     """Standard uncertainties of a sensor: of its gain, relative, and of its zero."""
 
@@ -217,10 +210,7 @@ class Channel(Part):
     unit: UnitText | None = None
     gain: Number | None = None
     sign: Sign = 1
-    zero: Annotated[
-        Annotated[Zero, Tag(":group")] | Annotated[Number, Tag(":value")],
-        forms("a number with its unit, or {over: [0 s, 0.5 s]}"),
-    ] = Amount(0.0, 0.0, "", {})
+    zero: ChannelZero = Amount(0.0, 0.0, "", {})
     range: Number | None = None
     accuracy: Accuracies = Accuracies()
 
@@ -242,6 +232,39 @@ class Channel(Part):
         except UnitError as error:
             raise problem(error.what, error.remedy) from None
         return found
+
+
+class FileChannel(Part):
+    """A channel in one data file, as of another setting of its amplifier: what it states in place of the channel's."""
+
+    unit: UnitText | None = None
+    gain: Number | None = None
+    zero: ChannelZero | None = None
+    range: Number | None = None
+    accuracy: Accuracies | None = None
+
+    def of(self, channel: Channel) -> Channel:
+        """The channel as it is in the file; an error of pydantic if the two do not go together."""
+        stated = {key: getattr(self, key) for key in type(self).model_fields if getattr(self, key) is not None}
+        found = channel.model_copy(update=stated)
+        if found.unit is not None:
+            found.scale(found.unit)
+        return found
+
+
+class File(Part):
+    """A data file, what was set while it was recorded, the time of it that is used, its zero of the angle, channels."""
+
+    file: str = Field(min_length=1)
+    set: Mapping[str, Setting] = {}
+    over: tuple[Number, Number] | None = None
+    angle: FileAngle | None = None
+    channels: Mapping[Name, FileChannel] = {}
+
+    @model_validator(mode="after")
+    def _ordered(self) -> File:
+        _check_spans([self.over] if self.over else [])
+        return self
 
 
 class Filter(Part):
@@ -269,10 +292,16 @@ class DataMapping(Part):
     drift: Literal["report", "remove"] = "report"
 
     def of_file(self, entry: File) -> DataMapping:
-        """The same with what a file states of its own angle."""
-        if entry.angle is None or self.angle is None:
-            return self
-        return self.model_copy(update={"angle": self.angle.model_copy(update={"zero": entry.angle.zero})})
+        """The same with what a file states of its own angle and its own channels."""
+        changes: dict[str, Any] = {}
+        if entry.angle is not None and self.angle is not None:
+            changes["angle"] = self.angle.model_copy(update={"zero": entry.angle.zero})
+        if entry.channels:
+            changes["channels"] = {
+                name: entry.channels[name].of(one) if name in entry.channels else one
+                for name, one in self.channels.items()
+            }
+        return self.model_copy(update=changes) if changes else self
 
     @property
     def timed(self) -> bool:
@@ -344,6 +373,7 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
         if file.angle is not None and mapping.angle is None:
             what = "states a zero of the angle, but no column gives an angle"
             yield Finding(what, f"files.{number}.angle", "add angle: {from: …}, or remove it")
+        yield from _check_channels(file, f"files.{number}.channels", channels)
     source = mapping.angle.channel if mapping.angle else None
     if source is not None and source not in channels:
         yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
@@ -354,6 +384,19 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
     if mapping.filter and base and base.rate and 2 * mapping.filter.cut_off.value >= base.rate.value:
         what = f"a cut-off of {mapping.filter.cut_off.value:g} Hz, samples come at {base.rate.value:g} Hz"
         yield Finding(what, "filter.cut_off", f"write less than half of that, {base.rate.value / 2:g} Hz")
+
+
+def _check_channels(file: File, where: str, channels: Mapping[str, Channel]) -> Iterator[Finding]:
+    """Channels of one file that are none of the mapping, or do not go together with it."""
+    for name, own in file.channels.items():
+        if name not in channels:
+            yield Finding(f"there is no channel '{name}'", f"{where}.{name}", nearest(name, channels))
+            continue
+        try:
+            own.of(channels[name])
+        except PydanticCustomError as error:
+            told = error.context or {}
+            yield Finding(error.message(), f"{where}.{name}", str(told.get("remedy", "")))
 
 
 def _outside(mapping: DataMapping, folder: Path) -> Iterator[Finding]:

@@ -67,7 +67,7 @@ def read_measured(
         name,
         tuple(_distinct(conditions)),
         tuple(findings),
-        (_averaged(conditions, sum(one.recorded for one in accounts)), *told(accounts)),
+        (_averaged(conditions, accounts), *told(accounts)),
     )
 
 
@@ -78,14 +78,17 @@ def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]
     return [mapping, *named]
 
 
-def _averaged(conditions: Sequence[Condition], recorded: float) -> str:
+def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> str:
     """How many turns there are, and of how many if some are not used."""
+    recorded, lost = sum(one.recorded for one in accounts), sum(one.left_out for one in accounts)
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
     if sum(counts) < recorded - 2 * len(counts):
         where += f", {sum(counts):,}" if len(counts) > 1 else ""
         where += f" of {recorded:,.0f} recorded"
+    elif lost:
+        where += f", {lost:,} more left out as the findings say"
     return f"{each} whole turns{where}; rows before, between and after them are not used"
 
 
@@ -146,7 +149,8 @@ def _unused_zero(mapped: Mapped, entries: Sequence[File]) -> list[Finding]:
 
 def _says(*entries: File) -> str:
     """What entries state of their files."""
-    return " and ".join(f"`{key}`" for key in ("set", "over", "angle") if any(getattr(one, key) for one in entries))
+    keys = ("set", "over", "angle", "channels")
+    return " and ".join(f"`{key}`" for key in keys if any(getattr(one, key) for one in entries))
 
 
 def _some(paths: Sequence[Path]) -> str:
@@ -186,11 +190,17 @@ class _File:
         table = _table(path, mapping, entry)
         for note in table.notes:
             account.say(note)
+        for number, text in table.ends.items():
+            what = f"the line below the numbers is left out: '{text[:60]}'"
+            account.findings.append(
+                Finding(what, "", "", Severity.NOTE, file=account.file, line=number, code="data.rows.end")
+            )
         self.line: Timeline = timeline(table, mapping.time, account)
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
         self.lag, self.step = 0.0, 0.0
+        self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
@@ -272,7 +282,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.step = found.lag, found.step
+        self.lag, self.step, self.angle = found.lag, found.step, found.values
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"
@@ -365,7 +375,8 @@ class _File:
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
         begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
         low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
-        span = faults.FaultSpan(low, high, begin, end)
+        start, cycle = float(mapping.start.evaluate()), float(mapping.cycle.evaluate())
+        span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit)
         readings = self.readings.pop(name)
         self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
         speed = channel.measures.startswith("rate:")

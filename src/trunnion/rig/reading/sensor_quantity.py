@@ -19,6 +19,7 @@ from pydantic_core import core_schema
 from trunnion.model.entry import problem
 from trunnion.model.expression import normalise
 from trunnion.model.names import nearest
+from trunnion.model.unit_spellings import pound_feet
 from trunnion.model.units import UnitError, root, si_unit, unit
 from trunnion.rig.reading.clock import is_time
 
@@ -83,8 +84,9 @@ class Amount:
 
 def dimensions(text: str) -> tuple[float, Dimensions]:
     """Factor to SI and exponents by base unit; UnitError for what is no unit, or one that may mean turns or radians."""
+    written = pound_feet(normalise(text))
     try:
-        factor, exponents, names = root(normalise(text))
+        factor, exponents, names = root(written)
     except UnitError as error:
         near = nearest(text, _USUAL)
         near = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
@@ -93,7 +95,7 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
         raise UnitError(f"the unit '{text}' is not one of a sensor", "use units of mechanics, volts, ampere or kelvin")
     pulses = any(name.endswith("hertz") for name in names) and exponents and exponents.keys() <= _COUNTED
     if not {"ampere", "kelvin"} & exponents.keys() and exponents != HERTZ and not pulses:
-        unit(normalise(text))
+        unit(written)
     return float(factor), exponents
 
 

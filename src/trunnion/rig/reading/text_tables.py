@@ -13,8 +13,9 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Container, Sequence
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ _QUOTED = re.compile(r'"[^"]*"')
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _NO_UNIT = ("", "-", "–", "1")
 GERMAN = ("Grad", "U/min", "Umin", "Umdr./min")  # units in headings, if not all are read without the mapping's word
+MOST_BELOW = 5  # lines of words below the numbers
 MOST_ABOVE = 3  # rows of units and remarks between names and numbers
 
 
@@ -81,8 +83,37 @@ def read_csv(path: Path, wanted: Sequence[str], optional: Sequence[str]) -> Data
     for name in places:
         values = np.concatenate(pieces.pop(name) or [np.empty(0)])
         columns[name] = Column(values, units[name], texts[name], examples[name], clocks.get(name))
+    columns, ends = _without_end(path, layout, columns, places)
     notes = [] if layout.encoding.startswith("utf-8") else [f"read in the encoding {layout.encoding}"]
-    return DataTable(str(path), columns, notes=notes)
+    return DataTable(str(path), columns, notes=notes, ends=ends)
+
+
+def _without_end(
+    path: Path, layout: _Layout, columns: dict[str, Column], places: Mapping[str, int]
+) -> tuple[dict[str, Column], dict[int, str]]:
+    """The columns without lines of words below the last row of numbers, as loggers write them, and these lines."""
+    known = [np.isfinite(one.values) | (one.clock.known() if one.clock else False) for one in columns.values()]
+    rows = np.flatnonzero(np.any(known, axis=0)) if known else np.empty(0)
+    extra = known[0].size - int(rows[-1]) - 1 if rows.size else 0
+    if not 0 < extra <= MOST_BELOW:
+        return columns, {}
+    last: deque[tuple[int, str]] = deque(maxlen=extra)
+    with path.open(encoding=layout.encoding, errors="replace") as file:
+        for number_of_line, line in enumerate(file, 1):
+            if line.strip() and not line.lstrip().startswith("#"):
+                last.append((number_of_line, line.strip()))
+    cells = [_cells(line, layout.separator) for _, line in last]
+    if not all(_words(row) for row in cells):
+        return columns, {}
+    found = {}
+    for name, one in columns.items():
+        own = [row[places[name]] for row in cells if len(row) > places[name]]
+        texts = one.texts - sum(bool(cell) and cell.casefold() not in NOTHING for cell in own)
+        if one.clock is not None:
+            one.clock.cut(one.values.size - extra)
+        example = one.example if texts else ""
+        found[name] = replace(one, values=one.values[:-extra], texts=texts, example=example)
+    return found, {place: " ".join(filter(None, row)) for (place, _), row in zip(last, cells, strict=True)}
 
 
 def _check_signs(path: Path, name: str, cells: Any) -> None:

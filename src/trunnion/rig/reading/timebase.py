@@ -78,7 +78,7 @@ def _by_clock(clock: Clock, account: Account) -> Array:
     except ValueError as error:
         remedy = "write them as 2026-11-22 11:40:00.0002, or state time: {rate: …}"
         raise MechanismError(Finding(str(error), "time.column", remedy, file=account.file)) from None
-    account.say(f"time is counted in s from the first time stamp, {clock.first}")
+    account.say("time is counted in s from the first time stamp, {}", clock.first)
     return seconds
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.log import Account, counted
+from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.timebase import GAP, Timeline
 
 __all__ = ["Turns", "cut", "resampled", "time_mean", "turn_means"]
@@ -71,17 +71,7 @@ def cut(
     if numbers.size:
         usual = float(np.median(lengths))
         odd = np.abs(lengths / usual - 1) > APART
-        if count := int(np.count_nonzero(odd)):
-            low, high = lengths[odd].min(), lengths[odd].max()
-            span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
-            what = f"{counted(count, 'turn')} of {numbers.size} {'lasts' if count == 1 else 'last'} {span}"
-            what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
-            account.note(
-                "data.turns.unusual",
-                where,
-                what,
-                "the drive starts, stops or is at rest there; use files: over: to select the steady part",
-            )
+        _tell_unusual(begin, end, odd, line, account, where)
         keep &= ~odd
     if len(spoilt):
         hit = np.zeros(numbers.size, dtype=np.bool_)
@@ -89,9 +79,41 @@ def cut(
             slack = min(line.step, 0.25 * (high - low))  # an index may lie where a turn begins
             hit |= (begin <= high - slack) & (end >= low + slack)
         keep &= ~hit
+        account.left_out += int(np.count_nonzero(hit & ~odd)) if numbers.size else 0
     numbers, begin, end = numbers[keep], begin[keep], end[keep]
     rows = _rows_of(share, numbers, begin, end, line, known & allowed, positions)
     return Turns(share, numbers, begin, end, rows, positions, line, window)
+
+
+def _tell_unusual(begin: Array, end: Array, odd: Mask, line: Timeline, account: Account, where: str) -> None:
+    """Tell of turns that last too long or too short: over a gap in time, or as the drive does not run evenly."""
+    lengths = end - begin
+    usual = float(np.median(lengths))
+    gaps = line.seconds[line.breaks]
+    first = np.searchsorted(gaps, begin)
+    over = odd & (np.searchsorted(gaps, end + line.step) > first)  # a turn that a gap cuts, and those gone in it
+    if count := int(np.count_nonzero(over)):
+        gone = int(np.sum(np.maximum(np.rint(lengths[over] / usual), 1)))
+        account.left_out += gone
+        at = line.breaks[first[over]]
+        longest = float(np.max(line.seconds[at] - line.seconds[at - 1]))
+        span = f"{counted(count, 'gap')} in time, the longest {longest:.3g} s, {times(line.seconds[at - 1])}"
+        unknown = f"{'leaves' if count == 1 else 'leave'} the angle unknown"
+        what = f"{span}, {unknown}; {counted(gone, 'turn')} left out"
+        account.note("data.turns.gap", where, what, "check the logger's buffer, or record again")
+    odd = odd & ~over
+    if count := int(np.count_nonzero(odd)):
+        account.left_out += count
+        low, high = lengths[odd].min(), lengths[odd].max()
+        span = f"{low:.4g} to {high:.4g} s" if count > 1 else f"{low:.4g} s"
+        what = f"{counted(count, 'turn')} of {odd.size} {'lasts' if count == 1 else 'last'} {span}"
+        what = f"{what} where {usual:.4g} s is usual, and {'is' if count == 1 else 'are'} left out"
+        account.note(
+            "data.turns.unusual",
+            where,
+            what,
+            "the drive starts, stops or is at rest there; use files: over: to select the steady part",
+        )
 
 
 def _whole(share: Array, highest: Array, line: Timeline) -> tuple[Array, Array, NDArray[np.intp]]:

@@ -17,17 +17,19 @@ def tables(measurement: Measurement) -> list[TextTable]:
     """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
     conditions = measurement.conditions
     channels = list(conditions[0].courses)
+    units = {name: conditions[0].courses[name].shown for name in channels}  # of all files, whatever a file is in
     speeds = np.isfinite([one.speed for one in conditions]).any()
     named, short = shortened([one.name for one in conditions])
     settings = [named] if named == "condition" else named.split(", ")
     head = [*settings, "turns", *(["speed rpm"] if speeds else [])]
-    head += [f"{name} {_unit(conditions[0].courses[name].shown[0])}".strip() for name in channels]
+    head += [f"{name} {_unit(units[name][0])}".strip() for name in channels]
     rows = []
     for one, name in list(zip(conditions, short, strict=True))[:MOST]:
         turns = max(course.turns.shape[0] for course in one.courses.values())
         speed = [f"{one.speed * 30 / np.pi:.5g}"] if speeds else []
         own = [name] if named == "condition" else [part.replace(" ", "\u00a0") for part in name.split(", ")]
-        rows.append([*own, f"{turns:,}", *speed, *(_figure(_overall(one.courses[key])) for key in channels)])
+        means = (_figure(_overall(one.courses[key], units[key][1])) for key in channels)
+        rows.append([*own, f"{turns:,}", *speed, *means])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
     shown = [TextTable(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
@@ -47,10 +49,11 @@ def _channel(courses: list[Signal]) -> list[str]:
     return [courses[0].measures, _unit(unit), *extremes, *(_figure(_rms(one) / factor, 3) for one in spreads)]
 
 
-def _overall(course: Signal) -> float:
+def _overall(course: Signal, size: float) -> float:
+    """Mean over the positions, in a unit of a size in SI."""
     known = course.mean[np.isfinite(course.mean)]
     with np.errstate(over="ignore"):
-        return float(known.mean()) / course.shown[1] if known.size else np.nan
+        return float(known.mean()) / size if known.size else np.nan
 
 
 def _rms(values: np.ndarray) -> float:

@@ -246,8 +246,8 @@ def _locked(
     joints = [name for name in module.joints if name in rubbing(system)]
     reverse, decides, multiple = "", "", None
     if near is not None:
-        both = near.locked & near.back.locked
-        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.locked) else "some"
+        both = near.ahead.locked & near.back.locked
+        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.ahead.locked) else "some"
         responsible = near.responsible()
         if responsible and responsible[0] in module.joints:
             decides, multiple = responsible

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
-from trunnion.cycle.locking_states import cells, ranges_of, states
+from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, Status
@@ -353,7 +353,7 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),
          "first": one.first, "count": one.last - one.first + 1}
-        for one in ranges_of(states(near.locked, near.back, known), margin)
+        for one in ranges_of(in_order(near.ahead, near.back, known), margin)
     ]  # fmt: skip
     return {"locking_ranges": {"of": dial.of, "positions": len(near.times), "rows": rows}}
 

@@ -264,3 +264,14 @@ def test_states_are_flags_with_meanings() -> None:
     assert words == [one.name.lower() for one in LockingState]
     columns = trunnion.analyse(hoist(), 12)
     assert "locking_state" not in columns
+
+
+def test_joints_whose_friction_is_zero_are_not_named() -> None:
+    """Neither where a joint is at rest nor among the multiples of single joints."""
+    for friction, named in ((0.0, ["A"]), (0.1, ["A", "H"])):
+        data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
+        for joint in ("H", "K"):
+            data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": friction if joint == "H" else 0.0}
+        run = prepare(Mechanism(**data))
+        names = {one.name.partition(".")[0] for one in report_figures(run, look(run, 8)) if "critical" in one.name}
+        assert names == set(named)

@@ -39,7 +39,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_springs
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.system import Dial, rubbing
+from trunnion.solve.system import Dial, felt, rubbing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -164,7 +164,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
         return [Figure("locking_margin", "locking margin (no joint has friction)", None)]
     margin = found["locking_margin"].values
     figures = [least_margin("locking_margin", "locking margin, all friction together", margin, dial)]
-    for joint in rubbing(run.system):
+    for joint in felt(run.system, run.values):
         figures += _of_joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
     more = found["other_solutions"].values
     if np.any(more > 0):

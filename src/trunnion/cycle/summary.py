@@ -29,7 +29,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated
-from trunnion.solve.system import Dial, System, rubbing
+from trunnion.solve.system import Dial, System, felt, rubbing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -173,8 +173,9 @@ def _over_the_cycle(
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near
-    )
+        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near,
+        felt(run.system, run.values),
+    )  # fmt: skip
     found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
     several = len(spans) > 1 or run.system.mechanism.gears

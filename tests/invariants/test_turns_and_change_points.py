@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 
 import trunnion
 from mechanisms import MODELS, build, five_bar, four_bar, watt_six_bar
@@ -23,6 +24,49 @@ def test_a_change_point_is_an_error_not_a_silent_change_of_assembly() -> None:
     data["assembly"] = {"C": [1.16, 0.25]}
     errors = [row for row in findings(trunnion.analyse(build(data), 7)) if row["severity"] == "error"]
     assert [row["figures"]["places"] for row in errors if row["code"] == "assembly.change_point"] == [["180°", "360°"]]
+
+
+def test_assemblies_that_coincide_over_a_range_are_told_by_its_ends() -> None:
+    """Coupler and rocker lie on the crank at every angle: A and D are at one place, and their lengths add up to it."""
+    data = four_bar(0.04, 0.025, 0.015, 0.04)
+    data["links"]["ground"]["points"]["D"] = [0.0, 0.0]
+    data["assembly"] = {"C": [0.015, 0.0]}
+    (told,) = [row for row in findings(trunnion.analyse(build(data), 7)) if row["code"] == "assembly.change_point"]
+    assert told["figures"]["places"] == ["between 0° and 360°"]
+
+
+CLAMP = """
+trunnion: 1
+gravity: [0, 0]
+links:
+  ground: {points: {A: [0, 0], D: [-25 mm, -35 mm], G: [-600 mm, 128 mm]}}
+  arm: {points: {A: [0, 0], B: [-25 mm, 8 mm]}}
+  handle: {points: {B: [0, 0], C: [22 mm, 0], H: [-120 mm, 0]}}
+  link: {points: {C: [0, 0], D: [21 mm, 0]}}
+  barrel: {points: {G: [0, 0], Z: {at: [400 mm, 0], axis: [1, 0]}}}
+  rod: {points: {Z: {at: [-175 mm, 0], axis: [1, 0]}, H: [0, 0]}}
+joints:
+  A: {type: revolute, links: [ground, arm]}
+  B: {type: revolute, links: [arm, handle]}
+  C: {type: revolute, links: [handle, link]}
+  D: {type: revolute, links: [ground, link]}
+  G: {type: revolute, links: [ground, barrel]}
+  H: {type: revolute, links: [handle, rod]}
+  Z: {type: prismatic, links: [barrel, rod]}
+assembly: {C: [-15 mm, -16 mm], B: [-26 mm, 3 mm]}
+"""
+
+
+@pytest.mark.parametrize(("low", "high", "start"), [(-90, 0, True), (0, -90, False)])
+def test_positions_without_an_assembly_are_told_whether_the_start_is_among_them(
+    low: int, high: int, start: bool
+) -> None:
+    """They are not said to be out of reach from a start that does not close itself."""
+    driver = {"range": [f"{low} mm", f"{high} mm"], "speed": f"{100 if high > low else -100} mm/s"}
+    model = trunnion.Mechanism.model_validate(yaml.safe_load(CLAMP) | {"drivers": {"Z": driver}})
+    (told,) = [row for row in findings(trunnion.analyse(model, 60)) if row["code"] == "assembly.open"]
+    assert told["figures"]["start"] is start
+    assert ("from the start" in told["what"]) != start
 
 
 @pytest.mark.spread(5)

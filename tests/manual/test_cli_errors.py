@@ -58,6 +58,9 @@ def test_what_play_does_and_whether_it_assembles(program: Run) -> None:
     done = program("play", FOUR_BAR)
     assert done.code == 0
     assert "worst case" in done.out
+    done = program("play", FOUR_BAR, "--at", "60deg", "--out", "play.csv")
+    assert done.code == 0
+    assert len(Path("play.csv").read_text(encoding="utf-8").splitlines()) == 2
     done = program("assemble", EXAMPLES / "misaligned-fourbar.yaml", "--steps", 24)
     assert done.code == 0
     assert "smallest clearance" in done.out

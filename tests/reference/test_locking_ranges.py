@@ -11,8 +11,9 @@ import trunnion
 from mechanisms import eccentric_press
 from mechanisms_parts import Data, revolute
 from trunnion import Mechanism, Status
-from trunnion.cycle.locking import LockingState, locking, look, ranges
+from trunnion.cycle.locking import LockingState, locking, look, ranges, report_figures
 from trunnion.cycle.locking_ends import ends
+from trunnion.cycle.locking_states import NO_MARGIN
 from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 
@@ -35,33 +36,103 @@ def states(found: xr.Dataset) -> np.ndarray:
 
 
 def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
-    """Backdriven while the load's arm L cos θ exceeds f r, self-locking from there to the top, pulled on behind it."""
+    """Backdriven while the load's arm L cos θ exceeds f r, self-locking from there to the top and behind it, pulled on
+    where the arm is below −f r: there the drive effort, which is positive before, is negative."""
     found = locking(hoist(), 401)
     arm = ARM * np.cos(np.radians(found["drive"].values))
-    expected = np.where(
-        arm > FRICTION * RADIUS,
-        LockingState.BACKDRIVABLE,
-        np.where(arm > 0, LockingState.SELF_LOCKING, LockingState.RUNS),
-    )
-    np.testing.assert_array_equal(states(found), expected)
-    pushed = states(found) != LockingState.RUNS
+    np.testing.assert_array_equal(states(found), expected_states(arm))
+    np.testing.assert_array_equal(states(found) == LockingState.DRIVEN_ON, found["drive_effort"].values[0] < 0)
+    pushed = arm > 0
     efficiency = found["efficiency_reverse_instant"].values
     np.testing.assert_allclose(efficiency[pushed], 1 - FRICTION * RADIUS / arm[pushed], rtol=1e-9)
     assert np.all(np.isnan(efficiency[~pushed]))
-    first, second, third = ranges(found)
-    assert [one.state for one in (first, second, third)] == [
-        LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.RUNS,
+    first, second, third, fourth = ranges(found)
+    assert [one.state for one in (first, second, third, fourth)] == [
+        LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON,
     ]  # fmt: skip
     angle = found["drive"].values
     limit = np.degrees(np.arccos(FRICTION * RADIUS / ARM))
     assert angle[first.last] < limit < angle[second.first]
     assert second.last + 1 == third.first
-    assert third.last == 400
+    assert angle[third.last] < 180 - limit < angle[fourth.first]
+    assert fourth.last == 400
+
+
+def expected_states(arm: np.ndarray) -> np.ndarray:
+    """Of a load with this arm about a pin, in m, positive where it pulls backward."""
+    hold = FRICTION * RADIUS
+    conditions = [arm > hold, arm > 0, arm > -hold]
+    held = [LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD]
+    return np.select(conditions, held, LockingState.DRIVEN_ON)
+
+
+@pytest.mark.parametrize("steps", [3, 5, 181])
+def test_a_position_in_the_dead_centre_is_of_the_state_behind_it(steps: int) -> None:
+    """The load has no power there, and no range of its own."""
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["drivers"]["A"]["range"] = [0.0, np.pi]
+    found = locking(Mechanism(**data), steps)
+    assert states(found)[steps // 2] == LockingState.SELF_LOCKING_FORWARD
+    assert LockingState.RUNS not in states(found)
+    data["joints"]["A"]["friction"] = 0.0
+    assert set(states(locking(Mechanism(**data), steps))) == {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON}
+
+
+def test_a_load_without_power_pushes_neither_way() -> None:
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["loads"]["weight"]["force"] = [0.0, "-100 N * between(drive, 0, 1.2)"]
+    found = locking(Mechanism(**data), 40)
+    np.testing.assert_array_equal(states(found) == LockingState.RUNS, found["drive"].values > np.degrees(1.2))
+
+
+def test_where_the_drive_effort_changes_sign_is_told_and_kept_in_the_result() -> None:
+    """180° less the angle at which the arm is that of the friction circle, in a figure and in an attribute."""
+    run = prepare(hoist())
+    found = look(run, 30)
+    limit = 180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM))
+    (told,) = [one for one in report_figures(run, found) if one.name == "drive_effort_sign"]
+    assert told.value == f"{limit:.2f}°"
+    kept = attribute(found, "locking_ranges")
+    assert (kept["of"], kept["unit"], kept["positions"]) == ("A", "°", 30)
+    assert [row["state"] for row in kept["rows"]] == [
+        "backdrivable",
+        "self_locking",
+        "self_locking_forward",
+        "driven_on",
+    ]
+    np.testing.assert_allclose(kept["rows"][-1]["ends"][0], limit, atol=0.01)
+    assert kept["rows"][-1]["ends"][1] is None  # the last position
+
+
+def test_an_end_at_zero_is_zero() -> None:
+    """Of a slide that drives the crank over its top, where its coordinate is 0: rounded to what it is known to."""
+    for steps in (31, 40, 57):
+        run = prepare(slide_hoist())
+        found = look(run, steps)
+        assert "0 mm" in [low for low, _ in ends(run, found, ranges(found), 1.5)]
+
+
+def slide_hoist() -> Mechanism:
+    """The hoist, whose lever hangs from a slide on a level guide by a link to the lever's end on top."""
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["links"] = {
+        "ground": {"points": {"A": [0, 0], "Z": {"at": [-0.1, 0.1], "axis": [-1, 0]}}},
+        "crank": {"points": {"A": [0, 0], "P": [ARM, 0], "H": [0.1, 0]}},
+        "rod": {"points": {"H": [0, 0], "K": [0.1, 0]}},
+        "slide": {"points": {"K": [0, 0], "Z": {"at": [0, 0], "axis": [-1, 0]}}},
+    }
+    data["joints"] |= {
+        "H": revolute("crank", "rod"), "K": revolute("rod", "slide"),
+        "Z": {"type": "prismatic", "links": ["ground", "slide"]},
+    }  # fmt: skip
+    data["drivers"] = {"Z": {"speed": 0.01, "range": [-0.03, 0.01]}}
+    data["assembly"] = {"H": [0.03, 0.095]}
+    return Mechanism(**data)
 
 
 def test_without_friction_every_load_drives_back() -> None:
     found = locking(hoist(0.0), 51)
-    assert set(states(found)) <= {LockingState.BACKDRIVABLE, LockingState.RUNS}
+    assert set(states(found)) == {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON}
     pushed = states(found) == LockingState.BACKDRIVABLE
     np.testing.assert_allclose(found["efficiency_reverse_instant"].values[pushed], 1.0, rtol=1e-9)
 
@@ -94,7 +165,8 @@ def test_ends_of_ranges_are_those_of_the_friction_circle(steps: int) -> None:
     found = look(run, steps)
     told = ends(run, found, ranges(found), 1.5)
     limit = f"{np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
-    assert told == [("0°", limit), (limit, "90°"), ("90°", "143.2°")]
+    behind = f"{180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
+    assert told == [("0°", limit), (limit, "90°"), ("90°", behind), (behind, "143.2°")]
 
 
 def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
@@ -123,9 +195,8 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
     tip = ARM * np.array([np.cos(angle), np.sin(angle)])
     pull = np.array([0.0, -0.1])[:, None] - tip
     arm = -(tip[0] * pull[1] - tip[1] * pull[0]) / np.hypot(*pull)
-    inside = np.where(arm > 0, LockingState.SELF_LOCKING, LockingState.RUNS)
-    np.testing.assert_array_equal(states(found), np.where(arm > FRICTION * RADIUS, LockingState.BACKDRIVABLE, inside))
-    pushed = states(found) != LockingState.RUNS
+    np.testing.assert_array_equal(states(found), expected_states(arm))
+    pushed = arm > 0
     efficiency = found["efficiency_reverse_instant"].values
     np.testing.assert_allclose(efficiency[pushed], 1 - FRICTION * RADIUS / arm[pushed], rtol=1e-9)
     np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
@@ -179,7 +250,7 @@ def test_ranges_cover_every_position_once_and_near_ones_are_below_the_margin() -
     covered = np.concatenate([np.arange(one.first, one.last + 1) for one in every if one.state is not None])
     np.testing.assert_array_equal(covered, np.arange(90))
     close = np.concatenate([np.arange(one.first, one.last + 1) for one in every if one.state is None])
-    running = states(found) < LockingState.LOCKED
+    running = ~np.isin(states(found), NO_MARGIN)
     np.testing.assert_array_equal(close, np.flatnonzero((margin < near) & running))
     for one in every:
         own = margin[one.first : one.last + 1]
@@ -193,3 +264,14 @@ def test_states_are_flags_with_meanings() -> None:
     assert words == [one.name.lower() for one in LockingState]
     columns = trunnion.analyse(hoist(), 12)
     assert "locking_state" not in columns
+
+
+def test_joints_whose_friction_is_zero_are_not_named() -> None:
+    """Neither where a joint is at rest nor among the multiples of single joints."""
+    for friction, named in ((0.0, ["A"]), (0.1, ["A", "H"])):
+        data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
+        for joint in ("H", "K"):
+            data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": friction if joint == "H" else 0.0}
+        run = prepare(Mechanism(**data))
+        names = {one.name.partition(".")[0] for one in report_figures(run, look(run, 8)) if "critical" in one.name}
+        assert names == set(named)

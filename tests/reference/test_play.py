@@ -50,6 +50,24 @@ def test_four_bar(joint: str) -> None:
     assert abs(brute - np.degrees(float(at["worst_case"].item()))) < 3e-4 * brute  # second order in the play
 
 
+@pytest.mark.parametrize("at", ["60 deg", np.pi / 3, "420 deg"])
+def test_one_position_is_that_of_the_cycle(at: str | float) -> None:
+    mechanism = four_bar("B")
+    names = ["rotation:D", "effort:A"]
+    one, cycle = trunnion.play(mechanism, names, at=at), trunnion.play(mechanism, names, steps=12)
+    assert one.sizes["position"] == 1
+    turns = (cycle["drive"].values - one["drive"].values[0]) / 360
+    here = int(np.argmin(np.abs(turns - np.round(turns))))
+    for name in ("value", "worst_case", "deviation", "worst_case_total", "status"):
+        np.testing.assert_allclose(one[name].values[..., 0], cycle[name].values[..., here], rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("at", ["60 mm", "there", "x deg"])
+def test_a_position_that_is_none_is_refused(at: str) -> None:
+    with pytest.raises(MechanismError):
+        trunnion.play(four_bar("B"), ["rotation:D"], at=at)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hole_on", ["rocker", "ground"])
 def test_rssr(hole_on: str) -> None:

@@ -17,6 +17,13 @@ from trunnion.views.cycle.report import _summary, report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 24
+HOIST = {
+    "trunnion": 1,
+    "links": {"ground": {"points": {"A": [0, 0]}}, "crank": {"points": {"A": [0, 0], "P": [0.02, 0]}}},
+    "joints": {"A": {"type": "revolute", "links": ["ground", "crank"], "pin": {"radius": 0.012}, "friction": 0.5}},
+    "drivers": {"A": {"speed": 1.0, "range": [0.0, 2.5]}},
+    "loads": {"weight": {"link": "crank", "at": "P", "force": [0.0, -100.0], "useful": True}},
+}
 
 
 @pytest.fixture(scope="module")
@@ -48,12 +55,38 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
     assert ahead == pytest.approx(100 * found["efficiency_instant"].values)
 
 
-def test_the_ranges_in_which_loads_do_not_push_back_are_named(press):
-    found = trunnion.locking(press, STEPS)
-    codes = set(found["locking_state"].values.tolist())
-    named = labels(plots.figure(found, "locking").axes[0])
-    for state in (LockingState.RUNS, LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING):
-        assert named.count(state.short) == (int(state) in codes)
+@pytest.mark.parametrize("friction", [0.1, 0.5])
+def test_every_state_is_coloured_and_named_once(press, friction):
+    found = trunnion.locking(press.with_values({"joint_defaults.friction": friction}), STEPS)
+    codes = set(found["locking_state"].values.tolist()) - {LockingState.UNSOLVED}
+    upper, lower = plots.figure(found, "locking").axes
+    for state in LockingState:
+        if state not in (LockingState.LOCKED, LockingState.JAMMED):  # these are said as where nothing is solved
+            assert labels(upper).count(state.short) == (int(state) in codes)
+    drive = found["drive"].values
+    for axes in (upper, lower):
+        spans = [(patch.get_x() - 1e-9, patch.get_x() + patch.get_width() + 1e-9) for patch in axes.patches]
+        assert all(any(low <= x <= high for low, high in spans) for x in drive)
+
+
+def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
+    """Ends of the shaded ranges are those found between the positions."""
+    hoist = trunnion.Mechanism.model_validate(HOIST)
+    found = trunnion.locking(hoist, STEPS)
+    upper = plots.figure(found, "locking").axes[0]
+    spans = {patch.get_label(): patch for patch in upper.patches}
+    limit = np.degrees(np.arccos(0.3))
+    held = spans[LockingState.SELF_LOCKING_FORWARD.short]
+    assert (held.get_x(), held.get_x() + held.get_width()) == pytest.approx((90, 180 - limit), abs=0.01)
+    (line,) = [line for line in upper.lines if line.get_label() == "drive effort changes sign"]
+    assert line.get_xdata()[0] == pytest.approx(180 - limit, abs=0.01)
+    colours = {patch.get_facecolor() for patch in upper.patches}
+    assert len(colours) == 4
+
+
+def test_every_state_has_a_colour_in_the_report():
+    style = (EXAMPLES.parent / "src/trunnion/views/web/report.css").read_text(encoding="utf-8")
+    assert all(f".state.{state.name.lower()} " in style.replace(",", " ").replace("{", " {") for state in LockingState)
 
 
 def test_locked_ranges_are_shaded(press):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -23,10 +23,6 @@ from trunnion.cli.options import (
 )
 from trunnion.cli.result import Shown, check_files
 from trunnion.cli.terminal import bar, console, show_figures, show_rows
-
-if TYPE_CHECKING:
-    from trunnion.cycle.locking import LockingRange
-    from trunnion.solve.system import Dial
 
 __all__ = ["locking"]
 
@@ -53,8 +49,8 @@ def locking(
     The margin for the friction of all joints and of each joint alone, other solutions of the friction equations, and
     the ranges of the drive in which the mechanism locks, is near locking, is self-locking or can be backdriven.
     """
-    from trunnion.cycle.locking import look, ranges, report_figures
-    from trunnion.cycle.locking_ends import ends
+    from trunnion.cycle.locking import look, report_figures
+    from trunnion.results.attributes import attribute
     from trunnion.solve.run import prepare
     from trunnion.solve.system import rubbing
 
@@ -63,17 +59,15 @@ def locking(
     with lines_of(file):
         run = prepare(mechanism)
         with bar("positions", steps, least=200_000) as progress:
-            found = look(run, steps, progress)
+            found = look(run, steps, progress, near)
     figures = report_figures(run, found)
-    every = ranges(found, near)
-    states, more = every[:MOST_RANGES], max(0, len(every) - MOST_RANGES)
-    places = ends(run, found, states, near)
+    every = attribute(found, "locking_ranges")
 
     def show() -> None:
         show_figures(mechanism.name or str(file), figures)
         if rubbing(run.system) and mechanism.drivers:
             console().print()
-            _show_ranges(states, places, run.system.dial(run.values, found["time"].values), near, more)
+            _show_ranges(every["of"], [row["cells"] for row in every["rows"]])
 
     def draw(path: Path) -> Any:
         from trunnion.views.cycle.locking_plot import locking as figure
@@ -86,11 +80,10 @@ def locking(
     ).finish()  # fmt: skip
 
 
-def _show_ranges(found: list[LockingRange], ends: list[tuple[str, str]], dial: Dial, near: float, more: int) -> None:
-    """The ranges as a table, in the order of the cycle; those near locking last. more: how many there are besides."""
-    from trunnion.cycle.locking_states import HEAD, cells
+def _show_ranges(of: str, rows: list[list[str]]) -> None:
+    """The ranges as a table, in the order of the cycle; those near locking last. of: the driver."""
+    from trunnion.cycle.locking_states import HEAD
 
-    rows = [cells(one, dial, near, places) for one, places in zip(found, ends, strict=True)]
-    show_rows(f"ranges of {dial.of}" if dial.of else "ranges", list(HEAD), rows)
-    if more:
-        console().print(f"{more} more ranges; --out has every position", markup=False)
+    show_rows(f"ranges of {of}" if of else "ranges", list(HEAD), rows[:MOST_RANGES])
+    if len(rows) > MOST_RANGES:
+        console().print(f"{len(rows) - MOST_RANGES} more ranges; --out has every position", markup=False)

@@ -27,6 +27,7 @@ __all__ = [
     "MappingFile",
     "Measures",
     "Method",
+    "OnePosition",
     "Out",
     "OutAllocation",
     "OutTolerance",
@@ -85,6 +86,10 @@ Rounds = Annotated[int, typer.Option("--iterations", help="Limit of friction ite
 At = Annotated[
     str | None,
     typer.Option("--at", help="Position for measures that state none: 60deg, 20mm, 0.1s.", show_default=False),
+]
+OnePosition = Annotated[
+    str | None,
+    typer.Option("--at", help="One position instead of the cycle: 60deg, 20mm, 0.1s.", show_default=False),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same result.")]
 Jobs = Annotated[

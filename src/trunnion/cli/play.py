@@ -10,6 +10,7 @@ from trunnion.cli.options import (
     File,
     FrictionLaw,
     Measures,
+    OnePosition,
     Out,
     Set,
     Steps,
@@ -30,6 +31,7 @@ def play(
     file: File,
     measure: Measures = None,
     steps: Steps = 360,
+    at: OnePosition = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -47,7 +49,7 @@ def play(
     check_files(out or [])
     mechanism = stated(file, set_, table, friction)
     with lines_of(file), bar("positions", steps, least=20_000) as progress:
-        result = run(mechanism, measure, steps, progress)
+        result = run(mechanism, measure, steps, progress, at)
 
     def draw(path: Path) -> Any:
         from trunnion.views.common.peaks import whole_peaks

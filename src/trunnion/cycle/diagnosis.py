@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -153,8 +153,11 @@ def findings(
     condition: NDArray[np.float64],
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
     near: Locking | None = None,
+    felt: Sequence[str] | None = None,
 ) -> list[Finding]:
-    """One finding for each cause. efforts: least and largest effort and unit of every driver."""
+    """One finding for each cause. efforts: least and largest effort and unit of every driver; felt: joints with
+    friction that is not 0, all that have a law if not given."""
+    felt = rubbing(causes.system) if felt is None else felt
     found = [_not_assembled(causes, dial, part) for part in causes.open_modules().values()]
     stuck = causes.stuck()
     stuck = stuck[status[stuck] == Status.ZERO_SLIP]
@@ -171,7 +174,7 @@ def findings(
         code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
         found.append(finding_for(code, path, at=dial.intervals(positions)))
     for number, (positions, share) in causes.locked().items():
-        found.append(_locked(causes.system, dial, number, positions, share, near))
+        found.append(_locked(causes.system, dial, number, positions, share, near, felt))
     late = np.flatnonzero(status == Status.NOT_CONVERGED)
     if len(late):
         found.append(finding_for("friction.not_converged", "joints", at=dial.intervals(late)))
@@ -180,7 +183,8 @@ def findings(
         found.append(
             finding_for("position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close]))
         )
-    for joints, positions in _together(causes.zero_slip()):
+    holding = {*felt, *causes.system.resisted}  # without friction either way is the same
+    for joints, positions in _together({name: at for name, at in causes.zero_slip().items() if name in holding}):
         if not efforts or any(_matters(positions, lower, upper) for lower, upper, _ in efforts.values()):
             found.append(_zero_slip(dial, joints, positions, efforts))
     return found
@@ -207,7 +211,10 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
     where, at = f"links {', '.join(module.links)}", dial.intervals(part.positions)
     if not part.reasons:
         errors, redundant = mechanism.has_errors, bool(module.redundant)
-        return finding_for("assembly.open", where, at=at, everywhere=everywhere, redundant=redundant, errors=errors)
+        return finding_for(
+            "assembly.open", where, at=at, everywhere=everywhere, redundant=redundant, errors=errors,
+            start=bool(np.any(np.asarray(part.positions) == 0)),
+        )  # fmt: skip
     gaps = {name: np.nanmax(sizes) for name, sizes in part.reasons.items() if np.any(sizes > 0)}
     return finding_for("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
 
@@ -240,14 +247,15 @@ def _locked(
     positions: Positions,
     share: NDArray[np.float64],
     near: Locking | None,
+    felt: Sequence[str],
 ) -> Finding:
     """How far it is from running, the joint that decides, and whether it locks the other way too."""
     module = system.plan.modules[number]
-    joints = [name for name in module.joints if name in rubbing(system)]
+    joints = [name for name in module.joints if name in felt]
     reverse, decides, multiple = "", "", None
     if near is not None:
-        both = near.locked & near.back.locked
-        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.locked) else "some"
+        both = near.ahead.locked & near.back.locked
+        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.ahead.locked) else "some"
         responsible = near.responsible()
         if responsible and responsible[0] in module.joints:
             decides, multiple = responsible

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.analyse import analyse_run
+from trunnion.cycle.locking_ends import told
 from trunnion.cycle.locking_states import (
     NEAR,
     ROUNDING,
     LockingRange,
     LockingState,
+    in_order,
     pushed,
     ranges_of,
-    states,
 )
 from trunnion.cycle.near_locking import (
-    Reverse,
+    Passage,
     critical_figure,
     critical_multiples,
     least_margin,
     others,
+    passage,
     reverse,
     reverse_figure,
 )
@@ -36,7 +39,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_springs
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.system import Dial, rubbing
+from trunnion.solve.system import Dial, felt, rubbing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,6 +47,8 @@ if TYPE_CHECKING:
 __all__ = ["MOST_STEPS", "NEAR", "LockingRange", "LockingState", "locking", "look", "ranges", "report_figures"]
 
 MOST_STEPS = 8192
+MOST_PLACES = 3  # named in one figure
+HELD_AND_DRIVEN = LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON
 
 VARIABLES = {
     "critical_multiple": Variable(
@@ -76,8 +81,8 @@ def locking(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], No
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
-def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = None) -> xr.Dataset:
-    """What `locking` does, for a mechanism that is prepared."""
+def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = None, near: float = NEAR) -> xr.Dataset:
+    """What `locking` does, for a mechanism that is prepared. near: the margin below which a range is near locking."""
     mechanism = run.system.mechanism
     if run.determinacy is not None:
         run.determinacy.refuse()
@@ -102,12 +107,13 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
         "power_given_reverse": other.given,
         "efficiency_reverse_instant": _efficiency_reverse(other),
-        "locking_state": states(status == Status.LOCKED, other, known),
+        "locking_state": in_order(passage(back)._replace(locked=status == Status.LOCKED), other, known),
     }
     found = result.assign(described(arrays, VARIABLES))
     found["locking_state"].attrs.update(codes("flag", LockingState))
     said = finding_rows(_notes(run, result))
-    return found.assign_attrs(encoded({"findings": [*attribute(found, "findings"), *said]})) if said else found
+    findings = {"findings": [*attribute(found, "findings"), *said]} if said else {}
+    return found.assign_attrs(encoded({"locking_ranges": told(run, found, near), **findings}))
 
 
 def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
@@ -139,7 +145,7 @@ def _beside_the_drive(mechanism: Mechanism) -> list[str]:
     return [name for name, load in mechanism.loads.items() if load.link in driven and not load.useful]
 
 
-def _efficiency_reverse(back: Reverse) -> NDArray[np.float64]:
+def _efficiency_reverse(back: Passage) -> NDArray[np.float64]:
     """Of every position; NaN where the useful loads supply no power backward, or where that motion locks."""
     with np.errstate(all="ignore"):
         return np.where(pushed(back) & ~back.locked, back.delivered / back.given, np.nan)
@@ -158,15 +164,27 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
         return [Figure("locking_margin", "locking margin (no joint has friction)", None)]
     margin = found["locking_margin"].values
     figures = [least_margin("locking_margin", "locking margin, all friction together", margin, dial)]
-    for joint in rubbing(run.system):
+    for joint in felt(run.system, run.values):
         figures += _of_joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
     more = found["other_solutions"].values
     if np.any(more > 0):
         subject = f"other solutions of the friction equations, {dial.intervals(np.flatnonzero(more > 0))}"
         figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="maximum"))
+    figures += _turning(found)
     backward = reverse_figure(run, _reverse(found))
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
+
+
+def _turning(found: xr.Dataset) -> list[Figure]:
+    """Where friction no longer holds the loads that push forward: there the drive effort changes its sign."""
+    rows = [row for row in attribute(found, "locking_ranges")["rows"] if row["state"]]
+    both = {one.name.lower() for one in HELD_AND_DRIVEN}
+    places = [after["cells"][1] for before, after in pairwise(rows) if {before["state"], after["state"]} == both]
+    if not places:
+        return []
+    where = ", ".join(places[:MOST_PLACES]) + (f" and {len(places) - MOST_PLACES} more" * (len(places) > MOST_PLACES))
+    return [Figure("drive_effort_sign", "the drive effort changes sign at", where)]
 
 
 def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[Figure]:
@@ -181,7 +199,7 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
     return [own] if multiple[at] == 0 else [least]
 
 
-def _reverse(found: xr.Dataset) -> Reverse:
+def _reverse(found: xr.Dataset) -> Passage:
     """The way back as the Dataset has it."""
     delivered, given = found["power_delivered_reverse"].values, found["power_given_reverse"].values
-    return Reverse({}, np.isnan(delivered) & np.isfinite(given), delivered, given)
+    return Passage({}, np.isnan(delivered) & np.isfinite(given), delivered, given)

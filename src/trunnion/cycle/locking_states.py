@@ -15,9 +15,20 @@ from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.system import Dial
 
 if TYPE_CHECKING:
-    from trunnion.cycle.near_locking import Reverse
+    from trunnion.cycle.near_locking import Passage
 
-__all__ = ["HEAD", "NEAR", "ROUNDING", "LockingRange", "LockingState", "cells", "pushed", "ranges_of", "states"]
+__all__ = [
+    "HEAD",
+    "NEAR",
+    "ROUNDING",
+    "LockingRange",
+    "LockingState",
+    "cells",
+    "in_order",
+    "pushed",
+    "ranges_of",
+    "states",
+]
 
 ROUNDING = 1e-9  # of the largest power: what is less is no power
 NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
@@ -27,13 +38,15 @@ HEAD = ("state", "from", "to", "smallest margin", "at")  # of the table of range
 class LockingState(Coded):
     """What friction does at a position: forward, and when all speeds are reversed."""
 
-    RUNS = 0, "runs; the useful loads do not push it backward"
+    RUNS = 0, "runs; the useful loads push it neither backward nor forward"
     BACKDRIVABLE = 1, "can be backdriven by the useful loads"
     SELF_LOCKING = 2, "self-locking: the useful loads push it backward, but do not overcome friction"
     LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward"
     LOCKED = 4, "locked: no drive effort can move it forward"
     JAMMED = 5, "jammed: locked forward and backward"
     UNSOLVED = 6, "not solved"
+    SELF_LOCKING_FORWARD = 7, "self-locking: the useful loads push it forward, but do not overcome friction"
+    DRIVEN_ON = 8, "the useful loads drive it forward, and the drive brakes it"
 
     @property
     def short(self) -> str:
@@ -42,14 +55,20 @@ class LockingState(Coded):
 
 
 SHORT = {
-    LockingState.RUNS: "loads do not push back",
+    LockingState.RUNS: "loads do not push",
     LockingState.BACKDRIVABLE: "can be backdriven",
     LockingState.SELF_LOCKING: "self-locking",
     LockingState.LOCKED_BACKWARD: "locked backward",
     LockingState.LOCKED: "locked",
     LockingState.JAMMED: "jammed",
     LockingState.UNSOLVED: "not solved",
+    LockingState.SELF_LOCKING_FORWARD: "self-locking, pushed forward",
+    LockingState.DRIVEN_ON: "loads drive it on",
 }
+PUSHED = (
+    LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON,
+)  # fmt: skip
+NO_MARGIN = (LockingState.LOCKED, LockingState.JAMMED, LockingState.UNSOLVED)  # these are not near locking
 
 
 class LockingRange(NamedTuple):
@@ -66,38 +85,56 @@ class LockingRange(NamedTuple):
     at: int
 
 
-def pushed(back: Reverse, least: float | None = None) -> NDArray[np.bool_]:
-    """Where the useful loads supply power backward, and no rounding of none: more than the least, W."""
-    least = ROUNDING * np.nanmax(np.abs(back.given), initial=0.0) if least is None else least
-    found: NDArray[np.bool_] = back.given > least
+def pushed(of: Passage, least: float | None = None) -> NDArray[np.bool_]:
+    """Where the useful loads supply power to a motion, and no rounding of none: more than the least, W."""
+    least = _least(of) if least is None else least
+    found: NDArray[np.bool_] = of.given > least
     return found
 
 
-def states(
-    ahead: NDArray[np.bool_], back: Reverse, known: NDArray[np.bool_], least: float | None = None
-) -> NDArray[np.int8]:
-    """The code of `LockingState` of every position. ahead: where it is locked forward; known: where the forces or the
-    cause of locking are; least: see `pushed`."""
-    behind = back.locked
-    driven = pushed(back, least) & ~behind
+def _least(of: Passage) -> float:
+    """Power that is none, W."""
+    return float(ROUNDING * np.nanmax(np.abs(of.given), initial=0.0))
+
+
+def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
+    """The code of `LockingState` of every position. ahead, back: the positions passed forward and backward; known:
+    where the forces or the cause of locking are; least: see `pushed`."""
+    least = _least(back) if least is None else least
+    driven = pushed(back, least) & ~back.locked
+    held = -ahead.delivered > least  # the drive must push against friction
+    beyond = pushed(ahead, least)
     cases = [
         (~known, LockingState.UNSOLVED),
-        (ahead & behind, LockingState.JAMMED),
-        (ahead, LockingState.LOCKED),
-        (behind, LockingState.LOCKED_BACKWARD),
+        (ahead.locked & back.locked, LockingState.JAMMED),
+        (ahead.locked, LockingState.LOCKED),
+        (back.locked, LockingState.LOCKED_BACKWARD),
         (driven & (back.delivered > 0), LockingState.BACKDRIVABLE),
         (driven, LockingState.SELF_LOCKING),
+        (beyond & held, LockingState.SELF_LOCKING_FORWARD),
+        (beyond, LockingState.DRIVEN_ON),
     ]
-    return np.select([of for of, _ in cases], [int(state) for _, state in cases], int(LockingState.RUNS)).astype(
-        np.int8
-    )
+    found = np.select([of for of, _ in cases], [int(state) for _, state in cases], int(LockingState.RUNS))
+    return found.astype(np.int8)
+
+
+def in_order(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
+    """`states` of the positions of a cycle in their order. Where the loads have no power at one position alone they
+    turn there from backward to forward: a dead centre, which is of the state of what follows."""
+    found = states(ahead, back, known, least)
+    pushes = np.isin(found, PUSHED)
+    alone = np.zeros(len(found), bool)
+    alone[1:-1] = (found[1:-1] == LockingState.RUNS) & pushes[:-2] & pushes[2:]
+    held = -ahead.delivered > (_least(back) if least is None else least)
+    found[alone] = np.where(held, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON)[alone]
+    return found
 
 
 def ranges_of(state: NDArray[Any], margin: NDArray[np.float64], near: float = NEAR) -> list[LockingRange]:
     """The intervals in which the state of positions stays the same, in their order; after them those that run, but with
     a margin below `near`."""
     runs = [LockingRange(list(LockingState)[int(state[run[0]])], *_worst(run, margin)) for run in _runs(state)]
-    close = (margin < near) & (state < LockingState.LOCKED)
+    close = (margin < near) & ~np.isin(state, NO_MARGIN)
     return [*runs, *(LockingRange(None, *_worst(run, margin)) for run in _runs(close) if close[run[0]])]
 
 

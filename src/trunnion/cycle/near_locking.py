@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Locking",
-    "Reverse",
+    "Passage",
     "critical_figure",
     "critical_multiples",
     "findings",
@@ -40,6 +40,7 @@ __all__ = [
     "locks",
     "look",
     "others",
+    "passage",
     "reverse",
     "reverse_figure",
 ]
@@ -189,7 +190,7 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
     return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, place=place)
 
 
-def reverse_figure(run: Run, back: Reverse) -> Figure | None:
+def reverse_figure(run: Run, back: Passage) -> Figure | None:
     """Power that reaches the drivers over that of the useful loads and springs, backward; None if these do not drive.
 
     It locks, or is 0 or less: then it holds itself.
@@ -211,7 +212,7 @@ def reverse_figure(run: Run, back: Reverse) -> Figure | None:
     return Figure(name, subject, value, note="" if value > 0 else "self-locking")
 
 
-def _reversed_means(run: Run, back: Reverse) -> tuple[float, float]:
+def _reversed_means(run: Run, back: Passage) -> tuple[float, float]:
     """Mean powers, W, delivered and given, backward, 0 where they cancel; that of the loads is known where it locks."""
     if run.cycle.duration <= 0:
         return float(back.delivered[0]), float(back.given[0])
@@ -230,8 +231,8 @@ def _reversed_means(run: Run, back: Reverse) -> tuple[float, float]:
     return delivered, given
 
 
-class Reverse(NamedTuple):
-    """The same positions passed backward: effort of every driver, where it locks, and what flows where.
+class Passage(NamedTuple):
+    """Positions passed forward or backward: effort of every driver, where it locks, and what flows where.
 
     delivered: power that the drivers take out, W; given: power that the useful loads and springs put in, W.
     """
@@ -242,7 +243,7 @@ class Reverse(NamedTuple):
     given: Array
 
 
-def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Reverse:
+def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Passage:
     """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
     with them; inertia stays, for accelerations do."""
     walk = ahead.backward()
@@ -251,12 +252,17 @@ def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Reverse:
     deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
     with np.errstate(all="ignore"):
         other = backward(walk, method, Given({}, deflections))
-    shape = time.shape
-    efforts = {name: np.broadcast_to(effort, shape) for name, effort in other.efforts.items()}
+    return passage(other)
+
+
+def passage(back: Backward) -> Passage:
+    """What flows where as the positions are passed in the direction of a walk that is solved."""
+    walk, shape = back.walk, np.shape(back.walk.time)
+    efforts = {name: np.broadcast_to(effort, shape) for name, effort in back.efforts.items()}
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
-    powers = useful_powers(run.system.mechanism, other.load_powers, other.springs)
+    powers = useful_powers(walk.system.mechanism, back.load_powers, back.springs)
     given = sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape))
-    return Reverse(efforts, locks(other), delivered, given)
+    return Passage(efforts, locks(back), delivered, given)
 
 
 # ---- over a cycle ---------------------------------------------------------------------------------------------
@@ -266,17 +272,17 @@ def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Reverse:
 class Locking:
     """What one cycle shows, looked at some times (s).
 
-    locked: whether it is; first: number of the analysed position with the least margin, None if all are beyond what was
-    looked for; critical: for each joint, the multiple of its own friction at which it locks there; others: solutions
-    at full friction beside the one that grows from none; back: the same positions run backward.
+    ahead, back: the positions passed forward and backward; first: number of the analysed position with the least
+    margin, None if all are beyond what was looked for; critical: for each joint, the multiple of its own friction at
+    which it locks there; others: solutions at full friction beside the one that grows from none.
     """
 
     times: Array
-    locked: NDArray[np.bool_]
+    ahead: Passage
     first: int | None
     critical: dict[str, float]
     others: Array
-    back: Reverse
+    back: Passage
 
     def responsible(self) -> tuple[str, float] | None:
         """The joint whose friction, changed alone, decides, and the multiple of it at which it does.
@@ -309,19 +315,19 @@ def look(run: Run, time: Array, margin: Array, method: FrictionMethod, walked: B
     plain = replace(method, name="newton", margin_up_to=0.0)
     same = walked is not None and len(times) == len(time) and method.name == plain.name
     if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
-        locked, more = np.ones(len(times), bool), np.zeros(len(times))
-        behind = reverse(run, run.walk(times), plain)
+        more, unknown = np.zeros(len(times)), np.full(len(times), np.nan)
+        ahead, behind = Passage({}, np.ones(len(times), bool), unknown, unknown), reverse(run, run.walk(times), plain)
     else:
         known = walked if same else None
         key = "both ways", len(times), plain
-        locked, more, behind = run.once(key, lambda: _both_ways(run, times, plain, known))
+        ahead, more, behind = run.once(key, lambda: _both_ways(run, times, plain, known))
     first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
     critical: dict[str, float] = {}
     if first is not None:
         worst, most = time[[first]], method.margin_up_to
         there = "critical", float(worst[0]), plain, most
         critical = run.once(there, lambda: _critical(run, worst, plain, most))
-    return Locking(times, locked, first, critical, more, behind)
+    return Locking(times, ahead, first, critical, more, behind)
 
 
 def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dict[str, float]:
@@ -332,15 +338,15 @@ def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dic
 
 def _both_ways(
     run: Run, times: Array, method: FrictionMethod, walked: Backward | None
-) -> tuple[NDArray[np.bool_], Array, Reverse]:
-    """Where it locks, other solutions, and the way back. walked: the walk through these times, if it is there."""
+) -> tuple[Passage, Array, Passage]:
+    """The way forward, other solutions, and the way back. walked: the walk through these times, if it is there."""
     back = walked or run.solve(times, method=method)
-    return locks(back), others(back), reverse(run, back.walk, method)
+    return passage(back), others(back), reverse(run, back.walk, method)
 
 
 def findings(near: Locking, dial: Dial) -> Iterator[Finding]:
     """What to say of other solutions."""
-    more = np.flatnonzero((near.others > 0) & ~near.locked)
+    more = np.flatnonzero((near.others > 0) & ~near.ahead.locked)
     if len(more):
         count = int(np.max(near.others[more]))
         yield finding_for("friction.other_solutions", "joints", count=count, at=dial.intervals(more))

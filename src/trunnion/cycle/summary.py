@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
-from trunnion.cycle.locking_states import cells, ranges_of, states
+from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, Status
@@ -28,7 +28,7 @@ from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import start
 from trunnion.solve.loads import Stated
-from trunnion.solve.system import Dial, System, rubbing
+from trunnion.solve.system import Dial, System, felt, rubbing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -172,8 +172,9 @@ def _over_the_cycle(
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near
-    )
+        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near,
+        felt(run.system, run.values),
+    )  # fmt: skip
     found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
     several = len(spans) > 1 or run.system.mechanism.gears
@@ -350,7 +351,7 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),
          "first": one.first, "count": one.last - one.first + 1}
-        for one in ranges_of(states(near.locked, near.back, known), margin)
+        for one in ranges_of(in_order(near.ahead, near.back, known), margin)
     ]  # fmt: skip
     return {"locking_ranges": {"of": dial.of, "positions": len(near.times), "rows": rows}}
 

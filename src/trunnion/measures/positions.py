@@ -15,12 +15,16 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.quadrature import Nodes, nodes
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure
+from trunnion.model.measure_kinds import place_kind
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import UnitError
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["PositionPlan", "Window", "plan"]
+__all__ = ["PositionPlan", "Window", "place_of", "plan"]
 
 Array = NDArray[np.float64]
 
@@ -124,6 +128,24 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     period = duration if run.cycle.periodic else None
     whole = Window(index, rule.at, known[0][index], period, known[1], (rule.weights, rule.inside))
     return PositionPlan(run, times, windows | dict.fromkeys(averaged, whole))
+
+
+def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
+    """A position as a user writes it: a coordinate of the first driver, rad or m, or a time, s; whether it is a time.
+
+    Raises MechanismError for what is none.
+    """
+    remedy = "write 60deg, 20mm or 0.1s, as the driver turns or slides"
+    try:
+        quantity = Quantity.read(at)
+        kind = place_kind(mechanism, quantity, {})
+        quantity.check({}, kind)
+        value = float(quantity.evaluate())
+    except UnitError as error:
+        raise MechanismError(Finding(f"'{at}' is not a position: {error.what}", "at", remedy)) from None
+    except KeyError:
+        raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
+    return value, kind.unit == "s"
 
 
 def _averages(run: Run, measure: Measure) -> bool:

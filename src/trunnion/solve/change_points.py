@@ -18,12 +18,17 @@ __all__ = ["find", "finding", "suspects"]
 
 Array = NDArray[np.float64]
 
+Meeting = tuple[float, float]  # first and last time, s
+ROW = 3  # positions of the grid at which two assemblies meet: no single place
 TOUCHING = 1e-6  # of 1/condition: below it two assemblies meet
 
 
-def finding(system: System, values: Values, module: Module, at: Sequence[float]) -> Finding:
-    """What to say of change points at these times."""
-    places = [system.dial(values, np.array([moment])).at(0) for moment in at]
+def finding(system: System, values: Values, module: Module, at: Sequence[Meeting]) -> Finding:
+    """What to say of change points at these times, and over these ranges of them."""
+    places = []
+    for first, last in at:
+        dial = system.dial(values, np.array([first, last]))
+        places.append(dial.at(0) if first == last else f"between {dial.at(0)} and {dial.at(1)}")
     links, joint = list(module.links), module.joints[1]
     return finding_for("assembly.change_point", f"links {', '.join(links)}", places=places, links=links, joint=joint)
 
@@ -38,11 +43,11 @@ def suspects(margin: Array) -> NDArray[np.bool_]:
     return np.asarray((here <= before) & (here <= after) & (here <= 1.1 * steep))
 
 
-def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> list[float]:
-    """Times at which a closed form passes a position where its assemblies meet, s.
+def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> list[Meeting]:
+    """First and last time at which the assemblies of a closed form meet, s: the same where it passes such a position.
 
     There 1/condition touches zero between two assembled positions: found on the grid as a minimum that its
-    neighbours' slope would reach, then by golden section.
+    neighbours' slope would reach, then by golden section. Over a range it is zero at positions of the grid in a row.
     """
     if len(times) < 3:
         return []
@@ -55,8 +60,19 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
         found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
         return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
 
-    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in np.flatnonzero(suspects(margin)) + 1]
-    return [moment for moment in moments if margin_at(moment) < TOUCHING]
+    ranges = _in_a_row(margin < TOUCHING)
+    near = suspects(margin)
+    for first, last in ranges:
+        near[max(first - 2, 0) : last + 1] = False  # it lacks the first and the last of the grid
+    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in np.flatnonzero(near) + 1]
+    found = [(moment, moment) for moment in moments if margin_at(moment) < TOUCHING]
+    return sorted([*found, *((float(times[first]), float(times[last])) for first, last in ranges)])
+
+
+def _in_a_row(touches: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last of some positions in a row, where they are more than pass one meeting point."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(int)))
+    return [(int(low), int(high) - 1) for low, high in zip(edges[::2], edges[1::2], strict=True) if high - low >= ROW]
 
 
 def _lowest(function: Callable[[float], float], low: float, high: float) -> float:

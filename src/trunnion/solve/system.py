@@ -436,6 +436,16 @@ def rubbing(system: System) -> list[str]:
     return [name for name, joint in system.mechanism.effective_joints.items() if joint.friction is not None]
 
 
+def felt(system: System, values: Values) -> list[str]:
+    """Joints with friction whose coefficient is not 0, as far as their law is proportional to one."""
+    found = []
+    for joint in rubbing(system):
+        path = f"joints.{joint}.friction.{law_of(system, joint).scale}"
+        if path not in values or np.any(np.asarray(primal(values[path])) != 0):
+            found.append(joint)
+    return found
+
+
 def law_of(system: System, joint: str) -> FrictionLaw:
     """Friction law of a joint that has friction."""
     friction = system.mechanism.effective_joints[joint].friction

@@ -146,8 +146,9 @@ CYCLE: dict[str, Sentence] = {
     ),
     "locking.pins_centred": Sentence(
         NOTE,
-        "the locking margin is that with the seats of {joints}; critical multiples of single joints and the motion "
-        "backward are those of pins in the middle of their play",
+        "locking takes the seats of {joints} for the margin and for where it locks forward; all else is of pins in the "
+        "middle of their play: the other states and their ranges, the motion backward, critical multiples of single "
+        "joints",
     ),
     "locking.springs_not_useful": Sentence(
         NOTE,

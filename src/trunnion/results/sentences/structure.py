@@ -18,17 +18,17 @@ def _gap(at: str, everywhere: bool, gaps: Mapping[str, float]) -> str:
     return f"cannot be assembled {where}: {by or 'an earlier group has no position'}"
 
 
-def _open(at: str, everywhere: bool, redundant: bool, errors: bool) -> str:
-    why = "these links do not close"
-    if not everywhere:
+def _open(at: str, everywhere: bool, redundant: bool, errors: bool, start: bool = False) -> str:
+    why = "these links do not close" + (" there, where the motion starts" if start and not everywhere else "")
+    if not everywhere and not start:
         why = "these links cannot reach it from the start without being taken apart"
-    elif redundant and errors:
+    elif everywhere and redundant and errors:
         why = "these links are over-constrained; with their errors they need play to fit together, and as rigid parts "
         why += "they cannot be analysed"
     return f"cannot be assembled {'at any position' if everywhere else at}: {why}"
 
 
-def _mend(at: str, everywhere: bool, redundant: bool, errors: bool) -> str:
+def _mend(at: str, everywhere: bool, redundant: bool, errors: bool, start: bool = False) -> str:
     if not (everywhere and redundant):
         return "change the lengths or the range of the driver"
     if errors:
@@ -46,6 +46,13 @@ def _overdriven(formula: int, rank: int, spins: int, drivers: int) -> str:
 def _dragged(link: str, points: Sequence[str], torque: float | None) -> str:
     drag = f"; friction of its joints would drag it with up to {readable(torque, 'N m')}" if torque is not None else ""
     return f"the analysis sets this spin to zero{drag}"
+
+
+def _meeting(places: Sequence[str], links: Sequence[str], joint: str) -> str:
+    """places: coordinates, and ranges of them."""
+    alone = [place for place in places if not place.startswith("between")]
+    where = ", ".join([f"at {', '.join(alone)}"] * bool(alone) + [place for place in places if place not in alone])
+    return f"change point {where}: two assembly modes of the links {', '.join(links)} coincide there"
 
 
 STRUCTURE: dict[str, Sentence] = {
@@ -87,7 +94,7 @@ STRUCTURE: dict[str, Sentence] = {
     ),
     "assembly.change_point": Sentence(
         ERROR,
-        "change point at {places}: two assembly modes of the links {links} coincide there",
+        _meeting,
         "the motion beyond it is not determined; here {joint} stays on its side. Change a length, or limit the range "
         "of the driver",
     ),

@@ -34,7 +34,7 @@ from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import moment, reference
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
-from trunnion.measures.positions import plan
+from trunnion.measures.positions import place_of, plan
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -124,6 +124,7 @@ def play(
     measures: Sequence[str] | None = None,
     steps: int = 360,
     progress: Callable[[int], None] | None = None,
+    at: float | str | None = None,
 ) -> xr.Dataset:
     """What the play of every joint does to measures over the cycle: worst case and standard deviation.
 
@@ -132,7 +133,8 @@ def play(
     states none, rotation and slide of every joint to the ground that is not driven. The figures of a maximum or minimum
     are those at its place, `extreme_worst_case`; other statistics are left out. Returns a Dataset over (measure,
     joint, position) of `result.VARIABLES`: SI, each measure in its own unit. NaN where a position has no answer.
-    steps: equally spaced positions of the cycle. progress: called with the number of positions done.
+    steps: equally spaced positions of the cycle. at: one position instead, such as "20 mm" or, in SI, 0.02.
+    progress: called with the number of positions done.
     Method: virtual work for coordinates and angles, derivatives by dual numbers for others; first order in the play,
     about the mechanism with every pin in the middle of its hole.
     Raises MechanismError if no joint states a clearance, for an unknown measure, or as `analyse` does.
@@ -144,8 +146,14 @@ def play(
     found, told = _measures(run, measures)
     known = plays(run.system, run.values)
     _check(known)
-    effect = _over(run, found, known, run.cycle.times(steps if run.cycle.duration > 0 else 1), progress)
-    effect = replace(effect, extremes=_extremes(run, found, known, steps))
+    if at is None:
+        effect = _over(run, found, known, run.cycle.times(steps if run.cycle.duration > 0 else 1), progress)
+        effect = replace(effect, extremes=_extremes(run, found, known, steps))
+    else:
+        value, timed = place_of(mechanism, at)
+        there = plan(run, [replace(found[0], at=value, over=None, timed=timed)], 1)
+        found = [replace(one, at=None) for one in found]
+        effect = _over(run, found, known, there.times, progress)
     return dataset(effect, [*_model_findings(run, effect), *told])
 
 

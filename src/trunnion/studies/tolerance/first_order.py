@@ -14,11 +14,8 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference
 from trunnion.measures.measures import Measure, named, outputs
-from trunnion.measures.positions import PositionPlan, plan
-from trunnion.model.measure_kinds import place_kind
+from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.quantity import Quantity
-from trunnion.model.units import UnitError
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
@@ -140,14 +137,5 @@ def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:
     """A measure taken at a place if it has none of its own and no figure of a whole course."""
     if measure.at is not None or measure.over is not None or measure.statistic or measure.rule not in ("deviation",):
         return measure
-    remedy = "write 60deg, 20mm or 0.1s, as the driver turns or slides"
-    try:
-        quantity = Quantity.read(at)
-        kind = place_kind(mechanism, quantity, {})
-        quantity.check({}, kind)
-        value = float(quantity.evaluate())
-    except UnitError as error:
-        raise MechanismError(Finding(f"'{at}' is not a position: {error.what}", "at", remedy)) from None
-    except KeyError:
-        raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
-    return replace(measure, at=value, timed=kind.unit == "s")
+    value, timed = place_of(mechanism, at)
+    return replace(measure, at=value, timed=timed)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.cycle.locking import LockingState
+from trunnion.cycle.locking import HELD_AND_DRIVEN, LockingState
 from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import attribute
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.common.figures import INK, PALETTE, along, curve, legend, new, shade, style_of
@@ -20,11 +21,14 @@ if TYPE_CHECKING:
 
 __all__ = ["has_friction", "locking"]
 
-# what is shaded: values of `locking_state`, the first of which the legend names, and the colour
+# what is shaded: values of `locking_state` and the colour; `shade` has the locked ones and those not solved
 STATES = (
-    ((LockingState.BACKDRIVABLE,), "#dcefe7"),
-    ((LockingState.SELF_LOCKING,), "#fbe6cf"),
-    ((LockingState.LOCKED_BACKWARD, LockingState.JAMMED), "#f3d0d8"),
+    (LockingState.RUNS, "#eef0f3"),
+    (LockingState.BACKDRIVABLE, "#dcefe7"),
+    (LockingState.SELF_LOCKING, "#fbe6cf"),
+    (LockingState.SELF_LOCKING_FORWARD, "#f6c993"),
+    (LockingState.DRIVEN_ON, "#d6e6f5"),
+    (LockingState.LOCKED_BACKWARD, "#f3d0d8"),
 )
 LEAST_TOP = 2.0  # of the axis of the margin, so that 1 does not lie on its frame
 
@@ -110,17 +114,35 @@ def _limits(curves: list[Array]) -> tuple[float, float]:
 
 
 def _states(axes: Axes, result: xr.Dataset, over: Abscissa, named: bool) -> None:
-    """The ranges of a result of `locking`, in their colours; named: for the legend."""
+    """The ranges of a result of `locking`, in their colours, and where the drive effort changes sign; named: for the
+    legend."""
     if "locking_state" not in result:
         return
-    state, x = result["locking_state"].values, over.values
-    if named and np.any(state == LockingState.RUNS):  # white, so that it has an edge in the legend
-        axes.fill_between([], [], facecolor="white", edgecolor=INK, linewidth=0.5, label=LockingState.RUNS.short)
-    half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
-    for members, colour in STATES:
-        inside = np.isin(state, members)
+    state = result["locking_state"].values
+    ends = _ends(result, over)
+    for one, colour in STATES:
+        inside = state == one
         edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
         for number, (start, stop) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-            low, high = sorted((float(x[start]), float(x[stop - 1])))
-            label = members[0].short if named and number == 0 else None
-            axes.axvspan(low - half, high + half, color=colour, linewidth=0, zorder=0.4, label=label)
+            label = one.short if named and number == 0 else None
+            axes.axvspan(ends[start], ends[stop], color=colour, linewidth=0, zorder=0.4, label=label)
+    held = np.isin(state, HELD_AND_DRIVEN)
+    turns = held[:-1] & held[1:] & (state[:-1] != state[1:])
+    label = "drive effort changes sign" if named else None
+    for place in np.flatnonzero(turns):
+        axes.axvline(ends[place + 1], color=INK, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1.5, label=label)
+        label = None
+
+
+def _ends(result: xr.Dataset, over: Abscissa) -> Array:
+    """Where what is before each position gives way to it, one more than there are: found between positions, or
+    half-way."""
+    x = over.values
+    half = float(x[1] - x[0]) / 2 if x.size > 1 else 0.5
+    ends = np.concatenate([[x[0] - half], (x[1:] + x[:-1]) / 2, [x[-1] + half]])
+    told = attribute(result, "locking_ranges", "{}")
+    if told and told["of"] and told["positions"] == x.size:  # else they are times
+        for row in told["rows"]:
+            if row["state"] and row.get("ends", [None])[0] is not None:
+                ends[row["first"]] = row["ends"][0]
+    return ends

@@ -48,7 +48,8 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTabl
         best = int(np.nanargmax(row))
         rows.append([label, "", quantity(float(row[best]), unit), over.say(best), ""])
     low, high = (quantity(float(pick(result["value"].values)), unit) for pick in (np.nanmin, np.nanmax))
-    return TextTable(f"{name}, from {low} to {high}; shares are at {over.say(top)}", HEAD, rows)
+    course = f"from {low} to {high}" if result.sizes["position"] > 1 else low
+    return TextTable(f"{name}, {course}; shares are at {over.say(top)}", HEAD, rows)
 
 
 def _extremes(result: xr.Dataset) -> list[list[str]]:

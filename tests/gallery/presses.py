@@ -79,7 +79,32 @@ def stroke_by_hand() -> float:
     return float(2 * np.hypot(0.06, 1.26) * np.sin((high - low) / 2))
 
 
+# ---- flywheel-press: how the motor starts it ------------------------------------------------------------------------
+
+
+def start_of(one: Outcome) -> float:
+    """Acceleration of the crank at the start, without friction."""
+    smooth = trunnion.simulate(one.mechanism.with_friction("off"), 1e-3, 1)
+    return float(smooth["joint_rotation_acceleration"].sel(joint="O").values[0])
+
+
+def start_by_hand() -> float:
+    """i η T over the inertias, at the dead centre: of the crank, of the rotor by i² η, of the rod."""
+    standstill = 2 * 60 / (1 / 0.2 + 0.2)
+    rod = 14 * (0.04 * (1 - 80 / 220)) ** 2 + 0.09 * (0.04 / 0.22) ** 2
+    return float(12 * 0.95 * standstill / (22 + 12**2 * 0.95 * 0.02 + rod))
+
+
 ENTRIES = {
+    "flywheel-press": Entry(
+        says="Acceleration of the crank as the motor starts it, without friction",
+        unit="rad/s^2",
+        found=start_of,
+        expected=start_by_hand,
+        source="Kloss's torque at standstill over the inertias at the dead centre",
+        tolerance=1e-9,
+        figures=("mechanism", "torque"),
+    ),
     "toggle-press": Entry(
         says="Distance of the knee from its dead centre below which the press holds by itself",
         unit="m",

@@ -91,7 +91,7 @@ def test_the_loss_of_a_gear_turns_round_with_the_power() -> None:
 
 def test_switched_off_and_braked() -> None:
     """Constant torques: two straight lines in the speed, and a stop at a known time."""
-    motor = {"kind": "constant", "effort": 4, "off": 1.0, "brake": 2.0, "brake_from": 1.5}
+    motor = {"kind": "constant", "effort": 4, "off_from": 1.0, "brake": 2.0, "brake_from": 1.5}
     result = simulate(wheel(motor), 4.0, 8, 1e-11)
     top = (4 - 0.6) / 0.05
     later = top - 0.6 / 0.05 * 0.5
@@ -272,7 +272,7 @@ def test_the_books_of_energy_are_kept() -> None:
 
 
 def test_a_summary_says_how_it_starts() -> None:
-    figures = {one.name: one for one in summary_of(simulate(slider_crank(), 1.5, 100))}
-    assert 0.5 < figures["O.starting_time"].value < 2.0
+    figures = {one.name: one for one in summary_of(simulate(slider_crank(), 0.8, 100))}
+    assert 0.3 < figures["O.starting_time"].value < 0.8
     assert 0.001 < figures["O.fluctuation"].value < 0.1
     assert figures["O.speed_mean"].value < 157

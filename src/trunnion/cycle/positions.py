@@ -105,7 +105,7 @@ def positions(
 
     means = _means(run, arrays, quick) if averaged else still(arrays)
     meant = (_means(run, ideal, quick, ideal=True) if averaged else still(ideal)) if run.erring else None
-    walked = back if steps <= LOOKED and not run.seats else None
+    walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     return Positions(arrays, labels, time, method, causes, means, meant, losses, walked)
 
 

@@ -23,7 +23,7 @@ class Drive:
     """What drives one free coordinate; nothing if it has no motor.
 
     parameters: of the motor, SI; inertia: of the rotor as the motor sees it, kg m² or kg; ratio: motor speed over the
-    coordinate's; off, brake_from: times, s, from which the motor is off and the brake on.
+    coordinate's; off_from, brake_from: times, s, from which the motor is off and the brake on.
     """
 
     motor: Motor | None
@@ -31,7 +31,7 @@ class Drive:
     ratio: float = 1.0
     efficiency: float = 1.0
     inertia: float = 0.0
-    off: float = np.inf
+    off_from: float = np.inf
     brake: float = 0.0
     brake_from: float = np.inf
 
@@ -43,7 +43,7 @@ class Drive:
     @property
     def times(self) -> list[float]:
         """Times, s, at which its effort jumps or bends."""
-        found = [self.off, self.brake_from]
+        found = [self.off_from, self.brake_from]
         if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
             found += list(self.parameters["points.place"])
         return [time for time in found if np.isfinite(time)]
@@ -55,7 +55,7 @@ class Drive:
 
     def shaft(self, time: Array, speed: Array, integral: Array, now: float) -> Array:
         """Effort at the motor's shaft. now: a time, s, that says what is switched on: within one stretch all is."""
-        if self.motor is None or now >= self.off:
+        if self.motor is None or now >= self.off_from:
             return 0.0 * speed
         return self.motor.of.function(self.ratio * speed, time, self.parameters, integral)
 
@@ -70,7 +70,7 @@ class Drive:
 
     def error(self, time: Array, speed: Array, integral: Array, now: float) -> Array:
         """Rate of the controller's integral."""
-        if self.motor is None or self.motor.of.error is None or now >= self.off:
+        if self.motor is None or self.motor.of.error is None or now >= self.off_from:
             return 0.0 * speed
         return self.motor.of.error(self.ratio * speed, time, self.parameters, integral)
 
@@ -90,6 +90,6 @@ def drives(system: System, values: Values) -> dict[str, Drive]:
         for key in ("place", "effort"):
             rows = range(len(motor.points or ()))
             parameters[f"points.{key}"] = np.array([float(own[f"points.{k}.{key}"]) for k in rows])
-        known = ("ratio", "efficiency", "inertia", "off", "brake", "brake_from")
+        known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from")
         found[name] = Drive(motor, parameters, **{key: float(own[key]) for key in known if key in own})
     return found

@@ -171,8 +171,8 @@ class Motor(Part):
     """What drives a joint whose motion is found, by a kind of `joints.motors`, and what is between it and the joint.
 
     ratio: speed of the motor over that of the joint; efficiency: of that gear; inertia: of the rotor (mass of a linear
-    motor), on the motor's side. off: time at which the motor is switched off; brake: effort that resists the joint from
-    the time brake_from on.
+    motor), on the motor's side. off_from: time at which the motor is switched off; brake: effort that resists the joint
+    from the time brake_from on.
     """
 
     kind: Annotated[str, _check_motor, _schema_motor]
@@ -191,7 +191,7 @@ class Motor(Part):
     ratio: Dimensionless | None = None
     efficiency: Dimensionless | None = None
     inertia: AnyQuantity | None = None
-    off: Time | None = None
+    off_from: Time | None = None
     brake: ForceOrMoment | None = None
     brake_from: Time | None = None
 

@@ -13,7 +13,7 @@ from trunnion.model.parts import Driver
 __all__ = ["FREE", "free_motion", "motor_values"]
 
 FREE = ("free", "motor", "initial")  # keys of a driver that no motion law takes
-COMMON = ("kind", "ratio", "efficiency", "inertia", "off", "brake", "brake_from")  # of every kind of motor
+COMMON = ("kind", "ratio", "efficiency", "inertia", "off_from", "brake", "brake_from")  # of every kind of motor
 EXAMPLES = {
     "effort": "4 N m",
     "stall_effort": "4 N m",
@@ -54,7 +54,7 @@ def free_motion(driver: Driver, where: str) -> Iterator[Finding]:
 
 
 ABOVE_0 = ("breakdown_effort", "breakdown_slip", "limit", "efficiency")
-NOT_BELOW_0 = ("inertia", "brake", "proportional", "integral", "off", "brake_from")
+NOT_BELOW_0 = ("inertia", "brake", "proportional", "integral", "off_from", "brake_from")
 NOT_0 = ("ratio", "no_load_speed", "synchronous_speed")
 
 

@@ -134,14 +134,14 @@ _RIG = (
     ),
     Fault(
         "bias-scatter-of-a-population",
-        "rig/comparison/assessment.py",
+        "rig/comparison/uncertainty.py",
         "np.std(means, ddof=1)",
         "np.std(means)",
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),
     ),
     Fault(
         "bias-without-its-local-part",
-        "rig/comparison/assessment.py",
+        "rig/comparison/uncertainty.py",
         "local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])",
         "local = np.zeros(1)",
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),

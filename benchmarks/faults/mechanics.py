@@ -225,8 +225,8 @@ _CYCLE = (
     Fault(
         "useful-power-sign",
         "cycle/fill.py",
-        "useful = useful - back.load_powers[name]",
-        "useful = useful + back.load_powers[name]",
+        "useful = useful - power",
+        "useful = useful + power",
         ("tests/reference/test_means.py", "-k", "efficiency"),
     ),
 )
@@ -342,4 +342,49 @@ _ENGINES = (
     ),
 )
 
-FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_MEASURES)
+_DYNAMICS = (
+    Fault(
+        "rotor-without-its-ratio",
+        "dynamics/motor.py",
+        "self.inertia * self.ratio * second",
+        "self.inertia * second",
+        ("tests/reference/test_motion_in_time.py", "-k", "rotor"),
+    ),
+    Fault(
+        "loss-of-a-gear-one-way",
+        "joints/motors.py",
+        "np.where(joint * speed >= 0.0, joint * efficiency, joint / efficiency)",
+        "joint * efficiency",
+        ("tests/reference/test_motion_in_time.py", "-k", "gear"),
+    ),
+    Fault(
+        "tables-without-dampers",
+        "dynamics/tabulated.py",
+        " + matrix[:, 2] * speed",
+        "",
+        ("tests/reference/test_motion_in_time.py", "-k", "runs_down"),
+    ),
+    Fault(
+        "friction-of-the-other-sense-at-rest",
+        "dynamics/rest.py",
+        "miss = sense * (given - demanded)[0]",
+        "miss = (given - demanded)[0]",
+        ("tests/reference/test_motion_in_time.py", "-k", "weak or breaks"),
+    ),
+    Fault(
+        "twice-the-kinetic-energy",
+        "dynamics/energy.py",
+        "found = found - 0.5 * algebra.power",
+        "found = found - algebra.power",
+        ("tests/reference/test_motion_in_time.py", "-k", "books"),
+    ),
+    Fault(
+        "inertia-of-the-other-sign-in-tables",
+        "dynamics/tables.py",
+        "_lanes(motion, q, 0.0, 1.0, False)",
+        "_lanes(motion, q, 0.0, -1.0, False)",
+        ("tests/invariants/test_free_motion.py", "-k", "tables"),
+    ),
+)
+
+FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_DYNAMICS, *_MEASURES)

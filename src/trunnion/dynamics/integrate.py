@@ -33,6 +33,8 @@ __all__ = ["Ended", "Event", "Integration", "Solution", "Stretch"]
 Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
+SHORT = 0.25  # of the time to a place that is not reached: how far to go on before it is looked for again
+STUCK = 50  # events at one time
 SECANTS = 8  # rounds to the place of a time in a step along another number
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
 CLOSE = 1e-13  # of the time or coordinate: places that are one
@@ -144,9 +146,19 @@ class Integration:
     def run(self, row: Array) -> Solution:
         """The motion from an initial row."""
         self._follow(0.0, row, 0.0, 0.0)
-        time, step, sense = 0.0, None, float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0
+        before, time, step, sense = (
+            -1.0,
+            0.0,
+            None,
+            float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0,
+        )
+        stayed = 0
         for _ in range(MOST_EVENTS):
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
+                return self.solution
+            stayed, before = (stayed + 1 if time == before else 0), time
+            if stayed > STUCK:
+                self._stop("step", time, row)
                 return self.solution
             k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
             until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else 0.0))
@@ -291,6 +303,8 @@ class Integration:
                 return np.full_like(state, np.nan)  # it turns round before
             found = rate(moment, state)
             pace = found[k]
+            if not pace * (to.value - begin) > 0.0:
+                return np.full_like(state, np.nan)  # it does not go there
             with np.errstate(all="ignore"):
                 slopes: Array = found / pace
                 slopes[k] = 1.0 / pace
@@ -309,6 +323,9 @@ class Integration:
             before[k] = last
             if wrong and k == 0 and sense:
                 return self._approach(float(held[k]), before, Passing(n, 0.0), until, sense, now, rate)
+            if wrong and k == 0:  # nothing sticks where it turns round: on by time, not as far as the place
+                far = SHORT * (to.value - last) / float(before[n])
+                return self._plain(float(held[k]), before, min(until, float(held[k]) + far), sense, now, rate)
             if wrong:
                 return self._failed(float(held[k]), before, sense, now, failed)[:2]
             if solver.y[k] > until:
@@ -377,15 +394,18 @@ class Integration:
         ahead = row.copy()
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
         causes = [self._cause(time, one, sense, now) for one in (row, ahead)]
-        figures = {"coordinate": float(row[0]), "rate": float(row[n])}
         if self.rest is not None and "locked" in causes:
             energy = self._kinetic(time, row, sense, now)
             self._note(time, "lock", energy, "J")
             row[n] = 0.0
             return time, row, None
         code = next((one for one in causes if one != "locked" and one), "step")
-        self.end(code, time, figures)
+        self._stop(code, time, row)
         return time, row, None
+
+    def _stop(self, code: str, time: float, row: Array) -> None:
+        figures = {"coordinate": float(row[0]), "rate": float(row[self.layout.coordinates])}
+        self.end(code, time, figures)
 
     def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
         """Why a state has no acceleration; empty if it has one."""

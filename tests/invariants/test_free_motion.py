@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
@@ -125,6 +126,8 @@ def test_a_range_ends_the_motion() -> None:
         ({"speed": 1, "motor": {**LINEAR, "ratio": 0}}, "input.drivers"),
         ({"speed": 1, "motor": {**LINEAR, "brake": 2}}, "input.drivers"),
         ({"speed": 1, "initial": {"speed": 1}}, "input.drivers"),
+        ({"speed": 1, "motor": {**LINEAR, "no_load_speed": -100}}, "input.drivers"),
+        ({"speed": 1, "range": [0, 1], "motor": LINEAR, "initial": {"coordinate": 2}}, "input.drivers"),
         ({"speed": 1, "motor": {"kind": "steam"}}, "input.drivers"),
     ],
 )
@@ -133,6 +136,34 @@ def test_a_driver_that_cannot_be_let_move_is_refused(driver: dict[str, Any], cod
     with pytest.raises(MechanismError) as caught:
         simulate(Mechanism(**data), 1.0)
     assert {one.code for one in caught.value.findings} == {code}
+
+
+def test_what_has_no_mass_has_no_acceleration() -> None:
+    data = wheel(LINEAR).data()
+    data["links"]["wheel"]["inertia"] = 0
+    with pytest.raises(MechanismError) as caught:
+        simulate(Mechanism(**data), 1.0)
+    assert caught.value.findings[0].where == "drivers.A"
+
+
+def test_it_turns_round_before_the_end_of_its_range() -> None:
+    """A pendulum in a range that it nearly reaches: its period is that of the whole swing, by the elliptic integral."""
+    data: dict[str, Any] = {
+        "gravity": [0, -9.81],
+        "links": {
+            "ground": {"points": {"A": [0, 0]}},
+            "bob": {"points": {"A": [0, 0]}, "mass": 1, "centre": [1, 0]},
+        },
+        "joints": {"A": {"type": "revolute", "links": ["ground", "bob"]}},
+        "drivers": {"A": {
+            "speed": 1, "free": True, "range": [-np.pi / 2 - 0.501, -np.pi / 2 + 0.501],
+            "initial": {"coordinate": -np.pi / 2 + 0.5},
+        }},
+    }  # fmt: skip
+    period = 4 * ellipk(np.sin(0.25) ** 2) / np.sqrt(9.81)
+    result = simulate(Mechanism(**data), period, 1, 1e-10)
+    assert not result.trunnion.findings
+    assert float(result["drive_coordinate"].values[0, 1]) == pytest.approx(-np.pi / 2 + 0.5, abs=1e-7)
 
 
 @pytest.mark.parametrize("options", [{"duration": -1.0}, {"duration": 1.0, "steps": 0}, {"tolerance": 1.0}])

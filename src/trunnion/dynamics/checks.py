@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.mechanism import Mechanism
@@ -17,6 +19,17 @@ def refuse(mechanism: Mechanism) -> None:
         raise MechanismError(findings)
 
 
+def _inert(mechanism: Mechanism) -> Iterator[bool]:
+    """Whether each mass and inertia of what moves is one."""
+    values = mechanism.parameters()
+    for path, value in values.items():
+        section, name, *rest = path.split(".")
+        if section == "links" and name != mechanism.fixed_link and rest and rest[0] in ("mass", "inertia"):
+            yield bool(np.any(np.asarray(value) != 0))
+        if section == "drivers" and rest == ["motor", "inertia"]:
+            yield bool(np.any(np.asarray(value) != 0))
+
+
 def _findings(mechanism: Mechanism) -> Iterator[Finding]:
     free = [name for name, driver in mechanism.drivers.items() if driver.found]
     if not free:
@@ -25,8 +38,18 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         remedy = "state a motor, such as motor: {kind: constant, effort: 4 N m}, or free: true"
         yield Finding(what, f"drivers.{first}" if first else "drivers", remedy)
         return
+    if not any(_inert(mechanism)):
+        remedy = "state a mass or an inertia of a link that it moves, or the inertia of its motor"
+        yield Finding("no mass moves with it, so it has no acceleration", f"drivers.{free[0]}", remedy)
     if len(free) < 2:
         return
+    for name in free:
+        motor = mechanism.drivers[name].motor
+        if motor is not None and motor.efficiency is not None and motor.efficiency.source != 1:
+            what = (
+                f"the gear's loss may hold its joint at rest, and with {len(free)} free drivers joints stick one by one"
+            )
+            yield Finding(what, f"drivers.{name}.motor.efficiency", "remove it, or use one free driver")
     smooth = [name for name, law in FRICTION_LAWS.items() if not law.interval_at_rest]
     for name, joint in mechanism.effective_joints.items():
         law = joint.friction.law if joint.friction else None

@@ -33,7 +33,7 @@ __all__ = ["Ended", "Event", "Integration", "Solution", "Stretch"]
 Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
-SHORT = 0.25  # of the time to a place that is not reached: how far to go on before it is looked for again
+CREEPING, CREPT = 400, 1e-9  # steps that get on by less of the duration: it does not get on
 STUCK = 50  # events at one time
 SECANTS = 8  # rounds to the place of a time in a step along another number
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
@@ -115,7 +115,7 @@ class Integration:
 
     bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
     limits: coordinates between which the driver may move; progress: told the time that is reached; inside: share of the
-    coordinate by which forces are asked for on this side of a bend.
+    coordinate by which forces are asked for on this side of a bend; times: s, at which a load jumps or bends.
     """
 
     motion: FreeMotion
@@ -127,11 +127,15 @@ class Integration:
     limits: tuple[float, float] = (-np.inf, np.inf)
     progress: Callable[[float], None] | None = None
     inside: float = INSIDE
+    times: Sequence[float] = ()
 
     def __post_init__(self) -> None:
         self.layout = Layout(len(self.motion.names), len(self.motion.bristles))
         self.solution = Solution(self.layout)
-        times = {time for drive in self.motion.drives.values() for time in drive.times if 0 < time < self.duration}
+        known = [time for drive in self.motion.drives.values() for time in drive.times]
+        times = {time for time in (*known, *self.times) if 0 < time < self.duration}
+        self.pace = np.sqrt(self.motion.unit)  # typical rates
+        self.turned_over, self.asked_for = 0.0, 0
         self.breaks = [*sorted(times), self.duration]
         self.rest = Rest(self.motion, self.layout) if self.sticks else None
 
@@ -139,13 +143,16 @@ class Integration:
     def sticks(self) -> bool:
         """Whether the one free coordinate may rest in friction."""
         braked = any(np.isfinite(drive.brake_from) for drive in self.motion.drives.values())
-        return len(self.motion.names) == 1 and bool(self.motion.sticking or braked)
+        lossy = any(drive.efficiency < 1.0 for drive in self.motion.drives.values())
+        return len(self.motion.names) == 1 and bool(self.motion.sticking or braked or lossy)
 
     # ---- the whole way ----------------------------------------------------------------------------------------
 
     def run(self, row: Array) -> Solution:
         """The motion from an initial row."""
         self._follow(0.0, row, 0.0, 0.0)
+        if not self._begins(row):
+            return self.solution
         before, time, step, sense = (
             -1.0,
             0.0,
@@ -171,6 +178,24 @@ class Integration:
             time, row, step = self._move(time, row, until, sense, now, step)
         self.end("events", time, {"count": float(MOST_EVENTS)})
         return self.solution
+
+    def _begins(self, row: Array) -> bool:
+        """Whether there are accelerations at the start; they also tell what rates are typical."""
+        n, now = self.layout.coordinates, 0.5 * self.breaks[0]
+        if self.rest is not None and row[n] == 0.0:
+            if self._cause(0.0, row, 1.0, now) != "not_assembled":
+                return True
+            self._stop("not_assembled", 0.0, row)
+            return False
+        sense = float(np.sign(row[n])) if self.sticks else 0.0
+        at = self.layout.moment(np.zeros(1), row[:, None], sense, now)
+        with np.errstate(all="ignore"):
+            second = self.dynamics(at).second
+        if not np.all(np.isfinite(second)):
+            self._stop(self._cause(0.0, row, sense, now) or "no_acceleration", 0.0, row)
+            return False
+        self.pace = np.maximum(self.pace, np.maximum(np.sqrt(np.abs(second)), np.abs(row[n : 2 * n])))
+        return True
 
     def end(self, code: str, time: float, figures: dict[str, Any] | None = None) -> None:
         self.solution.ended = Ended(f"simulate.{code}", time, figures or {})
@@ -217,14 +242,21 @@ class Integration:
         between = self._place(float(row[0]), sense or float(np.sign(row[n])))
         rate = self._rate(sense, now, between)
         first = min(step, 0.5 * (until - time)) if step else None
-        solver = self._solver(rate, time, row, until, self._absolute(row), first)
+        solver, marks = self._solver(rate, time, row, until, self._absolute(row), first), [time]
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
-            near = self._near(row, between, self._next(solver, until))
+            marks.append(before)
+            if len(marks) > CREEPING and before - marks[-CREEPING] < CREPT * self.duration:
+                return self._failed(before, row, sense, now, "")
+            near = self._near(row, between, self._next(solver, until), rate, before)
             failed = None if near else solver.step()
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
                 return self._failed(before, row, sense, now, failed)
             passed = near or self._passed(row, np.array(solver.y), sense, between)
+            if passed is not None and passed.number == 0 and row[n] == 0.0:  # from rest: nearer first
+                size = 0.25 * (float(solver.t) - before)
+                solver = self._solver(rate, before, row, until, self._absolute(row), size)
+                continue
             if passed is not None:
                 last = float(solver.step_size or 0.0)
                 return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
@@ -258,6 +290,8 @@ class Integration:
         first: float | None = None,
     ) -> OdeSolver:  # fmt: skip
         kind = LSODA if self.motion.bristles else DOP853
+        if first is None and not np.all(np.isfinite(rate(begin, row))):
+            first = 1e-12 * abs(end - begin)  # SciPy would look for one without end; so the first step fails
         return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first)
 
     @staticmethod
@@ -265,13 +299,19 @@ class Integration:
         """How far the next step is about to go, s."""
         return min(float(getattr(solver, "h_abs", None) or solver.step_size or 0.0), until - float(solver.t))
 
-    def _near(self, row: Array, between: tuple[float, float], step: float) -> Passing | None:
-        """The bend that the next step would pass, foreseen by the speed."""
-        speed = float(row[self.layout.coordinates])
+    def _near(
+        self, row: Array, between: tuple[float, float], step: float, rate: Callable[[float, Array], Array], time: float
+    ) -> Passing | None:
+        """The bend that the next step would pass, foreseen by the speed; not if it turns round before."""
+        n = self.layout.coordinates
+        speed = float(row[n])
         level = between[1] if speed > 0 else between[0]
         if len(self.motion.names) != 1 or not np.isfinite(level) or speed == 0.0:
             return None
-        return Passing(0, level) if (level - row[0]) / speed < step else None
+        if not (level - row[0]) / speed < step:
+            return None
+        reached = speed * speed + 2.0 * float(rate(time, row)[n]) * (level - float(row[0]))
+        return Passing(0, level) if reached > 0.0 else None
 
     def _passed(self, before: Array, after: Array, sense: float, between: tuple[float, float]) -> Passing | None:
         """What a step has passed: the speed 0, or else a bend; the step is then taken anew, up to it."""
@@ -281,7 +321,8 @@ class Integration:
         if len(self.motion.names) == 1:
             for level in between:
                 if np.isfinite(level) and (before[0] - level) * (after[0] - level) < 0:
-                    return Passing(0, level)
+                    ahead = (level - before[0]) * before[n] > 0.0
+                    return Passing(0, level) if ahead or before[n] == 0.0 else Passing(n, 0.0)
         return None
 
     def _approach(
@@ -312,20 +353,19 @@ class Integration:
 
         begin, state = float(row[k]), row.copy()
         if begin == to.value:
+            if k == 0 and to.value in self.limits:
+                self.end("range", time, {"coordinate": to.value})
             return time, row
         state[k], absolute = time, self._absolute(row)
-        absolute[k] = self.tolerance / max(float(np.max(np.sqrt(self.motion.unit))), 1e-300)
+        absolute[k] = self.tolerance / max(float(np.max(self.pace)), 1e-300)
         solver = self._solver(by_number, begin, state, to.value, absolute)
         while solver.status == "running":
             last, held = float(solver.t), np.array(solver.y)
             failed = solver.step()
             wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), held.copy()
             before[k] = last
-            if wrong and k == 0 and sense:
+            if wrong and k == 0 and before[n] != 0.0:  # it turns round before the place
                 return self._approach(float(held[k]), before, Passing(n, 0.0), until, sense, now, rate)
-            if wrong and k == 0:  # nothing sticks where it turns round: on by time, not as far as the place
-                far = SHORT * (to.value - last) / float(before[n])
-                return self._plain(float(held[k]), before, min(until, float(held[k]) + far), sense, now, rate)
             if wrong:
                 return self._failed(float(held[k]), before, sense, now, failed)[:2]
             if solver.y[k] > until:
@@ -354,19 +394,20 @@ class Integration:
 
     def _absolute(self, row: Array) -> Array:
         """Absolute tolerances: a share of what is typical of each number."""
-        unit, n = self.motion.unit, self.layout.coordinates
-        pace = float(np.max(np.sqrt(unit)))
-        sizes = np.array([1.0 if self.motion.system.turns(name) else np.sqrt(u) / pace for name, u in
-                          zip(self.motion.names, unit, strict=True)])  # fmt: skip
+        n, system = self.layout.coordinates, self.motion.system
+        size = float(np.ravel(system.size(self.motion.values))[0])
+        sizes = np.array([1.0 if system.turns(name) else size for name in self.motion.names])
         found = np.full(len(row), self.tolerance)
         found[:n] *= 0.01 * sizes
-        found[n : 2 * n] *= 0.01 * sizes * pace
+        found[n : 2 * n] *= 0.01 * self.pace
         found[2 * n : 3 * n] *= sizes
         found[3 * n : 3 * n + self.layout.bristles] *= 1e-9
-        turned_over = float(
-            np.max(np.abs(row[-len(WORKS) :]))
-        )  # at the start nothing: the works follow the motion then
-        found[-len(WORKS) :] = self.tolerance * turned_over if turned_over else np.inf
+        self.turned_over = max(self.turned_over, float(np.max(np.abs(row[-len(WORKS) :]))))
+        self.asked_for += 1
+        if self.asked_for & (self.asked_for - 1) == 0:  # the 1st, 2nd, 4th … time: energy may be large and no work done
+            self.turned_over = max(self.turned_over, self._kinetic(0.0, row, 0.0, 0.0))
+        # at the start nothing is turned over: the works follow the motion then
+        found[-len(WORKS) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
         return found
 
     def _place(self, q: float, sense: float) -> tuple[float, float]:
@@ -381,7 +422,9 @@ class Integration:
             )
             every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
             near = 1e-12 * max(1.0, abs(q))
-            below, above = every[every < q - near], every[every > q + near]
+            # one at q itself is behind, by the way it goes
+            below = every[every < q + (near if sense > 0 else -near)]
+            above = every[every > q - (near if sense < 0 else -near)]
             low = max(low, below[-1]) if len(below) else low
             high = min(high, above[0]) if len(above) else high
         return low, high

@@ -59,10 +59,21 @@ class Drive:
             return 0.0 * speed
         return self.motor.of.function(self.ratio * speed, time, self.parameters, integral)
 
-    def effort(self, time: Array, speed: Array, second: Array, integral: Array, now: float) -> Array:
-        """Effort on the coordinate, less what the rotor takes to be accelerated; second: of the coordinate."""
+    def waiting(self, since: Array, integral: Array, now: float) -> Array:
+        """The controller's integral after a time at rest, s."""
+        if self.motor is None or self.motor.of.at_rest is None or now >= self.off_from:
+            return integral + 0.0 * since
+        return self.motor.of.at_rest(since, self.parameters, integral)
+
+    def effort(
+        self, time: Array, speed: Array, second: Array, integral: Array, now: float, sense: float = 0.0
+    ) -> Array:
+        """Effort on the coordinate, less what the rotor takes to be accelerated; second: of the coordinate.
+
+        sense: of the motion about to begin where the speed is 0, by which the loss in the gear goes.
+        """
         free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
-        return transmitted(free, speed, self.ratio, self.efficiency)
+        return transmitted(free, np.where(speed != 0.0, speed, sense), self.ratio, self.efficiency)
 
     def braking(self, now: float) -> float:
         """Effort of the brake, against the motion."""

@@ -38,9 +38,7 @@ class Rest:
         """The state at times of a rest that began at a time in a row: only controllers move on."""
         found = np.repeat(row[:, None], len(time), axis=1)
         (drive,), n = self.motion.drives.values(), self.layout.coordinates
-        start = row[2 * n : 3 * n]
-        rate = drive.error(np.array([begin]), np.zeros(1), start, begin)
-        found[2 * n] = start[0] + rate[0] * (time - begin)
+        found[2 * n] = drive.waiting(time - begin, row[2 * n], begin)
         return found
 
     def beyond(self, time: Array, row: Array, begin: float, now: float) -> tuple[Array, Array]:

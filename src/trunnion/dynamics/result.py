@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
+from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import Solution
 from trunnion.dynamics.rates import WORKS
 from trunnion.dynamics.rest import Rest
@@ -63,6 +64,7 @@ def result_of(motion: FreeMotion, solution: Solution, books: Books) -> Result:
     """The result of a motion in time."""
     mechanism, system = motion.system.mechanism, motion.system
     residual, turned_over = _energy(books)
+    turned_over = max(turned_over, _turned_over(motion, solution))
     findings = [*_findings(motion, solution, books), *_unbalanced(residual, turned_over)]
     attributes = encoded(
         {
@@ -121,6 +123,23 @@ def _energy(books: Books) -> tuple[Array, float]:
     residual = drive + loads + springs - friction - (energy - energy[0])
     sizes = [np.nanmax(np.abs(one), initial=0.0) for one in (*books.works, *(books.energies - books.energies[:, :1]))]
     return residual, float(max(sizes))
+
+
+LOOKED = 400  # times between the rows at which the energy is looked at
+
+
+def _turned_over(motion: FreeMotion, solution: Solution) -> float:
+    """The largest work or change of energy at the ends of steps, J: rows may be far apart."""
+    if motion.followed or not solution.stretches:
+        return 0.0
+    ends = np.array([one.end for one in solution.stretches])
+    time = np.unique(np.append(ends[:: max(1, len(ends) // LOOKED)], solution.stretches[0].begin))
+    rows, _ = solution.at(time)
+    at = solution.layout.moment(time, rows)
+    walk = motion.walk(at, np.zeros_like(at.q))
+    energies = np.array([np.broadcast_to(one, time.shape) for one in (kinetic_energy(walk), potential_energy(walk))])
+    changes = energies - energies[:, :1]
+    return float(np.nanmax(np.abs(np.concatenate([changes, solution.layout.works(rows)])), initial=0.0))
 
 
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
@@ -184,6 +203,8 @@ def _summary(
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
         rate, what = books.at.rate[i], "speed"
         unit = "rad/s" if turns else "m/s"
+        if not np.any(np.isfinite(rate)) or not np.any(np.isfinite(books.works[0])):
+            continue
         most = int(np.nanargmax(np.abs(rate)))
         found.append(Figure(f"{name}.speed_max", f"{what} of {name}", rate[most], unit, "largest", _at(books, most)))
         last = np.flatnonzero(np.isfinite(rate))[-1]
@@ -201,10 +222,12 @@ def _summary(
             most = int(np.nanargmax(size))
             found.append(Figure(f"{joint}.reaction_max", f"reaction in {joint}", size[most], "N", "largest",
                                 _at(books, most)))  # fmt: skip
+    if not np.any(np.isfinite(books.works[0])):  # it does not begin
+        return found
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
     words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction")
     for key, word, work in zip(WORKS, words, books.works[:, done], strict=True):
-        if np.any(books.works[WORKS.index(key)] != 0.0):
+        if np.any(np.nan_to_num(books.works[WORKS.index(key)]) != 0.0):
             found.append(Figure(f"work_{key}", word, work, "J"))
     worst = float(np.nanmax(np.abs(residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))

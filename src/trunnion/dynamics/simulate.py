@@ -17,7 +17,7 @@ from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
-from trunnion.dynamics.start import initial_row, places
+from trunnion.dynamics.start import initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
@@ -38,7 +38,7 @@ __all__ = ["simulate", "simulated"]
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
-TABLED = 1e-14  # as `integrate.INSIDE`, of tables, which know on which side they are asked
+TABLED = 1e-12  # as `integrate.INSIDE`, of tables, which know on which side they are asked
 CYCLES = 10  # of the nominal motion: the duration if none is stated
 
 
@@ -83,15 +83,24 @@ def simulated(
     rates = walks if tables is None else TabulatedRates(tables, walks)
     integration = Integration(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
-        INSIDE if tables is None else TABLED,
+        INSIDE if tables is None else TABLED, load_times(motion, duration),
     )  # fmt: skip
+    row = initial_row(motion)
+    _check_start(motion, row, known.limits)
     try:
-        solution = integration.run(initial_row(motion))
+        solution = integration.run(row)
     except KeyboardInterrupt:  # what is done is kept
         solution = integration.solution
         integration.end("stopped", solution.end)
     time = np.linspace(0.0, duration, steps + 1)
     return result_of(motion, solution, Filling(motion, solution, time).books())
+
+
+def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:
+    """MechanismError for a start outside the range of the one free driver."""
+    if not limits[0] <= row[0] <= limits[1]:
+        what = f"begins at {row[0]:g} (SI), outside its range from {limits[0]:g} to {limits[1]:g}"
+        raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin within the range"))
 
 
 def _check_numbers(duration: float, steps: int, tolerance: float) -> None:

@@ -12,10 +12,11 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
 
-__all__ = ["Places", "initial_row", "places"]
+__all__ = ["Places", "initial_row", "load_times", "places"]
 
 Array = NDArray[np.float64]
 
+SCANNED = 4001  # times at which ends of loads are looked for: most are linear in the time, and found exactly
 CLOSE = 1e-9  # of the way: bends that are one
 
 
@@ -43,6 +44,31 @@ def initial_row(motion: FreeMotion) -> Array:
         row[i] = _number(values.get(f"{path}.initial.coordinate", begin))
         row[layout.coordinates + i] = _number(values.get(f"{path}.initial.speed", 0.0))
     return row
+
+
+def load_times(motion: FreeMotion, duration: float) -> list[float]:
+    """Times, s, at which loads that vary with the time jump or bend: ends of a `between`, points of a table."""
+    mechanism = motion.system.mechanism
+    found, grid = list[float](), np.linspace(0.0, duration, SCANNED)
+    for name, table in mechanism.tables.items():
+        if table.over == "time":
+            knots = np.array([_number(motion.values[f"tables.{name}.points.{k}.at"]) for k in range(len(table.points))])
+            period = _number(motion.values.get(f"tables.{name}.period", knots[-1] - knots[0]))
+            laps = np.arange(int(duration / period) + 2) * period if table.repeats and period > 0 else np.zeros(1)
+            found += list((knots + laps[:, None]).ravel())
+    for entry in mechanism.parameter_set.entries.values():
+        if not entry.varies or entry.quantity.expression is None or "time" not in entry.quantity.names:
+            continue
+        sizes = [name for name in entry.quantity.names if name in mechanism.dimensions]
+        known = {name: motion.values[f"dimensions.{name}"] for name in sizes}
+        for kink in entry.quantity.expression.kinks:
+            try:
+                level = np.broadcast_to(np.asarray(kink({**known, "time": grid}), float), grid.shape)
+            except KeyError:  # it depends on the motion as well
+                continue
+            k = np.flatnonzero(np.diff(np.sign(level)) != 0)
+            found += list(grid[k] - level[k] * (grid[k + 1] - grid[k]) / (level[k + 1] - level[k]))
+    return found
 
 
 def places(motion: FreeMotion) -> Places:

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 ROUNDS = 30  # of Newton's method
 SETTLED = 1e-11  # of the largest acceleration: where it ends
 CLOSE = 1e-6  # a step of which the next is below rounding, for it converges to the square
+FAR = 1e3  # times what is typical: an acceleration beyond which the step of the derivative was too short
 DIFFERENCE = 1e-4  # of the acceleration, by which the derivative is taken where E is not affine
 
 
@@ -178,7 +179,7 @@ class FreeMotion:
         found = []
         for i, drive in enumerate(self.drives.values()):
             rate = at.rate[i]
-            effort = drive.effort(at.time, rate, second[i], at.integral[i], at.now)
+            effort = drive.effort(at.time, rate, second[i], at.integral[i], at.now, at.sense)
             sense = np.where(rate != 0.0, np.sign(rate), at.sense)
             found.append(effort - sense * drive.braking(at.now))
         return np.array(found).reshape(at.q.shape)
@@ -209,7 +210,9 @@ class FreeMotion:
             second = second + step
             largest = np.maximum(np.max(np.abs(second), axis=0), 1e-6 * np.min(self.unit))
             close = SETTLED if not self.affine else CLOSE
-            if np.all(~np.isfinite(step) | (np.abs(step) <= close * largest)) or self.affine:
+            if np.all(~np.isfinite(step) | (np.abs(step) <= close * largest)):
+                break
+            if self.affine and np.all(~np.isfinite(step) | (np.abs(step) <= FAR * self.unit[:, None])):
                 break
             if np.all(~np.isfinite(step) | (np.abs(step) <= CLOSE * DIFFERENCE * largest)):
                 break
@@ -223,6 +226,8 @@ class FreeMotion:
         steps = self.unit[:, None] + np.zeros((count, lanes))
         if not self.affine:
             steps = DIFFERENCE * np.maximum(np.abs(second), 1e-2 * steps)
+        else:
+            steps = np.maximum(steps, np.abs(second))
         tried = [second] + [second + np.where(np.arange(count)[:, None] == i, steps, 0.0) for i in range(count)]
         q, rate, integral, bristles = (
             np.tile(part, (1, count + 1)) for part in (at.q, at.rate, at.integral, at.bristles)

@@ -14,6 +14,7 @@ __all__ = ["steady_figures"]
 Array = NDArray[np.float64]
 
 LOOKED, LAST = 2000, 720  # times at which the motion is looked at, and its last turn
+STEADY = 0.02  # of the mean speed: by how much the turn before the last may differ where it runs steadily
 STARTED = 0.95  # of the mean speed of the last turn: from then on it has started
 FEWEST = 3  # whole turns of which one speaks of a steady one
 
@@ -37,13 +38,20 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
     fine = np.linspace(before[-1], time[-1], LAST)
     rate = np.abs(solution.at(fine)[0][solution.layout.coordinates + i])
     steady = float(turned[-1] - _turned(solution, fine[:1], i)[0]) / (time[-1] - before[-1])
+    last = np.interp(time[-1] - 2 * np.pi / steady, time, np.nan_to_num(mean))
+    if not abs(last - steady) <= STEADY * steady:
+        return []
     first = int(np.argmax(np.nan_to_num(mean) >= STARTED * steady))
+    near = np.linspace(time[max(first - 1, 0)], time[first], LAST)
+    ends = _turned(solution, near, i)
+    means = 2 * np.pi / (near - np.interp(ends - 2 * np.pi, turned, time, left=np.nan))
+    started = float(near[int(np.argmax(np.nan_to_num(means) >= STARTED * steady))])
+    begun = abs(float(solution.at(np.zeros(1))[0][solution.layout.coordinates + i, 0])) < 0.5 * steady
     fluctuation = (np.max(rate) - np.min(rate)) / steady
+    start = Figure(f"{name}.starting_time", f"starting time of {name}", started, "s", f"to {STARTED:.0%} of that speed")
     return [
         Figure(f"{name}.speed_mean", f"speed of {name}", steady, "rad/s", "mean of the last turn"),
-        Figure(
-            f"{name}.starting_time", f"starting time of {name}", time[first], "s", f"to {STARTED:.0%} of that speed"
-        ),
+        *([start] if begun else []),
         Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", fluctuation, "1", "last turn"),
     ]
 

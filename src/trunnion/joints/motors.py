@@ -26,7 +26,8 @@ class MotorKind:
 
     function: `(speed, time, parameters, integral) -> effort` at the motor's own shaft, N m or N; speed in rad/s or m/s;
     integral: of the controller's error over time, 0 of a motor without. error: of a kind with such an integral, its
-    rate `(speed, time, parameters, integral) -> rate`. needs: keys that must be given; takes: keys that may be.
+    rate `(speed, time, parameters, integral) -> rate`, and at_rest what it is after a time at speed 0. needs: keys that
+    must be given; takes: keys that may be.
     """
 
     function: Callable[[Array, Array, Parameters, Array], Array]
@@ -35,6 +36,7 @@ class MotorKind:
     source: str = ""
     validity: str = ""
     error: Callable[[Array, Array, Parameters, Array], Array] | None = None
+    at_rest: Callable[[Array, Parameters, Array], Array] | None = None
 
 
 def constant(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
@@ -91,6 +93,18 @@ def control_error(speed: Array, time: Array, parameters: Parameters, integral: A
     return np.where(held, 0.0, error)
 
 
+def control_at_rest(since: Array, parameters: Parameters, integral: Array) -> Array:
+    """The controller's integral after a time at speed 0: it grows evenly up to where the limit holds it."""
+    error, gain = float(parameters["target"]), float(parameters["integral"])
+    found: Array = integral + error * since
+    if gain == 0.0 or error == 0.0:
+        return found
+    most = (np.sign(error) * parameters["limit"] - parameters["proportional"] * error) / gain
+    pick, other = (np.minimum, np.maximum) if error > 0 else (np.maximum, np.minimum)
+    held: Array = pick(found, other(most, integral))
+    return held
+
+
 MOTORS: dict[str, MotorKind] = {
     "constant": MotorKind(constant, ("effort",), validity="a hanging weight, a cylinder at constant pressure"),
     "linear": MotorKind(
@@ -113,6 +127,7 @@ MOTORS: dict[str, MotorKind] = {
         source="K. J. Åström, R. M. Murray, Feedback Systems, 2nd ed., Princeton University Press, 2021, chapter 11",
         validity="a servo drive whose current loop is fast against the mechanism",
         error=control_error,
+        at_rest=control_at_rest,
     ),
 }
 

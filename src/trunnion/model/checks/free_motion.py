@@ -66,6 +66,10 @@ def motor_values(driver: Driver, values: Mapping[str, float], where: str) -> Ite
             number = values.get(f"{where}.{key}", np.nan)
             if {ABOVE_0: number <= 0, NOT_BELOW_0: number < 0, NOT_0: number == 0}[keys]:
                 yield Finding(f"is {number:g}", f"{where}.{key}", f"give a number {limit}")
+    for effort, speed in (("stall_effort", "no_load_speed"), ("breakdown_effort", "synchronous_speed")):
+        if values.get(f"{where}.{effort}", np.nan) * values.get(f"{where}.{speed}", np.nan) < 0:
+            what = f"the motor drives away from its {speed}: their signs differ"
+            yield Finding(what, f"{where}.{effort}", f"give {effort} and {speed} the same sign")
     if values.get(f"{where}.efficiency", 1.0) > 1.0:
         what = f"is {values[f'{where}.efficiency']:g}, above 1"
         yield Finding(what, f"{where}.efficiency", "give a share of at most 1, such as 0.95")

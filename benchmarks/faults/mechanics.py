@@ -345,9 +345,9 @@ _ENGINES = (
 _DYNAMICS = (
     Fault(
         "rotor-without-its-ratio",
-        "dynamics/motor.py",
-        "self.inertia * self.ratio * second",
-        "self.inertia * second",
+        "dynamics/tabulated.py",
+        "gear * drive.inertia * drive.ratio",
+        "gear * drive.inertia",
         ("tests/reference/test_motion_in_time.py", "-k", "rotor"),
     ),
     Fault(
@@ -362,7 +362,7 @@ _DYNAMICS = (
         "dynamics/tabulated.py",
         " + matrix[:, 2] * speed",
         "",
-        ("tests/reference/test_motion_in_time.py", "-k", "runs_down"),
+        ("tests/invariants/test_free_motion.py", "-k", "tables"),
     ),
     Fault(
         "friction-of-the-other-sense-at-rest",

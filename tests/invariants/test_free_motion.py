@@ -69,7 +69,9 @@ def compared(mechanism: Mechanism, lanes: int = 5) -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_tables_are_what_walks_find(law: str) -> None:
-    compared(slider_crank(LAWS[law]))
+    compared(
+        slider_crank(LAWS[law], springs={"damper": {"joint": "S", "stiffness": 200, "free_length": 0.1, "damping": 30}})
+    )
 
 
 @pytest.mark.parametrize("name", ["durango-fourbar", "whitworth-quick-return", "jansen"])

@@ -5,18 +5,51 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from trunnion.dynamics.opened import in_play
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.mechanism import Mechanism
 
-__all__ = ["refuse"]
+__all__ = ["refuse", "refuse_massless"]
+
+Array = NDArray[np.float64]
 
 
 def refuse(mechanism: Mechanism) -> None:
     """MechanismError with what keeps a mechanism from being let move."""
     if findings := list(_findings(mechanism)):
         raise MechanismError(findings)
+
+
+SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none
+
+
+def refuse_massless(motion: FreeMotion, row: Array) -> None:
+    """MechanismError where a force on some free coordinate would accelerate nothing: links without mass that no joint
+    holds. row: the state at the start."""
+    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(motion.contacts.each))
+    matrix = motion.inertia(at)[:, :, 0] * motion.unit
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    with np.errstate(all="ignore"):
+        condition = np.linalg.cond(matrix / scale[:, None] / scale) if np.all(scale > 0) else np.inf
+    if condition < SINGULAR:
+        return
+    values, joints = motion.values, dict.fromkeys(one.joint for one in motion.contacts.each)
+    light = [
+        link
+        for one in motion.contacts.each
+        for link in (one.body, one.other)
+        if link != motion.system.mechanism.fixed_link
+        and not np.any(values[f"links.{link}.mass"]) and not np.any(values[f"links.{link}.inertia"])
+    ]  # fmt: skip
+    names = ", ".join(dict.fromkeys(light)) or "some link"
+    what = f"{names} has no mass and is held by nothing while the pins of {', '.join(joints)} are in play"
+    remedy = "state its mass and inertia, or let fewer of its joints be in play"
+    raise MechanismError(Finding(what, f"links.{light[0]}" if light else "links", remedy))
 
 
 def _inert(mechanism: Mechanism) -> Iterator[bool]:
@@ -32,7 +65,7 @@ def _inert(mechanism: Mechanism) -> Iterator[bool]:
 
 def _findings(mechanism: Mechanism) -> Iterator[Finding]:
     free = [name for name, driver in mechanism.drivers.items() if driver.found]
-    if not free:
+    if not free and not in_play(mechanism):
         first = next(iter(mechanism.drivers), "")
         what = "no driver is free, so there is no motion to find"
         remedy = "state a motor, such as motor: {kind: constant, effort: 4 N m}, or free: true"
@@ -41,27 +74,38 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
     if not any(_inert(mechanism)):
         remedy = "state a mass or an inertia of a link that it moves, or the inertia of its motor"
         yield Finding("no mass moves with it, so it has no acceleration", f"drivers.{free[0]}", remedy)
-    if len(free) < 2:
+    playing = in_play(mechanism)
+    if len(free) < 2 and not playing:
         return
+    why = f"with {', '.join(playing)} in play" if playing else f"with {len(free)} free drivers"
+    yield from _sticking(mechanism, free, playing, why)
+
+
+def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: str) -> Iterator[Finding]:
+    """What may hold a joint at rest where several coordinates are free: joints would stick one by one."""
+    one_by_one, remedy = f"{why} joints stick one by one", "remove it, or use one free driver and no joint in play"
     for name in free:
         motor = mechanism.drivers[name].motor
-        if motor is not None and motor.efficiency is not None and motor.efficiency.source != 1:
-            what = (
-                f"the gear's loss may hold its joint at rest, and with {len(free)} free drivers joints stick one by one"
+        if motor is None:
+            continue
+        if motor.efficiency is not None and motor.efficiency.source != 1:
+            what = f"the gear's loss may hold its joint at rest, and {one_by_one}"
+            yield Finding(what, f"drivers.{name}.motor.efficiency", remedy)
+        if motor.brake is not None:
+            yield Finding(
+                f"a brake may hold its joint at rest, and {one_by_one}", f"drivers.{name}.motor.brake", remedy
             )
-            yield Finding(what, f"drivers.{name}.motor.efficiency", "remove it, or use one free driver")
     smooth = [name for name, law in FRICTION_LAWS.items() if not law.interval_at_rest]
+    plain = [name for name in smooth if FRICTION_LAWS[name].relaxation is None]
     for name, joint in mechanism.effective_joints.items():
         law = joint.friction.law if joint.friction else None
-        if law and FRICTION_LAWS[law].interval_at_rest:
-            what = f"the law {law} lets a joint stick, and with {len(free)} free drivers joints stick one by one"
+        if law and name in playing and law not in plain:
+            what = f"the law {law} is not one of a contact that comes and goes"
+            yield Finding(what, f"joints.{name}.friction", f"use {' or '.join(plain)}")
+        elif law and FRICTION_LAWS[law].interval_at_rest:
+            what = f"the law {law} lets a joint stick, and {one_by_one}"
             yield Finding(what, f"joints.{name}.friction", f"use a law that is smooth at rest: {', '.join(smooth)}")
     for name, load in mechanism.loads.items():
         if load.joint is not None:
-            what = f"it may hold its joint at rest, and with {len(free)} free drivers joints stick one by one"
+            what = f"it may hold its joint at rest, and {one_by_one}"
             yield Finding(what, f"loads.{name}", "use a damper (springs: damping) instead, or one free driver")
-    for name in free:
-        motor = mechanism.drivers[name].motor
-        if motor is not None and motor.brake is not None:
-            what = f"a brake may hold its joint at rest, and with {len(free)} free drivers joints stick one by one"
-            yield Finding(what, f"drivers.{name}.motor.brake", "remove it, or use one free driver")

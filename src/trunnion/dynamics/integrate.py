@@ -22,9 +22,9 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.rates import WORKS, Dynamics, Layout
+from trunnion.dynamics.rates import Dynamics, Layout
 from trunnion.dynamics.rest import Rest
-from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
@@ -54,7 +54,7 @@ class Stretch(NamedTuple):
     """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
 
     sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
-    goes on, where it is followed.
+    goes on, where it is followed; onsets: of the contacts of joints in play, see `Moment`.
     """
 
     begin: float
@@ -64,6 +64,7 @@ class Stretch(NamedTuple):
     resting: bool
     now: float
     snapshot: Snapshot | None = None
+    onsets: tuple[float | None, ...] = ()
 
 
 class Passing(NamedTuple):
@@ -130,7 +131,7 @@ class Integration:
     times: Sequence[float] = ()
 
     def __post_init__(self) -> None:
-        self.layout = Layout(len(self.motion.names), len(self.motion.bristles))
+        self.layout = Layout.of(self.motion)
         self.solution = Solution(self.layout)
         known = [time for drive in self.motion.drives.values() for time in drive.times]
         times = {time for time in (*known, *self.times) if 0 < time < self.duration}
@@ -179,6 +180,10 @@ class Integration:
         self.end("events", time, {"count": float(MOST_EVENTS)})
         return self.solution
 
+    def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
+        """The state of a row."""
+        return self.layout.moment(np.array([time]), row[:, None], sense, now)
+
     def _begins(self, row: Array) -> bool:
         """Whether there are accelerations at the start; they also tell what rates are typical."""
         n, now = self.layout.coordinates, 0.5 * self.breaks[0]
@@ -188,7 +193,7 @@ class Integration:
             self._stop("not_assembled", 0.0, row)
             return False
         sense = float(np.sign(row[n])) if self.sticks else 0.0
-        at = self.layout.moment(np.zeros(1), row[:, None], sense, now)
+        at = self.moment(0.0, row, sense, now)
         with np.errstate(all="ignore"):
             second = self.dynamics(at).second
         if not np.all(np.isfinite(second)):
@@ -215,7 +220,7 @@ class Integration:
 
     def _follow(self, time: float, row: Array, sense: float, now: float) -> None:
         with np.errstate(all="ignore"):
-            self.motion.step(self.layout.moment(np.array([time]), row[:, None], sense, now))
+            self.motion.step(self.moment(time, row, sense, now))
 
     # ---- at rest ----------------------------------------------------------------------------------------------
 
@@ -278,7 +283,7 @@ class Integration:
                 asked[0] = min(max(numbers[0], low + inside), high - inside)
                 if sense and sense * speeds[0] < 0.0:
                     asked[n] = 0.0
-            at = self.layout.moment(np.array([moment]), asked[:, None], sense, now)
+            at = self.moment(moment, asked, sense, now)
             with np.errstate(all="ignore"):
                 rates = self.dynamics(at)
             return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
@@ -402,12 +407,12 @@ class Integration:
         found[n : 2 * n] *= 0.01 * self.pace
         found[2 * n : 3 * n] *= sizes
         found[3 * n : 3 * n + self.layout.bristles] *= 1e-9
-        self.turned_over = max(self.turned_over, float(np.max(np.abs(row[-len(WORKS) :]))))
+        self.turned_over = max(self.turned_over, float(np.max(np.abs(row[-len(self.layout.works_named) :]))))
         self.asked_for += 1
         if self.asked_for & (self.asked_for - 1) == 0:  # the 1st, 2nd, 4th … time: energy may be large and no work done
             self.turned_over = max(self.turned_over, self._kinetic(0.0, row, 0.0, 0.0))
         # at the start nothing is turned over: the works follow the motion then
-        found[-len(WORKS) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
+        found[-len(self.layout.works_named) :] = self.tolerance * self.turned_over if self.turned_over else np.inf
         return found
 
     def _place(self, q: float, sense: float) -> tuple[float, float]:
@@ -452,7 +457,7 @@ class Integration:
 
     def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
         """Why a state has no acceleration; empty if it has one."""
-        at = self.layout.moment(np.array([time]), row[:, None], sense, now)
+        at = self.moment(time, row, sense, now)
         with np.errstate(all="ignore"):
             walk = self.motion.walk(at, np.zeros_like(at.q))
             if int(pose_status(walk, (1,))[0]) == Status.NOT_ASSEMBLED:
@@ -461,7 +466,7 @@ class Integration:
         return "" if rates.sound else "locked" if rates.locked else "no_acceleration"
 
     def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
-        at = self.layout.moment(np.array([time]), row[:, None], sense, now)
+        at = self.moment(time, row, sense, now)
         return float(np.ravel(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))[0])
 
 

@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Contacts
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
-__all__ = ["WORKS", "Dynamics", "Layout", "Rates", "Walks", "works_of"]
+__all__ = ["CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Walks", "works_of"]
 
 Array = NDArray[np.float64]
 
-# what is integrated to make the books: by the drivers (freed or not), loads and springs into the mechanism, to friction
+# what is integrated to make the books: by the drivers (freed or not), loads and springs into the mechanism, to
+# friction, and of joints in play to the contacts
 WORKS = ("drive", "loads", "springs", "friction")
+CONTACT = "contact"
 
 
 class Rates(NamedTuple):
@@ -44,10 +47,21 @@ class Layout(NamedTuple):
 
     coordinates: int
     bristles: int
+    touching: bool = False
+
+    @classmethod
+    def of(cls, motion: FreeMotion) -> Layout:
+        """The row of a free motion."""
+        return cls(len(motion.names), len(motion.bristles), bool(motion.contacts.each))
+
+    @property
+    def works_named(self) -> tuple[str, ...]:
+        """The works in a row."""
+        return (*WORKS, CONTACT) if self.touching else WORKS
 
     @property
     def size(self) -> int:
-        return 3 * self.coordinates + self.bristles + len(WORKS)
+        return 3 * self.coordinates + self.bristles + len(self.works_named)
 
     def moment(self, time: Array, rows: Array, sense: float = 0.0, now: float = 0.0) -> Moment:
         """The state of lanes, (number, lane)."""
@@ -84,17 +98,21 @@ class Walks:
         sound = bool(np.all(found.converged & ~found.turned))
         locked = any(bool(np.any(np.less(one.share, 1.0))) for one in found.back.settled)
         memory = bristle_rates(motion, at, found.back)[:, 0]
-        return Rates(found.second[:, 0], integral[:, 0], memory, works_of(found.back, at), sound, locked)
+        works = works_of(found.back, at, motion.contacts)
+        return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
 
 
-def works_of(back: Backward, at: Moment) -> Array:
-    """Power of the drivers, loads and springs into the mechanism, and to friction, W; one lane."""
-    walk = back.walk
+def works_of(back: Backward, at: Moment, contacts: Contacts | None = None) -> Array:
+    """Power of the drivers, loads and springs into the mechanism, and to friction and contacts, W; one lane."""
+    walk, stated = back.walk, back.walk.system.mechanism.loads
     drive = sum(float(np.ravel(primal(e * walk.rate(name)))[0]) for name, e in back.efforts.items())
-    loads = sum(float(np.ravel(primal(power))[0]) for power in back.load_powers.values())
+    loads = sum(float(np.ravel(primal(power))[0]) for name, power in back.load_powers.items() if name in stated)
     springs = sum(float(np.ravel(primal(state.power))[0]) for state in back.springs.values())
     friction = sum(float(np.ravel(primal(back.friction_power(joint)))[0]) for joint in walk.system.joints)
-    return np.array([drive, loads, springs, friction])
+    if contacts is None or not contacts.each:
+        return np.array([drive, loads, springs, friction])
+    contact = sum(float(np.ravel(push.loss)[0]) for _, push in contacts.pushes(walk, at.onsets))
+    return np.array([drive, loads, springs, friction, contact])
 
 
 def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> Array:

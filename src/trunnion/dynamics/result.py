@@ -9,19 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
+from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import Solution
 from trunnion.dynamics.rates import WORKS
 from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.steady import steady_figures
 from trunnion.errors import Finding
+from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
+from trunnion.solve.run import Run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,25 +62,31 @@ class Books(NamedTuple):
     energies: Array
     works: Array
     resting: NDArray[np.bool_]
+    touches: Touches | None = None
 
 
-def result_of(motion: FreeMotion, solution: Solution, books: Books) -> Result:
-    """The result of a motion in time."""
-    mechanism, system = motion.system.mechanism, motion.system
+def result_of(
+    motion: FreeMotion, solution: Solution, books: Books, stated: Run | None = None, impacts: Sequence[Impact] = ()
+) -> Result:
+    """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out;
+    impacts: of these."""
+    run = stated or motion.run
+    mechanism, system = run.system.mechanism, run.system
     residual, turned_over = _energy(books)
     turned_over = max(turned_over, _turned_over(motion, solution))
-    findings = [*_findings(motion, solution, books), *_unbalanced(residual, turned_over)]
+    findings = [*_findings(motion, solution, run), *_unbalanced(residual, turned_over)]
     attributes = encoded(
         {
             **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
             **cited(references(mechanism)),
             "driver_units": effort_units(system),
             "spring_units": spring_units(system),
-            "free_drivers": list(motion.names),
+            "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
-            "summary": figure_rows(_summary(motion, solution, books, residual, turned_over)),
+            **({"impacts": [one.label for one in impacts]} if stated else {}),
+            "summary": figure_rows(_summary(motion, solution, books, residual, run, impacts)),
             "inputs": inputs(mechanism),
-            "scene": scene_of(motion.run),
+            "scene": scene_of(run),
             "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
                        for one in solution.events],
         }
@@ -84,16 +94,27 @@ def result_of(motion: FreeMotion, solution: Solution, books: Books) -> Result:
 
     def build() -> xr.Dataset:
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
-        found = described(books.arrays, known) | described(_own(motion, solution, books, residual), MOTION)
+        found = described(books.arrays, known) | described(_own(motion, run, solution, books, residual), MOTION)
+        labels = dict(books.labels)
+        if stated is not None and books.touches is not None:
+            labels["contact"] = list(motion.contacts.labels)
+            found |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
+                impact_arrays(impacts), IMPACT
+            )
         time = described({"time": books.time}, {"time": Variable(("time",), "s", "time from the start")})
-        return dataset_of("motion", found, books.labels, attributes, time)
+        return dataset_of("motion", found, labels, attributes, time)
 
     return Result(attributes, build)
 
 
-def _own(motion: FreeMotion, solution: Solution, books: Books, residual: Array) -> dict[str, Any]:
+def _shown(motion: FreeMotion, run: Run) -> list[str]:
+    """The free drivers that the file states."""
+    return [name for name in motion.names if name in run.system.mechanism.drivers]
+
+
+def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residual: Array) -> dict[str, Any]:
     """What there is beside the variables of a cycle."""
-    system, names = motion.system, list(motion.system.mechanism.drivers)
+    system, names = run.system, list(run.system.mechanism.drivers)
     coordinates, rates = np.empty((2, len(names), len(books.time)))
     for row, name in enumerate(names):
         if name in motion.names:
@@ -104,7 +125,7 @@ def _own(motion: FreeMotion, solution: Solution, books: Books, residual: Array) 
     return {
         "drive_coordinate": coordinates,
         "drive_rate": rates,
-        **{f"work_{name}": work for name, work in zip(WORKS, books.works, strict=True)},
+        **{f"work_{name}": work for name, work in zip(WORKS, books.works, strict=False)},
         "kinetic_energy": books.energies[0],
         "potential_energy": books.energies[1],
         "energy_residual": residual,
@@ -118,9 +139,9 @@ def _own(motion: FreeMotion, solution: Solution, books: Books, residual: Array) 
 
 def _energy(books: Books) -> tuple[Array, float]:
     """What works and energies differ by at every row, J, and the energy turned over, J."""
-    drive, loads, springs, friction = books.works
+    drive, loads, springs, *lost = books.works  # to friction, and to contacts
     energy = books.energies.sum(axis=0)
-    residual = drive + loads + springs - friction - (energy - energy[0])
+    residual = drive + loads + springs - sum(lost) - (energy - energy[0])
     sizes = [np.nanmax(np.abs(one), initial=0.0) for one in (*books.works, *(books.energies - books.energies[:, :1]))]
     return residual, float(max(sizes))
 
@@ -142,6 +163,7 @@ def _turned_over(motion: FreeMotion, solution: Solution) -> float:
     return float(np.nanmax(np.abs(np.concatenate([changes, solution.layout.works(rows)])), initial=0.0))
 
 
+DIFFERS = 0.01  # of a restitution: a difference that is worth a note
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
@@ -154,13 +176,15 @@ def _unbalanced(residual: Array, turned_over: float) -> Iterator[Finding]:
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _findings(motion: FreeMotion, solution: Solution, books: Books) -> Iterator[Finding]:
+def _findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterator[Finding]:
     system = motion.system
     yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
     centred = [one.joint for one in motion.run.seats]
     if centred:
         yield finding_for("simulate.centred", joints=centred)
-    name = motion.names[0]
+    if contact_findings := list(_of_contacts(motion, run, solution)):
+        yield from contact_findings
+    name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
     for event in solution.events:
         if event.kind == "lock":
@@ -181,6 +205,16 @@ def _findings(motion: FreeMotion, solution: Solution, books: Books) -> Iterator[
         yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
 
 
+def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:
+    """What the laws of the contacts return, where that is not what was stated."""
+    for one in {one.joint: one for one in motion.contacts.each}.values():
+        law = run.system.mechanism.effective_joints[one.joint].contact
+        returned = restitution_of(one.factor)
+        if law is not None and abs(returned - one.restitution) > DIFFERS:
+            yield finding_for("simulate.restitution", f"joints.{one.joint}.contact", joint=one.joint, law=law.law,
+                              stated=one.restitution, returned=returned)  # fmt: skip
+
+
 def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float, float]:
     """Effort that acts at a time of rest, and the effort at which it would break away that way."""
     rows, _ = solution.at(np.array([time]))
@@ -194,12 +228,12 @@ def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float
 
 
 def _summary(
-    motion: FreeMotion, solution: Solution, books: Books, residual: Array, turned_over: float
+    motion: FreeMotion, solution: Solution, books: Books, residual: Array, run: Run, impacts: Sequence[Impact]
 ) -> Sequence[Figure]:
     """The figures that one looks at first."""
     found: list[Figure] = []
-    names = list(motion.system.mechanism.drivers)
-    for i, name in enumerate(motion.names):
+    names = list(run.system.mechanism.drivers)
+    for i, name in enumerate(_shown(motion, run)):
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
         rate, what = books.at.rate[i], "speed"
         unit = "rad/s" if turns else "m/s"
@@ -216,18 +250,21 @@ def _summary(
             Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
         )
         found += steady_figures(motion, solution, i)
-    for i, joint in enumerate(motion.system.joints):
+    for i, joint in enumerate(run.system.joints):
         size = np.sqrt(np.sum(books.arrays["reaction_force"][i] ** 2, axis=0))
         if np.any(size > 0):
             most = int(np.nanargmax(size))
             found.append(Figure(f"{joint}.reaction_max", f"reaction in {joint}", size[most], "N", "largest",
                                 _at(books, most)))  # fmt: skip
+    found += impact_figures(motion.contacts.labels, impacts, solution.end)
     if not np.any(np.isfinite(books.works[0])):  # it does not begin
         return found
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
-    words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction")
-    for key, word, work in zip(WORKS, words, books.works[:, done], strict=True):
-        if np.any(np.nan_to_num(books.works[WORKS.index(key)]) != 0.0):
+    words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
+             "work lost in contacts")  # fmt: skip
+    for key, word, works in zip((*WORKS, "contact"), words, books.works, strict=False):
+        work = works[done]
+        if np.any(np.nan_to_num(works) != 0.0):
             found.append(Figure(f"work_{key}", word, work, "J"))
     worst = float(np.nanmax(np.abs(residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))

@@ -11,22 +11,26 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
-from trunnion.dynamics.checks import refuse
+from trunnion.dynamics.checks import refuse, refuse_massless
+from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
+from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
+from trunnion.dynamics.shown import Touches, as_stated
 from trunnion.dynamics.start import initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
+from trunnion.dynamics.touching import contacts_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.memory import CHUNK
-from trunnion.solve.run import prepare
+from trunnion.solve.run import Run, prepare
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +43,7 @@ Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
 TABLED = 1e-12  # as `integrate.INSIDE`, of tables, which know on which side they are asked
+FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
 CYCLES = 10  # of the nominal motion: the duration if none is stated
 
 
@@ -77,6 +82,8 @@ def simulated(
         run.determinacy.refuse()
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance)
+    if in_play(mechanism):
+        return _with_play(run, duration, steps, tolerance, progress)
     motion = FreeMotion.of(run)
     known = places(motion)
     tables, walks = tabulated(motion, known), Walks(motion)
@@ -94,6 +101,28 @@ def simulated(
         integration.end("stopped", solution.end)
     time = np.linspace(0.0, duration, steps + 1)
     return result_of(motion, solution, Filling(motion, solution, time).books())
+
+
+def _with_play(
+    run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None
+) -> Result:
+    """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
+    bare = opened(run)
+    contacts = contacts_of(run, in_play(run.system.mechanism))
+    motion = FreeMotion.of(prepare(bare.mechanism), contacts)
+    row = initial_row(motion)
+    refuse_massless(motion, row)
+    fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
+    integration = ContactMotion(motion, Walks(motion), duration, max(fine, FINEST), progress=progress,
+                                times=load_times(motion, duration))  # fmt: skip
+    try:
+        solution = integration.run(row)
+    except KeyboardInterrupt:  # what is done is kept
+        solution = integration.solution
+        integration.end("stopped", solution.end)
+    time = np.linspace(0.0, duration, steps + 1)
+    books = Filling(motion, solution, time, run).books()
+    return result_of(motion, solution, books, run, integration.finished())
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:
@@ -123,6 +152,7 @@ class Filling:
     motion: FreeMotion
     solution: Solution
     time: Array
+    stated: Run | None = None
 
     def books(self) -> Books:
         """Every variable, over the rows up to where the motion ends; NaN after it."""
@@ -133,21 +163,27 @@ class Filling:
         rows, which = self.solution.at(self.time)
         layout = self.solution.layout
         seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
+        touches = Touches.empty(len(motion.contacts.each), len(self.time))
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
+            at = at._replace(onsets=stretch.onsets)
             second, back = self._solved(at, stretch)
             seconds[:, lanes] = second
             window = slice(int(lanes[0]), int(lanes[-1]) + 1)
             fill_chunk(arrays, back, at.time, window)
             energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
+            touches.fill(lanes, motion.contacts.pushes(back.walk, stretch.onsets), stretch.onsets)
         whole = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
             if array.flags.writeable and array.dtype == np.float64:
                 array[..., which < 0] = np.nan
         fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
         resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
-        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting)
+        if self.stated is not None:
+            arrays, labels = as_stated(self.stated, motion.contacts, touches, arrays, labels)
+            energies = np.vstack([energies, touches.stored.sum(axis=0)])
+        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting, touches)
 
     def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
         """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
@@ -156,7 +192,7 @@ class Filling:
 
         def key(k: int) -> object:
             one = stretches[k]
-            return one.sense, one.resting, one.now, None if one.snapshot is None else id(one.snapshot)
+            return one.sense, one.resting, one.now, one.onsets, None if one.snapshot is None else id(one.snapshot)
 
         begin = 0
         for i in range(1, len(which) + 1):

@@ -36,7 +36,7 @@ def _number(values: object) -> float:
 
 def initial_row(motion: FreeMotion) -> Array:
     """The state at the start: coordinates and speeds as stated, else at rest where the driver starts."""
-    values, layout = motion.values, Layout(len(motion.names), len(motion.bristles))
+    values, layout = motion.values, Layout.of(motion)
     row = np.zeros(layout.size)
     for i, name in enumerate(motion.names):
         path = f"drivers.{name}"

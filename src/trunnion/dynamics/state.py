@@ -8,7 +8,7 @@ the whole mechanism is assembled, and nothing is solved that the analysis of a p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -20,9 +20,11 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
+from trunnion.dynamics.touching import Contacts
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, freed, law_of, rubbing, sticking
 
@@ -40,7 +42,8 @@ DIFFERENCE = 1e-4  # of the acceleration, by which the derivative is taken where
 class Moment(NamedTuple):
     """The state of some lanes: time, s, coordinates and rates (coordinate, lane), controllers' integrals likewise,
     deflections of bristles (bristle, lane), m. sense: of the motion where the speed is 0, +1 or −1, of one coordinate;
-    now: a time within the stretch, which says what is switched on.
+    now: a time within the stretch, which says what is switched on; onsets: of each contact of joints in play its speed
+    of approach, m/s, None while it does not touch.
     """
 
     time: Array
@@ -50,6 +53,7 @@ class Moment(NamedTuple):
     bristles: Array
     sense: float = 0.0
     now: float = 0.0
+    onsets: tuple[float | None, ...] = ()
 
 
 class Accelerated(NamedTuple):
@@ -76,12 +80,13 @@ class FreeMotion:
     drives: Mapping[str, Drive]
     assembly: Assembly
     method: FrictionMethod = field(default_factory=FrictionMethod)
+    contacts: Contacts = field(default_factory=Contacts)
 
     @classmethod
-    def of(cls, run: Run) -> FreeMotion:
+    def of(cls, run: Run, contacts: Contacts | None = None) -> FreeMotion:
         """The free motion of a prepared mechanism."""
         found = drives(run.system, run.values)
-        return cls(run, found, follows(run, len(found) > 1))
+        return cls(run, found, follows(run, len(found) > 1), contacts=contacts or Contacts())
 
     @property
     def system(self) -> System:
@@ -138,8 +143,15 @@ class FreeMotion:
         given = Given(
             self.beginning(at) if zero_slip is None else zero_slip,
             dict(zip(self.bristles, at.bristles, strict=True)),
+            acting=self._acting(at.onsets),
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
+
+    def _acting(self, onsets: Sequence[float | None]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
+        """What the contacts that touch do to the links."""
+        if all(onset is None for onset in onsets):
+            return None
+        return lambda walk: self.contacts.actions(walk, onsets)
 
     def beginning(self, at: Moment, share: Number = 1.0) -> dict[str, Sense]:
         """The sense in which each joint that sticks is about to move, times a share; of one coordinate."""
@@ -220,6 +232,10 @@ class FreeMotion:
         second = np.where(turned, np.nan, second)
         return Accelerated(second, self.solve(at, second, senses), turned, converged)
 
+    def inertia(self, at: Moment) -> Array:
+        """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""
+        return self._linearised(at, np.zeros_like(at.q), self.beginning(at))[1]
+
     def _linearised(self, at: Moment, second: Array, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
         """E − T (coordinate, lane) and its derivatives by the accelerations (equation, coordinate, lane)."""
         count, lanes = at.q.shape
@@ -232,7 +248,8 @@ class FreeMotion:
         q, rate, integral, bristles = (
             np.tile(part, (1, count + 1)) for part in (at.q, at.rate, at.integral, at.bristles)
         )
-        many = Moment(np.tile(at.time, count + 1), q, rate, integral, bristles, at.sense, at.now)
+        time = np.tile(at.time, count + 1)
+        many = at._replace(time=time, q=q, rate=rate, integral=integral, bristles=bristles)
         wide: dict[str, Sense] = {joint: np.tile(np.asarray(sense), count + 1) for joint, sense in senses.items()}
         found = self.missing(many, np.concatenate(tried, axis=1), wide).reshape(count, count + 1, lanes)
         slopes = (found[:, 1:] - found[:, :1]) / steps[None]

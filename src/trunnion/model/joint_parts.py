@@ -22,15 +22,17 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from trunnion.joints.contact import CONTACT_LAWS, ContactLaw
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.entry import Direction, Name, Part, forms, known, problem
-from trunnion.model.quantity import Angle, AnyQuantity, Length, Quantity
+from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Length, Pressure, Quantity
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
     "FRICTION_MODELS",
     "JOINT_TYPES",
+    "Contact",
     "Fit",
     "Friction",
     "Guide",
@@ -54,6 +56,7 @@ def freedoms(joint_type: str) -> tuple[str, ...]:
 
 _check_type, _schema_type = known(JOINT_TYPES, "joint type")
 _check_law, _schema_law = known(tuple(FRICTION_LAWS), "friction law")
+_check_contact, _schema_contact = known(tuple(CONTACT_LAWS), "contact law")
 _check_model, _schema_model = known(FRICTION_MODELS, "friction model")
 
 JointType = Annotated[str, _check_type, _schema_type]
@@ -117,11 +120,47 @@ class Pin(Part):
 
 
 class Guide(Part):
-    """Slider and guide of a joint that slides: length in contact, width over which it carries torsion, play across."""
+    """Slider and guide of a joint that slides: length in contact, width over which it carries torsion, play across.
+
+    height: of the slider across its guide in the plane, of the corners that touch where it is in play; 0 if not stated.
+    """
 
     length: Length | None = None
+    height: Length | None = None
     width: Length | None = None
     clearance: Length | None = None
+
+
+class Contact(Part):
+    """How pin and hole, or slider and guide, push on each other where they touch: for pins in play in `simulate`.
+
+    law: of `joints.contact`; restitution: speed after over speed before an impact, from 0 to 1; stiffness: K of
+    F = K dⁿ, or the modulus of elasticity and Poisson's ratio of pin and hole instead (those of the hole are those of
+    the pin if not stated); exponent: n.
+    """
+
+    law: Annotated[str, _check_contact, _schema_contact] = "restitution"
+    restitution: Dimensionless | None = None
+    stiffness: AnyQuantity | None = None
+    exponent: Dimensionless | None = None
+    modulus: Pressure | None = None
+    poisson_ratio: Dimensionless | None = None
+    hole_modulus: Pressure | None = None
+    hole_poisson_ratio: Dimensionless | None = None
+
+    @property
+    def of(self) -> ContactLaw:
+        """The law."""
+        return CONTACT_LAWS[self.law]
+
+    def complete(self) -> Contact:
+        """With the exponent 3/2, and with Poisson's ratio 0.3 and the pin's material where they were not stated."""
+        found: dict[str, Any] = {"exponent": self.exponent or Quantity(1.5, KINDS["number"])}
+        if self.modulus is not None:
+            found["poisson_ratio"] = self.poisson_ratio or Quantity(0.3, KINDS["number"])
+            found["hole_modulus"] = self.hole_modulus or self.modulus
+            found["hole_poisson_ratio"] = self.hole_poisson_ratio or found["poisson_ratio"]
+        return self.model_copy(update=found)
 
 
 class Seat(Part):
@@ -217,6 +256,7 @@ class JointDefaults(Part):
 class Joint(Part):
     """A kinematic pair between two links, at the point of its own name on both.
 
+    contact: its pin is in play as it moves in time, and touches its hole; all other analyses leave it out.
     pitch: slide of a helical pair for one turn, positive for a right-hand thread. seat_on: the link on which the pin
     keeps its place while the joint turns, where its play is that of an analysis of tolerances; either if not stated.
     """
@@ -226,6 +266,7 @@ class Joint(Part):
     pitch: Length | None = None
     pin: Pin | None = None
     guide: Guide | None = None
+    contact: Contact | None = None
     friction: Friction | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None

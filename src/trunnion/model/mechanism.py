@@ -30,6 +30,7 @@ from trunnion.model.names import nearest
 from trunnion.model.numbers import Numbers
 from trunnion.model.parameters import LIMITS, Location
 from trunnion.model.parts import (
+    Contact,
     Guide,
     Joint,
     Misalignment,
@@ -58,7 +59,13 @@ if TYPE_CHECKING:
 __all__ = ["Mechanism", "read_mechanism"]
 
 # Parts of a joint whose numbers can be set before the file states them.
-_JOINT_PARTS: Mapping[str, type[Part]] = {"pin": Pin, "guide": Guide, "misalignment": Misalignment, "seat": Seat}
+_JOINT_PARTS: Mapping[str, type[Part]] = {
+    "pin": Pin,
+    "guide": Guide,
+    "contact": Contact,
+    "misalignment": Misalignment,
+    "seat": Seat,
+}
 
 
 class Mechanism(Numbers):
@@ -294,13 +301,17 @@ class Mechanism(Numbers):
             before, found, rest = name.rpartition(f".{part}.")
             holder = self._holder(before) if found else None
             key, *below = rest.split(".")
-            if not holder or key not in kind.model_fields or (holder == ("joint_defaults",) and part == "misalignment"):
+            if (
+                not holder
+                or key not in kind.model_fields
+                or (holder == ("joint_defaults",) and part in ("misalignment", "contact"))
+            ):
                 continue
             owner = before if before.startswith("joint") and before not in self.stated_joints else f"joints.{before}"
             path = f"{owner}.{part}.{rest}"
             if key == "direction" and below in (["x"], ["y"], ["z"]):
                 return path, (*holder, part, key, "xyz".index(below[0]))
-            return None if below or key in ("fit", "direction") else (path, (*holder, part, key))
+            return None if below or key in ("fit", "direction", "law") else (path, (*holder, part, key))
         before, found, key = name.rpartition(".motor.")
         driver = before.removeprefix("drivers.")
         if found and key in Motor.model_fields and driver in self.drivers and self.drivers[driver].motor is not None:

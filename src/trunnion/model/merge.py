@@ -44,7 +44,8 @@ def merge_joint(
         guide = Guide(**{**stated(defaults.guide), **stated(guide)})
     rubs = PAIRS[joint.type].count > 0  # nothing slips in a fixed joint: it needs no exception from the defaults
     friction = _friction(stated(defaults.friction) if rubs else {}, stated(joint.friction))
-    merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction})
+    touching = joint.contact and joint.contact.complete()
+    merged = joint.model_copy(update={"pin": pin, "guide": guide, "friction": friction, "contact": touching})
     merged = merged.model_copy(
         update={"misalignment": _misalignment(joint, spatial), "seat": _seat(merged, defaults.seat)}
     )

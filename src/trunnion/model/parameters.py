@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
-from trunnion.model.parts import Driver, Friction, Gear, Joint, Point, Spring, freedoms
+from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Point, Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 
@@ -189,6 +190,9 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
             follows = shared.get(entry.path) is entry.quantity
             alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
             yield Entry(entry.path, entry.location, entry.quantity, kind, alias)
+    for entry in _walk(joint.contact, f"joints.{name}.contact", (*location, "contact")):
+        stiff = entry.location[-1] == "stiffness"
+        yield replace(entry, kind=_contact_stiffness(joint.contact)) if stiff and joint.contact else entry
     yield from _misalignment(joint, f"joints.{name}.misalignment", (*location, "misalignment"))
     pin = joint.pin
     if pin and pin.length and not pin.bearing:
@@ -203,6 +207,17 @@ def _misalignment(joint: Joint, path: str, location: Location) -> Iterator[Entry
     if one and one.towards and one.offset_towards is None:
         towards = one.towards
         yield Entry(f"{path}.offset_towards", (*location, "offset_towards"), towards, towards.kind, f"{path}.towards")
+
+
+def _contact_stiffness(contact: Contact) -> Kind:
+    """What K of F = K dⁿ measures, by the exponent n; any quantity where that depends on dimensions."""
+    exponent = contact.exponent
+    if exponent is None or exponent.names:
+        return ANY
+    power = Fraction(str(exponent.evaluate())).limit_denominator(1000)
+    text = f"N/m^{float(power):g}" if power != 1 else "N/m"
+    dimension = (1 - power, Fraction(1), Fraction(-2), Fraction(0))
+    return Kind("contact stiffness", text, f"60 G{text}", (dimension,))
 
 
 def _law_kind(friction: Friction, parameter: str) -> Kind:

@@ -35,6 +35,7 @@ __all__ = [
     "Length",
     "Mass",
     "Moment",
+    "Pressure",
     "Quantity",
     "Rate",
     "Stiffness",
@@ -258,6 +259,7 @@ Acceleration = Annotated[Quantity, _Read(KINDS["acceleration"])]
 Time = Annotated[Quantity, _Read(KINDS["time"])]
 Rate = Annotated[Quantity, _Read(KINDS["angular speed"] | KINDS["speed"])]
 ForceOrMoment = Annotated[Quantity, _Read(KINDS["force"] | KINDS["moment"])]
+Pressure = Annotated[Quantity, _Read(KINDS["pressure"])]
 Stiffness = Annotated[Quantity, _Read(KINDS["stiffness"] | KINDS["torsional stiffness"])]
 Damping = Annotated[Quantity, _Read(KINDS["damping"] | KINDS["torsional damping"])]
 AngleOrLength = Annotated[Quantity, _Read(KINDS["angle"] | KINDS["length"])]

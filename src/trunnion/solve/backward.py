@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -50,12 +50,14 @@ class Given:
     zero_slip: share of what resists the joint to take where the relative speed is zero, with the sign of the slip that
     is about to begin, from −1 to 1; one for each contact of the joint or one for all; 0 if not stated. deflections: of
     the bristles of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how
-    links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way.
+    links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way. acting: what acts on
+    the links of a walk beside the loads and springs of the model, by name.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
     deflections: Mapping[str, Number] = field(default_factory=dict)
     travel: Mapping[str, Travel] = field(default_factory=dict)
+    acting: Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None = None
 
 
 def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Share:
@@ -175,6 +177,9 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     back.slips.update((joint, _slip(back, joint)) for joint in system.joints)
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip)
+    for name, action in given.acting(walk) if given.acting else ():
+        back.load_powers[name] = action.power
+        _act(back, name, action)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, given)
     return back

@@ -15,6 +15,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.checks.contacts import contact_law
 from trunnion.model.checks.costs import cost_names, cost_values
 from trunnion.model.checks.errors import errors, joint_errors
 from trunnion.model.checks.free_motion import FREE, free_motion
@@ -198,6 +199,8 @@ def _joints(mechanism: Numbers) -> Iterator[Finding]:
             yield from _ends(mechanism, name, joint)
         yield from pitch(joint, where)
         yield from contact(joint, where, mechanism.space == "spatial")
+        if joint.contact is not None:
+            yield from contact_law(mechanism, name, joint, joint.contact)
         if joint.friction is not None:
             own = mechanism.stated_joints[name].friction
             yield from _parameters_of_law(

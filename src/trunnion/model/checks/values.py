@@ -11,6 +11,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS, LawParameter
+from trunnion.model.checks.contacts import contact_values
 from trunnion.model.checks.errors import error_sizes, play_values
 from trunnion.model.checks.free_motion import motor_values
 from trunnion.model.checks.gears import gear_values
@@ -114,6 +115,7 @@ def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Fin
         entry = numbers.entries[f"{where}.{path}"]
         return entry.alias or entry.path
 
+    yield from contact_values(joint, numbers.nominal, where)
     if joint.friction and joint.friction.law:
         for parameter, declared in FRICTION_LAWS[joint.friction.law].parameters.items():
             if parameter in joint.friction.parameters:

@@ -54,6 +54,11 @@ DYNAMICS: dict[str, Sentence] = {
         "pins of {joints} are taken in the middle of their holes: a seat that follows the load is left out",
         quiet=True,
     ),
+    "simulate.restitution": Sentence(
+        NOTE,
+        "{joint}: with a stated restitution of {stated:.3g} the contact law {law} returns {returned:.3g}",
+        "state law: restitution to get back what is stated",
+    ),
     "simulate.energy": Sentence(
         WARNING,
         "works and energies differ by {share:.2g} of the energy turned over",

@@ -1,0 +1,210 @@
+"""Motion in time with joints in play: from onset to lift-off of every contact.
+
+A step ends where a gap closes or opens, so that every step is taken through smooth forces. Between contacts the pin
+flies; the forces of a contact come with its onset, whose speed of approach its law needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from trunnion.dynamics.integrate import Event, Integration, Stretch
+from trunnion.dynamics.state import Moment
+from trunnion.dynamics.touching import FIRST, SLOWEST, ContactState, Push
+
+__all__ = ["ContactMotion", "Impact"]
+
+Array = NDArray[np.float64]
+Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
+
+CLOSELY = 33  # times about a largest force
+LOOKS = 12  # times within a step at which gaps are looked at
+FINE = 40  # halvings towards the beginning of a step, where a gap that has just changed its sign is next to nothing
+MOST_CONTACTS = 100_000
+
+
+class Impact(NamedTuple):
+    """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
+    separation, m/s, largest normal force, N, and penetration, m, and the wear index ∫ |F| |slip| dt, J."""
+
+    label: str
+    begin: float
+    end: float
+    approach: float
+    separation: float
+    force: float
+    depth: float
+    wear: float
+
+
+@dataclass
+class _Open:
+    """A contact that lasts: its onset, and what it has come to so far. last: forces at the last looks."""
+
+    begin: float
+    approach: float
+    force: float = 0.0
+    depth: float = 0.0
+    wear: float = 0.0
+
+
+class Crossing(NamedTuple):
+    """A gap that changes its sign: contact, and time, s."""
+
+    contact: int
+    time: float
+
+
+@dataclass
+class ContactMotion(Integration):
+    """An integration that follows the contacts of `motion`.
+
+    onsets: of each contact its speed of approach, m/s, None while it does not touch; impacts: those that are over.
+    """
+
+    impacts: list[Impact] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        each = self.motion.contacts.each
+        self.onsets: tuple[float | None, ...] = (None,) * len(each)
+        self._open: dict[int, _Open] = {}
+        self._clearance = self.motion.contacts.least_clearance
+
+    def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
+        """The state of a row, with the contacts as they are."""
+        return super().moment(time, row, sense, now)._replace(onsets=self.onsets)
+
+    def _move(
+        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
+    ) -> tuple[float, Array, float | None]:
+        """Move until a contact begins or ends, or the next break."""
+        rate = self._rate(sense, now, (-np.inf, np.inf))
+        first = min(step, 0.5 * (until - time)) if step else None
+        solver = self._solver(rate, time, row, until, self._absolute(row), first)
+        while solver.status == "running":
+            before, held = float(solver.t), np.array(solver.y)
+            failed = solver.step()
+            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
+                return self._failed(before, held, sense, now, failed)
+            dense, after = solver.dense_output(), float(solver.t)
+            times = before + (after - before) * np.arange(1, LOOKS + 1) / LOOKS
+            crossing = self._first(dense, before, times)
+            end = after if crossing is None else crossing.time
+            self._measured(dense, np.append(times[times < end], end), before)
+            self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets))
+            found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
+            self._follow(end, found, sense, now)
+            if crossing is not None:
+                ahead = self._changed(crossing, found)
+                return end, found, min(ahead, float(solver.step_size or np.inf))
+        return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
+
+    # ---- gaps -------------------------------------------------------------------------------------------------
+
+    def _states(self, dense: Dense, times: Array) -> list[ContactState]:
+        """The contacts at times of a step."""
+        at = self.layout.moment(times, np.asarray(dense(times)))
+        with np.errstate(all="ignore"):
+            return self.motion.contacts.states(self.motion.walk(at, np.zeros_like(at.q)))
+
+    def _gaps(self, dense: Dense, times: Array) -> Array:
+        """Gaps, m, (contact, time), negative where a contact that touches is open or another has closed."""
+        states = self._states(dense, times)
+        sign = np.array([1.0 if onset is None else -1.0 for onset in self.onsets])
+        found: Array = sign[:, None] * np.array([np.broadcast_to(state.gap, times.shape) for state in states])
+        return found
+
+    def _first(self, dense: Dense, begin: float, times: Array) -> Crossing | None:
+        """The first gap that changes its sign within a step."""
+        crossed = self._gaps(dense, times) < 0.0
+        found: Crossing | None = None
+        for contact in np.flatnonzero(crossed.any(axis=1)):
+            k = int(np.argmax(crossed[contact]))
+            low, high = float(times[k - 1]) if k else begin, float(times[k])
+            if k == 0:  # it may have changed its sign at the beginning: look for where it is as it should be
+                nearer: Array = begin + (high - begin) * 0.5 ** np.arange(1.0, FINE + 1.0)
+                good = np.flatnonzero(self._gaps(dense, nearer)[contact] > 0.0)
+                if not len(good):
+                    return Crossing(int(contact), begin + (high - begin) * 0.5**FINE)
+                low = float(nearer[good[0]])
+            place = brentq(
+                lambda time, contact=contact: float(self._gaps(dense, np.array([time]))[contact, 0]),
+                low, high, xtol=1e-16, rtol=8.9e-16,
+            )  # fmt: skip
+            if found is None or place < found.time:
+                found = Crossing(int(contact), float(place))
+        return found
+
+    def _changed(self, crossing: Crossing, row: Array) -> float:
+        """Let a contact begin or end; how long the first step after it may be, s."""
+        k, time = crossing
+        label = self.motion.contacts.labels[k]
+        state = self._states(lambda times: row[:, None], np.array([time]))[k]
+        rate = float(np.ravel(state.rate)[0])
+        onsets: list[float | None] = list(self.onsets)
+        if onsets[k] is None:
+            onsets[k] = max(-rate, 0.0)
+            self._open[k] = _Open(time, max(-rate, 0.0))
+            self.solution.events.append(Event(time, "impact", label, -rate, "m/s"))
+        else:
+            onsets[k] = None
+            one = self._open.pop(k)
+            self.impacts.append(Impact(label, one.begin, time, one.approach, rate, one.force, one.depth, one.wear))
+            self.solution.events.append(Event(time, "lift-off", label, rate, "m/s"))
+        self.onsets = tuple(onsets)
+        return FIRST * self._clearance / max(abs(rate), SLOWEST)
+
+    # ---- what a contact comes to ------------------------------------------------------------------------------
+
+    def _measured(self, dense: Dense, times: Array, begin: float) -> None:
+        """Peaks and wear of the contacts that last, from the looks of a step."""
+        if not self._open:
+            return
+        times = np.append(begin, times)
+        pushes = self._pushes(dense, times)
+        for k, one in self._open.items():
+            state, push = pushes[k]
+            one.wear += float(np.trapezoid(np.abs(push.normal * state.slip), times))
+            one.force = max(one.force, self._largest(dense, times, push.normal, lambda s, p: p.normal, k))
+            one.depth = max(one.depth, self._largest(dense, times, -state.gap, lambda s, p: -s.gap, k))
+
+    def _largest(
+        self, dense: Dense, times: Array, seen: Array, of: Callable[[ContactState, Push], Array], k: int
+    ) -> float:
+        """The largest of a number of a contact within a step: looked at closely where it is inside."""
+        top = int(np.argmax(seen))
+        if not 0 < top < len(times) - 1:
+            return float(seen[top])
+        return _peak(of(*self._pushes(dense, np.linspace(times[top - 1], times[top + 1], CLOSELY))[k]))
+
+    def _pushes(self, dense: Dense, times: Array) -> list[tuple[ContactState, Push]]:
+        """The forces of the contacts at times of a step."""
+        at = self.layout.moment(times, np.asarray(dense(times)))
+        with np.errstate(all="ignore"):
+            return self.motion.contacts.pushes(self.motion.walk(at, np.zeros_like(at.q)), self.onsets)
+
+    def finished(self) -> list[Impact]:
+        """All contacts, those that last at the end with an end that is not known."""
+        last = [
+            Impact(self.motion.contacts.labels[k], one.begin, np.nan, one.approach, np.nan, one.force, one.depth,
+                   one.wear)
+            for k, one in self._open.items()
+        ]  # fmt: skip
+        return sorted([*self.impacts, *last], key=lambda one: one.begin)
+
+
+def _peak(values: Array) -> float:
+    """The largest of equally spaced numbers, of the parabola through it and its neighbours."""
+    k = int(np.argmax(values))
+    if not 0 < k < len(values) - 1:
+        return float(values[k])
+    before, top, after = (float(one) for one in values[k - 1 : k + 2])
+    bend = before - 2.0 * top + after
+    return top if bend >= 0.0 else top - 0.125 * (after - before) ** 2 / bend

@@ -1,0 +1,221 @@
+"""A mechanism whose joints in play are taken out: its links are held by contacts, and more coordinates are free.
+
+A pin in play takes no freedom away. Without its joint the linkage has two coordinates more, which are coordinates of
+joints that remain: in the loop of the joint, chosen so that the modules become as small as can be. A link that no joint
+holds any more has the place of its mass centre and its angle for coordinates, by joints to the ground that carry
+nothing. So motion in time needs nothing new for play: the offset of a pin in its hole follows from the coordinates.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.start import initial_row
+from trunnion.dynamics.state import FreeMotion
+from trunnion.errors import Finding, MechanismError
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.parts import Driver
+from trunnion.solve.forward import Forward
+from trunnion.solve.run import Run
+from trunnion.structure.decompose import decompose
+
+__all__ = ["Opened", "in_play", "opened"]
+
+Array = NDArray[np.float64]
+
+KEPT = (
+    "trunnion", "name", "space", "gravity", "dimensions", "links", "ground", "joints", "joint_defaults", "drivers",
+    "loads", "tables", "springs", "gears", "assembly", "errors", "fits",
+)  # fmt: skip
+PARTS = ("x", "y", "turn")  # of the way to the ground of a link that no joint holds
+MOST_CHOICES = 5000
+SHARE = (
+    1e-3  # of a radian or of the size: how far the stated motion of a coordinate that is freed goes, which is not it
+)
+
+
+@dataclass(frozen=True)
+class Opened:
+    """mechanism: without the joints in play, with more free drivers; run: of the mechanism as it is stated."""
+
+    mechanism: Mechanism
+    run: Run
+
+
+def in_play(mechanism: Mechanism) -> list[str]:
+    """Joints that state a contact."""
+    return [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
+
+
+def opened(run: Run) -> Opened:
+    """A prepared mechanism without its joints in play. It begins with every pin in the middle of its hole, with the
+    velocities of the linkage without play."""
+    mechanism, cut = run.system.mechanism, in_play(run.system.mechanism)
+    walk = _start(run)
+    data = {key: part for key, part in mechanism.data().items() if key in KEPT}
+    data["joints"] = {name: one for name, one in data["joints"].items() if name not in cut}
+    data["assembly"] = {name: one for name, one in data.get("assembly", {}).items() if name not in cut}
+    data["errors"] = {
+        name: one for name, one in data.get("errors", {}).items() if not _of(mechanism.path_of(name), cut)
+    }
+    held, coordinates = _loose(data, mechanism), dict[str, tuple[float, float]]()
+    for link in held:
+        coordinates.update(_hang(data, mechanism.fixed_link, link, walk))
+    base = Mechanism(**data)
+    wanted = 2 * len(cut) - len(coordinates)
+    coordinates.update((name, _coordinate(walk, name)) for name in _chosen(base, list(coordinates), wanted, cut, run))
+    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, coordinates)}
+    return Opened(Mechanism(**data), run)
+
+
+def _of(path: str, joints: Sequence[str]) -> bool:
+    """Whether a number is one of these joints."""
+    return any(path.startswith(f"joints.{name}.") for name in joints)
+
+
+def _start(run: Run) -> Forward:
+    """The walk of the mechanism as stated at the start, with the stated initial motion of its free drivers."""
+    names = [name for name, driver in run.system.mechanism.drivers.items() if driver.found]
+    if not names:
+        return run.walk(np.zeros(1))
+    motion = FreeMotion.of(run)
+    row = initial_row(motion)[:, None]
+    at = Layout.of(motion).moment(np.zeros(1), row)
+    return motion.walk(at, np.zeros_like(at.q))
+
+
+def _number(value: object) -> float:
+    return float(np.ravel(primal(value))[0])
+
+
+def _coordinate(walk: Forward, joint: str) -> tuple[float, float]:
+    """Coordinate of a joint and its rate at the start."""
+    which = 0 if walk.system.turns(joint) else 1
+    return _number(walk.coordinates(joint)[which]), _number(walk.rates(joint)[which])
+
+
+# ---- links that no joint holds --------------------------------------------------------------------------------
+
+
+def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
+    """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
+    part = {link: {link} for link in mechanism.links}
+    for joint in data["joints"].values():
+        one, other = (part[link] for link in joint["links"])
+        if one is not other:
+            one |= other
+            part.update(dict.fromkeys(other, one))
+    ground = part[mechanism.fixed_link]
+    others = {id(links): links for links in part.values() if links is not ground}
+    mass = mechanism.parameters()
+    return [
+        max((link for link in mechanism.links if link in links), key=lambda link: mass[f"links.{link}.mass"])
+        for links in others.values()
+    ]
+
+
+def _hang(data: dict[str, Any], ground: str, link: str, walk: Forward) -> dict[str, tuple[float, float]]:
+    """Connect a loose link with the ground by slides along x and y and a turn; their coordinates and rates."""
+    along, across, turn = names = [f"{link}_in_play_{part}" for part in PARTS]
+    carriers = [f"{along}_carrier", f"{across}_carrier"]
+    centre = tuple(_number(part) for part in walk.system.centre(walk.values, link))
+    links = data["links"] = {name: {**one, "points": dict(one["points"])} for name, one in data["links"].items()}
+    x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
+    links[ground]["points"][along] = x
+    links[carriers[0]] = {"points": {along: x, across: y}}
+    links[carriers[1]] = {"points": {across: y, turn: [0, 0]}}
+    links[link]["points"][turn] = list(centre)
+    ends = ([ground, carriers[0]], carriers, [carriers[1], link])
+    for name, kind, pair in zip(names, ("prismatic", "prismatic", "revolute"), ends, strict=True):
+        data["joints"][name] = {"type": kind, "links": pair, "friction": 0, "seat": "free"}
+    at, frame, twist = walk.at(link, centre), walk.motions[link].frame, walk.motions[link].twist
+    angle = np.arctan2(_number(frame.s), _number(frame.c))
+    return {
+        along: (_number(at.place[0]), _number(at.velocity[0])),
+        across: (_number(at.place[1]), _number(at.velocity[1])),
+        turn: (float(angle), _number(twist.w)),
+    }
+
+
+# ---- coordinates ----------------------------------------------------------------------------------------------
+
+
+def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], run: Run) -> tuple[str, ...]:
+    """The joints whose coordinates become free: with them every module is as small as can be."""
+    joints = [
+        name
+        for name, joint in base.effective_joints.items()
+        if name not in base.drivers and name not in hung and PAIRS[joint.type].drivable
+    ]
+    nearby = _loop(run.system.mechanism, cut)
+    joints.sort(key=lambda name: name not in nearby)
+    best: tuple[tuple[int, int], tuple[str, ...]] | None = None
+    for tried in itertools.islice(itertools.combinations(joints, count), MOST_CHOICES):
+        drivers = dict.fromkeys((*hung, *tried), Driver(free=True))
+        try:
+            plan = decompose(base.model_copy(update={"drivers": {**base.drivers, **drivers}}))
+        except MechanismError:
+            continue
+        sizes = [len(module.links) for module in plan.modules]
+        cost = max(sizes), -len(sizes)
+        if best is None or cost < best[0]:
+            best = cost, tried
+        if max(sizes) == 1:
+            break
+    if best is None:
+        what = f"without {', '.join(cut)} no {count} coordinates of other joints determine the mechanism"
+        raise MechanismError(Finding(what, "joints", "let fewer joints be in play"))
+    return best[1]
+
+
+def _loop(mechanism: Mechanism, cut: Sequence[str]) -> set[str]:
+    """Joints on the shortest ways around the joints that are cut."""
+    found: set[str] = set()
+    for name in cut:
+        first, second = mechanism.effective_joints[name].links
+        found.update(_way(mechanism, first, second, set(cut)))
+    return found
+
+
+def _way(mechanism: Mechanism, first: str, second: str, without: set[str]) -> Iterator[str]:
+    """Joints on the shortest way from a link to another."""
+    came: dict[str, tuple[str, str] | None] = {first: None}
+    front = [first]
+    while front and second not in came:
+        ahead: list[str] = []
+        for name, joint in mechanism.effective_joints.items():
+            for here, there in (joint.links, joint.links[::-1]):
+                if name not in without and here in front and there not in came:
+                    came[there] = (name, here)
+                    ahead.append(there)
+        front = ahead
+    while (step := came.get(second)) is not None:
+        yield step[0]
+        second = step[1]
+
+
+def _drivers(run: Run, base: Mechanism, coordinates: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, Any]]:
+    """Free drivers of the coordinates, from where they are at the start.
+
+    What they are stated to do otherwise is next to nothing, in the time of one cycle: it chooses the assembly there.
+    """
+    size, duration = _number(run.system.size(run.values)), run.cycle.duration or 1.0
+    found: dict[str, dict[str, Any]] = {}
+    for name, (coordinate, rate) in coordinates.items():
+        way = SHARE * (1.0 if PAIRS[base.effective_joints[name].type].turns else size)
+        found[name] = {
+            "free": True,
+            "speed": way / duration,
+            "range": [coordinate, coordinate + way],
+            "initial": {"coordinate": coordinate, "speed": rate},
+        }
+    return found

@@ -1,0 +1,186 @@
+"""A motion of joints in play as the mechanism was stated: with these joints, and without what stands in for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle.variables import fill_of
+from trunnion.dynamics.contact_motion import Impact
+from trunnion.dynamics.touching import Contacts, ContactState, Push
+from trunnion.results import variables as results
+from trunnion.results.dataset import Variable
+from trunnion.results.figure import Figure
+from trunnion.solve.run import Run
+
+__all__ = ["CONTACT", "IMPACT", "Touches", "as_stated", "impact_arrays", "impact_figures"]
+
+Array = NDArray[np.float64]
+
+CONTACT: dict[str, Variable] = {
+    "contact_gap": Variable(("contact", "time"), "m", "gap of the contact, negative where it touches"),
+    "contact_normal_force": Variable(("contact", "time"), "N", "normal force of the contact"),
+    "contact_friction_force": Variable(("contact", "time"), "N", "friction force of the contact, against its slip"),
+    "contact_slip": Variable(("contact", "time"), "m/s", "slip of the surfaces"),
+    "contact_touching": Variable(("contact", "time"), "1", "1 while the contact touches", np.int8),
+    "contact_offset": Variable(
+        ("contact", "axis", "time"), "m", "offset of the pin in its hole, of a corner in its guide; in the hole's axes"
+    ),
+    "contact_energy": Variable(("time",), "J", "elastic energy in the contacts"),
+    "work_contact": Variable(("time",), "J", "work lost in the contacts since the start, friction in them included"),
+}
+IMPACT: dict[str, Variable] = {
+    "impact_begin": Variable(("impact",), "s", "time at which a contact begins"),
+    "impact_end": Variable(("impact",), "s", "time at which it ends"),
+    "impact_approach": Variable(("impact",), "m/s", "speed of approach where it begins"),
+    "impact_separation": Variable(("impact",), "m/s", "speed of separation where it ends"),
+    "impact_force": Variable(("impact",), "N", "largest normal force"),
+    "impact_depth": Variable(("impact",), "m", "largest penetration"),
+    "impact_wear": Variable(("impact",), "J", "wear index, integral of normal force times slip"),
+}
+
+
+class Touches(NamedTuple):
+    """What the contacts were at every row: (contact, time), and the offsets (contact, axis, time); force: on the body,
+    (contact, axis, time); place: of the contact."""
+
+    gap: Array
+    normal: Array
+    friction: Array
+    slip: Array
+    touching: Array
+    stored: Array
+    offset: Array
+    force: Array
+    place: Array
+
+    @classmethod
+    def empty(cls, contacts: int, times: int) -> Touches:
+        """Nothing known."""
+        flat, deep = (contacts, times), (contacts, 2, times)
+        return cls(*(np.full(flat, np.nan) for _ in range(6)), *(np.full(deep, np.nan) for _ in range(3)))
+
+    def fill(
+        self, lanes: NDArray[np.intp], found: Sequence[tuple[ContactState, Push]], onsets: Sequence[object]
+    ) -> None:
+        """Write the rows of one walk."""
+        for k, (state, push) in enumerate(found):
+            self.gap[k, lanes], self.normal[k, lanes] = state.gap, push.normal
+            self.friction[k, lanes], self.slip[k, lanes] = push.friction, state.slip
+            self.touching[k, lanes], self.stored[k, lanes] = float(onsets[k] is not None), push.stored
+            for axis in (0, 1):
+                self.offset[k, axis, lanes], self.place[k, axis, lanes] = state.offset[axis], state.place[axis]
+                self.force[k, axis, lanes] = -push.normal * state.normal[axis] + push.friction * state.tangent[axis]
+
+    def arrays(self, work: Array) -> dict[str, Array]:
+        """The variables of `CONTACT`."""
+        return {
+            "contact_gap": self.gap,
+            "contact_normal_force": self.normal,
+            "contact_friction_force": self.friction,
+            "contact_slip": self.slip,
+            "contact_touching": np.nan_to_num(self.touching),
+            "contact_offset": self.offset,
+            "contact_energy": self.stored.sum(axis=0),
+            "work_contact": work,
+        }
+
+
+def as_stated(
+    run: Run, contacts: Contacts, touches: Touches, arrays: Mapping[str, Array], labels: Mapping[str, Sequence[str]]
+) -> tuple[dict[str, Array], dict[str, list[str]]]:
+    """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play."""
+    system = run.system
+    wanted = fill_of(system).labels(system)
+    known = results.variables(system.mechanism.space)
+    count = arrays["status"].shape[-1]
+    found = results.allocate(wanted, count)
+    for name, array in arrays.items():
+        if name not in found or results.SAME_AS.get(name) in found:
+            continue
+        into, dims = found[name], known[name].dims
+        places = [[(i, labels[dim].index(one)) for i, one in enumerate(wanted[dim]) if one in labels[dim]]
+                  for dim in dims if dim in wanted]  # fmt: skip
+        if not places:
+            into[...] = array
+            continue
+        to, of = (np.ix_(*([pair[side] for pair in some] for some in places)) for side in (0, 1))
+        into[to] = array[of]
+    _fill_joints(run, contacts, touches, found, wanted)
+    return found, wanted
+
+
+def _fill_joints(
+    run: Run, contacts: Contacts, touches: Touches, found: dict[str, Array], labels: Mapping[str, list[str]]
+) -> None:
+    """Motion and reaction of the joints in play."""
+    system = run.system
+    for joint in dict.fromkeys(one.joint for one in contacts.each):
+        row, links = labels["joint"].index(joint), system.joints[joint][1]
+        first, second = (labels["link"].index(link) for link in links)
+        for suffix in ("", "_velocity", "_acceleration"):
+            angles = found[f"link_angle{suffix}"]
+            found[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
+        point = found["point_position"][labels["point"].index(f"{links[1]}.{joint}")]
+        found["reaction_force"][row] = 0.0
+        for name in ("reaction_moment", "friction_torque", "friction_power", "friction_force"):
+            found[name][row] = 0.0
+        if not system.turns(joint):
+            _fill_slide(run, joint, found, labels)
+        for k, one in enumerate(contacts.each):
+            if one.joint != joint:
+                continue
+            force = touches.force[k] if one.body == links[1] else -touches.force[k]
+            arm = touches.place[k] - point
+            found["reaction_force"][row] += force
+            found["friction_power"][row] -= touches.friction[k] * touches.slip[k]
+            moment = arm[0] * force[1] - arm[1] * force[0]
+            found["friction_torque" if system.turns(joint) else "reaction_moment"][row] += moment
+
+
+def _fill_slide(run: Run, joint: str, found: dict[str, Array], labels: Mapping[str, list[str]]) -> None:
+    """How far, and how fast, a slider in play has come along its guide."""
+    first, second = run.system.joints[joint][1]
+    axis = run.system.holes(run.values)[first, joint]
+    angle = found["link_angle"][labels["link"].index(first)]
+    base = np.arctan2(float(np.ravel(primal(axis.s))[0]), float(np.ravel(primal(axis.c))[0]))
+    row, (one, other) = (
+        labels["joint"].index(joint),
+        (labels["point"].index(f"{link}.{joint}") for link in (first, second)),
+    )
+    c, s = np.cos(angle + base), np.sin(angle + base)
+    for suffix, name in (("", "position"), ("_velocity", "velocity"), ("_acceleration", "acceleration")):
+        apart = found[f"point_{name}"][other] - found[f"point_{name}"][one]
+        found[f"joint_slide{suffix}"][row] = c * apart[0] + s * apart[1]
+
+
+def impact_arrays(impacts: Sequence[Impact]) -> dict[str, Array]:
+    """The variables of `IMPACT`."""
+    keys = ("begin", "end", "approach", "separation", "force", "depth", "wear")
+    return {f"impact_{key}": np.array([getattr(one, key) for one in impacts], float) for key in keys}
+
+
+def impact_figures(labels: Sequence[str], impacts: Sequence[Impact], end: float) -> list[Figure]:
+    """What a summary says of every contact: how often and how hard it touches, for how long, and how much it wears."""
+    found: list[Figure] = []
+    for label in labels:
+        own = [one for one in impacts if one.label == label]
+        found.append(Figure(f"{label}.impacts", f"contacts of {label}", float(len(own)), "1"))
+        if not own:
+            continue
+        hardest = max(own, key=lambda one: one.force)
+        long = sum((one.end if np.isfinite(one.end) else end) - one.begin for one in own)
+        when, share = f"in the contact from {hardest.begin:.4g} s", long / end if end else np.nan
+        depth, speed = max(one.depth for one in own), max(one.approach for one in own)
+        found += [
+            Figure(f"{label}.contact_force_max", f"contact force in {label}", hardest.force, "N", "largest", when),
+            Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"),
+            Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest"),
+            Figure(f"{label}.contact_time", f"time in contact of {label}", share, "1", "of all"),
+            Figure(f"{label}.wear", f"wear index of {label}", sum(one.wear for one in own), "J"),
+        ]  # fmt: skip
+    return found

@@ -1,0 +1,260 @@
+"""Contacts of joints in play: gaps, the speeds at them, and the forces of the contact laws on the links.
+
+A pin of radius r lies in a hole of radius R at the offset c of its centre from the hole's: it touches the wall where
+|c| = ρ = R − r. A slider of a length and a height in a guide touches with its four corners. Normal forces follow the
+law of the joint's contact (`joints.contact`), tangential ones its friction law at the slip of the surfaces.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.joints.contact import hertz_stiffness, normal_force
+from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
+from trunnion.joints.pairs import PAIRS
+from trunnion.solve.forward import Forward
+from trunnion.solve.loads import LoadAction
+from trunnion.solve.run import Run
+from trunnion.solve.shifts import play_of
+
+__all__ = ["Contact", "ContactState", "Contacts", "Push", "contacts_of"]
+
+Array = NDArray[np.float64]
+Vector = tuple[Array, Array]
+
+SLOWEST = 1e-3  # m/s: an onset slower than this is taken to be as fast, or the loss of a mere pressing would be any
+FIRST = 1e-3  # of the clearance: about how deep the first step of a contact goes
+CENTRED = 1e-9  # of the clearance: nearer to the middle of its hole a pin lies in no direction
+
+
+class ContactState(NamedTuple):
+    """Gap, m, its rate and the slip of the surfaces, m/s; normal: unit vector on the pin or slider, from where it
+    touches to the other body; tangent: along which it slips; place: of the contact, m; offset: of the pin in its hole,
+    m, in the hole's axes, of a corner along and across its guide."""
+
+    gap: Array
+    rate: Array
+    slip: Array
+    normal: Vector
+    tangent: Vector
+    place: Vector
+    offset: Vector
+
+
+class Push(NamedTuple):
+    """Normal force, force of friction along the tangent on the pin or slider, N, stored energy, J, and loss, W."""
+
+    normal: Array
+    friction: Array
+    stored: Array
+    loss: Array
+
+
+@dataclass(frozen=True)
+class Contact(ABC):
+    """One place where two bodies of a joint in play may touch.
+
+    joint: of the file; label: its own name; body: the link of the pin or slider; other: the link of the hole or guide;
+    stiffness: N/mⁿ; factor: χ of its law; law, parameters: of friction, None without; clearance: m.
+    """
+
+    joint: str
+    label: str
+    body: str
+    other: str
+    clearance: float
+    stiffness: float
+    exponent: float
+    factor: float
+    restitution: float
+    law: FrictionLaw | None
+    parameters: Mapping[str, float]
+
+    @abstractmethod
+    def state(self, walk: Forward) -> ContactState:
+        """Where the surfaces are."""
+
+    def push(self, state: ContactState, onset: float | None) -> Push:
+        """Forces of a contact that began with a speed of approach, m/s; None: it is not touching."""
+        if onset is None:
+            nothing = 0.0 * state.gap
+            return Push(nothing, nothing, nothing, nothing)
+        depth, rate = -state.gap, -state.rate
+        normal = normal_force(depth, rate, max(onset, SLOWEST), self.stiffness, self.exponent, self.factor)
+        elastic = self.stiffness * np.power(np.maximum(depth, 0.0), self.exponent)
+        stored = elastic * np.maximum(depth, 0.0) / (self.exponent + 1.0)
+        friction = 0.0 * normal
+        if self.law is not None:
+            friction = self.law.function(normal, state.slip, **self.parameters)
+        return Push(normal, friction, stored, (normal - elastic) * rate - friction * state.slip)
+
+    def action(self, walk: Forward, state: ContactState, push: Push) -> LoadAction:
+        """What the contact does to the two links; its power into them, W."""
+        force = tuple(-push.normal * n + push.friction * t for n, t in zip(state.normal, state.tangent, strict=True))
+        on: list[tuple[str, Any]] = []
+        for link, sign in ((self.body, 1.0), (self.other, -1.0)):
+            own = tuple(sign * part for part in force)
+            on.append((link, walk.algebra.load(walk.motions[link].frame, own, walk.algebra.NO_MOMENT, state.place)))
+        return LoadAction(on, push.normal * state.rate + push.friction * state.slip)
+
+
+@dataclass(frozen=True)
+class PinContact(Contact):
+    """A pin in a hole. pin, hole: local places of their centres, m; wall: radius of the hole, m."""
+
+    pin: tuple[float, float] = (0.0, 0.0)
+    hole: tuple[float, float] = (0.0, 0.0)
+    wall: float = 0.0
+
+    def state(self, walk: Forward) -> ContactState:
+        """The gap is ρ − |c|."""
+        a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
+        cx, cy = a[0] - b[0], a[1] - b[1]
+        size = np.hypot(cx, cy)
+        there = size > CENTRED * self.clearance
+        size_there = np.where(there, size, 1.0)
+        nx, ny = np.where(there, cx / size_there, 1.0), np.where(there, cy / size_there, 0.0)
+        ux, uy = a[2] - b[2], a[3] - b[3]
+        tx, ty = -ny, nx
+        px, py = b[0] + self.wall * nx, b[1] + self.wall * ny
+        spins = [primal(walk.motions[link].twist.w) for link in (self.body, self.other)]
+        # velocities of both materials where they touch, along the tangent
+        slip = (
+            (a[2] * tx + a[3] * ty + spins[0] * ((px - a[0]) * nx + (py - a[1]) * ny))
+            - (b[2] * tx + b[3] * ty + spins[1] * ((px - b[0]) * nx + (py - b[1]) * ny))
+        )  # fmt: skip
+        frame = walk.motions[self.other].frame
+        offset = frame.c * cx + frame.s * cy, frame.c * cy - frame.s * cx
+        return ContactState(self.clearance - size, -(nx * ux + ny * uy), slip, (nx, ny), (tx, ty), (px, py), offset)
+
+
+@dataclass(frozen=True)
+class EdgeContact(Contact):
+    """A corner of a slider and a side of its guide.
+
+    corner: local place on the slider, m; line: a point of the guide's middle, m, and its direction, in the frame of the
+    guide's link; side: +1 or −1, the side on which the wall lies; distance: of the wall from the middle, m.
+    """
+
+    corner: tuple[float, float] = (0.0, 0.0)
+    line: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
+    side: float = 1.0
+    distance: float = 0.0
+
+    def state(self, walk: Forward) -> ContactState:
+        """The gap is the distance of the wall less that of the corner, on its side of the middle."""
+        x, y, c, s = self.line
+        a, frame = _point(walk, self.body, self.corner), walk.motions[self.other].frame
+        tx, ty = (primal(part) for part in walk.algebra.rotated(frame, (c, s)))
+        nx, ny = -self.side * ty, self.side * tx
+        origin = _point(walk, self.other, (x, y))
+        away = (a[0] - origin[0]) * nx + (a[1] - origin[1]) * ny
+        spin = primal(walk.motions[self.other].twist.w)
+        vx = a[2] - (origin[2] - spin * (a[1] - origin[1]))
+        vy = a[3] - (origin[3] + spin * (a[0] - origin[0]))
+        one = 0.0 * away
+        return ContactState(
+            self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + one, ny + one), (tx + one, ty + one),
+            (a[0], a[1]), ((a[0] - origin[0]) * tx + (a[1] - origin[1]) * ty, self.side * away),
+        )  # fmt: skip
+
+
+def _point(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Array, Array, Array, Array]:
+    """Place, m, and velocity, m/s, of a point of a link."""
+    at = walk.at(link, local)
+    x, y, vx, vy = (np.asarray(primal(part), float) for part in (*at.place[:2], *at.velocity[:2]))
+    return x, y, vx, vy
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """All contacts of a mechanism.
+
+    onsets: of each contact its speed of approach while it touches, None while it does not.
+    """
+
+    each: tuple[Contact, ...] = ()
+    labels: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", tuple(one.label for one in self.each))
+
+    @property
+    def least_clearance(self) -> float:
+        """m."""
+        return min(one.clearance for one in self.each)
+
+    def states(self, walk: Forward) -> list[ContactState]:
+        """Where all surfaces are."""
+        return [one.state(walk) for one in self.each]
+
+    def pushes(self, walk: Forward, onsets: Sequence[float | None]) -> list[tuple[ContactState, Push]]:
+        """The forces of all contacts."""
+        states = self.states(walk)
+        return [(state, one.push(state, onset)) for one, state, onset in zip(self.each, states, onsets, strict=True)]
+
+    def actions(self, walk: Forward, onsets: Sequence[float | None]) -> Iterator[tuple[str, LoadAction]]:
+        """What those that touch do to the links, by label."""
+        for one, onset in zip(self.each, onsets, strict=True):
+            if onset is not None:
+                state = one.state(walk)
+                yield one.label, one.action(walk, state, one.push(state, onset))
+
+
+def contacts_of(run: Run, joints: Sequence[str]) -> Contacts:
+    """The contacts of joints in play of a mechanism as it is stated."""
+    return Contacts(tuple(one for joint in joints for one in _of_joint(run, joint)))
+
+
+def _of_joint(run: Run, name: str) -> Iterator[Contact]:
+    system, values = run.system, run.values
+    stated = system.mechanism.effective_joints[name]
+    contact, play = stated.contact, play_of("planar", stated.type, values, name)
+    assert contact is not None  # the model's checks
+    assert play is not None
+    clearance, holes = _number(play.radii[0]), system.holes(values)
+    first, second = stated.links
+    known = {key: _number(values[path]) for key in ("restitution", "exponent", "stiffness")
+             if (path := f"joints.{name}.contact.{key}") in values}  # fmt: skip
+    restitution = known.get("restitution", 1.0)
+    law = FRICTION_LAWS[stated.friction.law or "coulomb"] if stated.friction else None
+    friction = {key: _number(values[f"joints.{name}.friction.{key}"]) for key in law.parameters} if law else {}
+    guided = PAIRS[stated.type].guided
+    radius = 0.0 if guided else _number(values.get(f"joints.{name}.pin.radius", 0.0))
+    stiffness = known["stiffness"] if "stiffness" in known else _hertz(values, name, radius, radius + clearance)
+    common: dict[str, Any] = {
+        "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": known["exponent"],
+        "factor": contact.of.factor(restitution), "restitution": restitution, "law": law, "parameters": friction,
+    }  # fmt: skip
+    places: list[Any] = [tuple(_number(part) for part in holes[link, name]) for link in (first, second)]
+    if not guided:
+        pin, hole = places[0][:2], places[1][:2]
+        wall = radius + clearance
+        yield PinContact(label=name, body=first, other=second, pin=pin, hole=hole, wall=wall, **common)
+        return
+    length = _number(values[f"joints.{name}.guide.length"])
+    height = _number(values.get(f"joints.{name}.guide.height", 0.0))
+    x, y, c, s = places[1]
+    for number, (end, side) in enumerate(((-1, 1.0), (1, 1.0), (-1, -1.0), (1, -1.0)), 1):
+        along, across = 0.5 * end * length, 0.5 * side * height
+        corner = x + along * c - across * s, y + along * s + across * c
+        yield EdgeContact(
+            label=f"{name}.{number}", body=second, other=first, corner=corner, line=places[0], side=side,
+            distance=0.5 * height + clearance, **common,
+        )  # fmt: skip
+
+
+def _hertz(values: Mapping[str, Any], name: str, pin: float, hole: float) -> float:
+    keys = ("modulus", "hole_modulus", "poisson_ratio", "hole_poisson_ratio")
+    return hertz_stiffness(pin, hole, *(_number(values[f"joints.{name}.contact.{key}"]) for key in keys))
+
+
+def _number(value: object) -> float:
+    return float(np.ravel(primal(value))[0])

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from trunnion.dynamics.integrate import Event, Integration, Stretch
+from trunnion.dynamics.rates import Seeing, Seen
 from trunnion.dynamics.state import Moment
-from trunnion.dynamics.touching import FIRST, SLOWEST, ContactState, Push
+from trunnion.dynamics.touching import FIRST, SLOWEST
 
 __all__ = ["ContactMotion", "Impact"]
 
@@ -73,6 +74,7 @@ class ContactMotion(Integration):
     def __post_init__(self) -> None:
         super().__post_init__()
         each = self.motion.contacts.each
+        self.seeing = cast("Seeing", self.dynamics)
         self.onsets: tuple[float | None, ...] = (None,) * len(each)
         self._open: dict[int, _Open] = {}
         self._clearance = self.motion.contacts.least_clearance
@@ -108,17 +110,16 @@ class ContactMotion(Integration):
 
     # ---- gaps -------------------------------------------------------------------------------------------------
 
-    def _states(self, dense: Dense, times: Array) -> list[ContactState]:
+    def _look(self, dense: Dense, times: Array) -> Seen:
         """The contacts at times of a step."""
-        at = self.layout.moment(times, np.asarray(dense(times)))
+        at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
-            return self.motion.contacts.states(self.motion.walk(at, np.zeros_like(at.q)))
+            return self.seeing.look(at)
 
     def _gaps(self, dense: Dense, times: Array) -> Array:
         """Gaps, m, (contact, time), negative where a contact that touches is open or another has closed."""
-        states = self._states(dense, times)
         sign = np.array([1.0 if onset is None else -1.0 for onset in self.onsets])
-        found: Array = sign[:, None] * np.array([np.broadcast_to(state.gap, times.shape) for state in states])
+        found: Array = sign[:, None] * self._look(dense, times).gap
         return found
 
     def _first(self, dense: Dense, begin: float, times: Array) -> Crossing | None:
@@ -146,11 +147,10 @@ class ContactMotion(Integration):
         """Let a contact begin or end; how long the first step after it may be, s."""
         k, time = crossing
         label = self.motion.contacts.labels[k]
-        state = self._states(lambda times: row[:, None], np.array([time]))[k]
-        rate = float(np.ravel(state.rate)[0])
+        rate = float(self._look(lambda times: row[:, None], np.array([time])).rate[k, 0])
         onsets: list[float | None] = list(self.onsets)
         if onsets[k] is None:
-            onsets[k] = max(-rate, 0.0)
+            onsets[k] = max(-rate, SLOWEST)
             self._open[k] = _Open(time, max(-rate, 0.0))
             self.solution.events.append(Event(time, "impact", label, -rate, "m/s"))
         else:
@@ -168,27 +168,20 @@ class ContactMotion(Integration):
         if not self._open:
             return
         times = np.append(begin, times)
-        pushes = self._pushes(dense, times)
+        seen = self._look(dense, times)
         for k, one in self._open.items():
-            state, push = pushes[k]
-            one.wear += float(np.trapezoid(np.abs(push.normal * state.slip), times))
-            one.force = max(one.force, self._largest(dense, times, push.normal, lambda s, p: p.normal, k))
-            one.depth = max(one.depth, self._largest(dense, times, -state.gap, lambda s, p: -s.gap, k))
+            one.wear += float(np.trapezoid(np.abs(seen.normal[k] * seen.slip[k]), times))
+            one.force = max(one.force, self._largest(dense, times, seen.normal[k], k, 1))
+            one.depth = max(one.depth, self._largest(dense, times, -seen.gap[k], k, -1))
 
-    def _largest(
-        self, dense: Dense, times: Array, seen: Array, of: Callable[[ContactState, Push], Array], k: int
-    ) -> float:
-        """The largest of a number of a contact within a step: looked at closely where it is inside."""
+    def _largest(self, dense: Dense, times: Array, seen: Array, k: int, what: int) -> float:
+        """The largest normal force (what: 1) or penetration (−1) of a contact within a step: looked at closely where it
+        is inside."""
         top = int(np.argmax(seen))
         if not 0 < top < len(times) - 1:
             return float(seen[top])
-        return _peak(of(*self._pushes(dense, np.linspace(times[top - 1], times[top + 1], CLOSELY))[k]))
-
-    def _pushes(self, dense: Dense, times: Array) -> list[tuple[ContactState, Push]]:
-        """The forces of the contacts at times of a step."""
-        at = self.layout.moment(times, np.asarray(dense(times)))
-        with np.errstate(all="ignore"):
-            return self.motion.contacts.pushes(self.motion.walk(at, np.zeros_like(at.q)), self.onsets)
+        close = self._look(dense, np.linspace(times[top - 1], times[top + 1], CLOSELY))
+        return _peak(close.normal[k] if what > 0 else -close.gap[k])
 
     def finished(self) -> list[Impact]:
         """All contacts, those that last at the end with an end that is not known."""

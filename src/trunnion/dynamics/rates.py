@@ -13,7 +13,7 @@ from trunnion.dynamics.touching import Contacts
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
-__all__ = ["CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Walks", "works_of"]
+__all__ = ["CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seeing", "Seen", "Walks", "works_of"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,21 @@ class Dynamics(Protocol):
     """What tells the rates at one moment."""
 
     def __call__(self, at: Moment) -> Rates: ...
+
+
+class Seen(NamedTuple):
+    """Of every contact, (contact, lane): gap, m, its rate and slip, m/s, and normal force, N."""
+
+    gap: Array
+    rate: Array
+    slip: Array
+    normal: Array
+
+
+class Seeing(Dynamics, Protocol):
+    """What also tells how the contacts are, in many lanes."""
+
+    def look(self, at: Moment) -> Seen: ...
 
 
 class Layout(NamedTuple):
@@ -100,6 +115,13 @@ class Walks:
         memory = bristle_rates(motion, at, found.back)[:, 0]
         works = works_of(found.back, at, motion.contacts)
         return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
+
+    def look(self, at: Moment) -> Seen:
+        """See `Seeing`."""
+        motion, lanes = self.motion, at.q.shape[1]
+        found = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
+        parts = [(state.gap, state.rate, state.slip, push.normal) for state, push in found]
+        return Seen(*(np.array([np.broadcast_to(one[i], lanes) for one in parts]) for i in range(len(Seen._fields))))
 
 
 def works_of(back: Backward, at: Moment, contacts: Contacts | None = None) -> Array:

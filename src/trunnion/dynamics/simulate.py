@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
 from trunnion.dynamics.checks import refuse, refuse_massless
+from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
@@ -87,7 +88,7 @@ def simulated(
     motion = FreeMotion.of(run)
     known = places(motion)
     tables, walks = tabulated(motion, known), Walks(motion)
-    rates = walks if tables is None else TabulatedRates(tables, walks)
+    rates = (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
     integration = Integration(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
         INSIDE if tables is None else TABLED, load_times(motion, duration),
@@ -113,7 +114,8 @@ def _with_play(
     row = initial_row(motion)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
-    integration = ContactMotion(motion, Walks(motion), duration, max(fine, FINEST), progress=progress,
+    rates = compiled_rates(motion) or Walks(motion)
+    integration = ContactMotion(motion, rates, duration, max(fine, FINEST), progress=progress,
                                 times=load_times(motion, duration))  # fmt: skip
     try:
         solution = integration.run(row)

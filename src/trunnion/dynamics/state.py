@@ -53,7 +53,7 @@ class Moment(NamedTuple):
     bristles: Array
     sense: float = 0.0
     now: float = 0.0
-    onsets: tuple[float | None, ...] = ()
+    onsets: tuple[Number | None, ...] = ()
 
 
 class Accelerated(NamedTuple):
@@ -147,7 +147,7 @@ class FreeMotion:
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
 
-    def _acting(self, onsets: Sequence[float | None]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
+    def _acting(self, onsets: Sequence[Number | None]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
         """What the contacts that touch do to the links."""
         if all(onset is None for onset in onsets):
             return None

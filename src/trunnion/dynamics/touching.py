@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.joints.contact import hertz_stiffness, normal_force
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.joints.contact import elastic_force, hertz_stiffness, normal_force
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.forward import Forward
@@ -27,9 +28,9 @@ from trunnion.solve.shifts import play_of
 __all__ = ["Contact", "ContactState", "Contacts", "Push", "contacts_of"]
 
 Array = NDArray[np.float64]
-Vector = tuple[Array, Array]
+Vector = tuple[Number, Number]
 
-SLOWEST = 1e-3  # m/s: an onset slower than this is taken to be as fast, or the loss of a mere pressing would be any
+SLOWEST = 1e-3  # m/s: a slower onset is taken to be as fast as this, else mere pressing would lose any amount
 FIRST = 1e-3  # of the clearance: about how deep the first step of a contact goes
 CENTRED = 1e-9  # of the clearance: nearer to the middle of its hole a pin lies in no direction
 
@@ -39,9 +40,9 @@ class ContactState(NamedTuple):
     touches to the other body; tangent: along which it slips; place: of the contact, m; offset: of the pin in its hole,
     m, in the hole's axes, of a corner along and across its guide."""
 
-    gap: Array
-    rate: Array
-    slip: Array
+    gap: Number
+    rate: Number
+    slip: Number
     normal: Vector
     tangent: Vector
     place: Vector
@@ -51,10 +52,10 @@ class ContactState(NamedTuple):
 class Push(NamedTuple):
     """Normal force, force of friction along the tangent on the pin or slider, N, stored energy, J, and loss, W."""
 
-    normal: Array
-    friction: Array
-    stored: Array
-    loss: Array
+    normal: Number
+    friction: Number
+    stored: Number
+    loss: Number
 
 
 @dataclass(frozen=True)
@@ -81,15 +82,15 @@ class Contact(ABC):
     def state(self, walk: Forward) -> ContactState:
         """Where the surfaces are."""
 
-    def push(self, state: ContactState, onset: float | None) -> Push:
+    def push(self, state: ContactState, onset: Number | None) -> Push:
         """Forces of a contact that began with a speed of approach, m/s; None: it is not touching."""
         if onset is None:
             nothing = 0.0 * state.gap
             return Push(nothing, nothing, nothing, nothing)
         depth, rate = -state.gap, -state.rate
-        normal = normal_force(depth, rate, max(onset, SLOWEST), self.stiffness, self.exponent, self.factor)
-        elastic = self.stiffness * np.power(np.maximum(depth, 0.0), self.exponent)
-        stored = elastic * np.maximum(depth, 0.0) / (self.exponent + 1.0)
+        normal = normal_force(depth, rate, onset, self.stiffness, self.exponent, self.factor)
+        elastic = elastic_force(depth, self.stiffness, self.exponent)
+        stored = elastic * namespace(depth).maximum(depth, 0.0) / (self.exponent + 1.0)
         friction = 0.0 * normal
         if self.law is not None:
             friction = self.law.function(normal, state.slip, **self.parameters)
@@ -117,10 +118,11 @@ class PinContact(Contact):
         """The gap is ρ − |c|."""
         a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
         cx, cy = a[0] - b[0], a[1] - b[1]
-        size = np.hypot(cx, cy)
+        xp = namespace(cx, cy)
+        size = xp.hypot(cx, cy)
         there = size > CENTRED * self.clearance
-        size_there = np.where(there, size, 1.0)
-        nx, ny = np.where(there, cx / size_there, 1.0), np.where(there, cy / size_there, 0.0)
+        size_there = xp.where(there, size, 1.0)
+        nx, ny = xp.where(there, cx / size_there, 1.0), xp.where(there, cy / size_there, 0.0)
         ux, uy = a[2] - b[2], a[3] - b[3]
         tx, ty = -ny, nx
         px, py = b[0] + self.wall * nx, b[1] + self.wall * ny
@@ -166,10 +168,10 @@ class EdgeContact(Contact):
         )  # fmt: skip
 
 
-def _point(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Array, Array, Array, Array]:
+def _point(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Number, Number, Number, Number]:
     """Place, m, and velocity, m/s, of a point of a link."""
     at = walk.at(link, local)
-    x, y, vx, vy = (np.asarray(primal(part), float) for part in (*at.place[:2], *at.velocity[:2]))
+    x, y, vx, vy = (primal(part) for part in (*at.place[:2], *at.velocity[:2]))
     return x, y, vx, vy
 
 
@@ -195,12 +197,12 @@ class Contacts:
         """Where all surfaces are."""
         return [one.state(walk) for one in self.each]
 
-    def pushes(self, walk: Forward, onsets: Sequence[float | None]) -> list[tuple[ContactState, Push]]:
+    def pushes(self, walk: Forward, onsets: Sequence[Number | None]) -> list[tuple[ContactState, Push]]:
         """The forces of all contacts."""
         states = self.states(walk)
         return [(state, one.push(state, onset)) for one, state, onset in zip(self.each, states, onsets, strict=True)]
 
-    def actions(self, walk: Forward, onsets: Sequence[float | None]) -> Iterator[tuple[str, LoadAction]]:
+    def actions(self, walk: Forward, onsets: Sequence[Number | None]) -> Iterator[tuple[str, LoadAction]]:
         """What those that touch do to the links, by label."""
         for one, onset in zip(self.each, onsets, strict=True):
             if onset is not None:

@@ -9,7 +9,7 @@ import os
 import platform
 import stat
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -103,12 +103,27 @@ class MachineCode:
         inputs: by name, (1,), (sample,), (position,) or (sample, position), contiguous floats. There are at least as
         many positions as a vector holds.
         """
+        self.bound(inputs, outputs, samples, positions)()
+
+    def bound(
+        self,
+        inputs: Mapping[str, Array],
+        outputs: Sequence[NDArray[Any]],
+        samples: tuple[int, int],
+        positions: tuple[int, int],
+    ) -> Callable[[], None]:
+        """`run` with these arrays, for being called often: what they hold may change in between."""
         stride = outputs[0].shape[-1]
         table = np.empty(max(1, self.rows * (positions[1] - positions[0])))
         arrays = [[inputs[name] for name in names] for names in self.inputs]
-        self._function(
-            *samples, *positions, stride, *(_pointers(some) for some in (*arrays, outputs)), table.ctypes.data
-        )
+        told = (*samples, *positions, stride, *(_pointers(some) for some in (*arrays, outputs)), table.ctypes.data)
+        held = inputs, outputs, table  # as long as their addresses are in use
+
+        def call() -> None:
+            self._function(*told)
+
+        call.held = held  # type: ignore[attr-defined]
+        return call
 
 
 def _pointers(arrays: Sequence[NDArray[Any]]) -> Any:

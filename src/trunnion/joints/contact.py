@@ -18,11 +18,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["CONTACT_LAWS", "ContactLaw", "hertz_stiffness", "loss_factor", "normal_force", "restitution_of"]
+from trunnion.algebra.namespace import Number, namespace
 
-Array = NDArray[np.float64]
+__all__ = [
+    "CONTACT_LAWS",
+    "ContactLaw",
+    "elastic_force",
+    "hertz_stiffness",
+    "loss_factor",
+    "normal_force",
+    "restitution_of",
+]
 
 MOST = 1e9  # loss factor beyond which nothing comes back
 HALVINGS = 200
@@ -42,14 +49,22 @@ class ContactLaw:
     elastic: bool = False
 
 
-def normal_force(depth: Array, rate: Array, onset: float, stiffness: float, exponent: float, factor: float) -> Array:
+def normal_force(
+    depth: Number, rate: Number, onset: Number, stiffness: float, exponent: float, factor: float
+) -> Number:
     """F = K dⁿ (1 + χ ḋ/v₀), N; 0 where d ≤ 0 or where the surfaces part faster than they spring back.
 
     depth: d, m; rate: ḋ, m/s; onset: v₀, m/s; stiffness: K, N/mⁿ.
     """
-    elastic = stiffness * np.power(np.maximum(depth, 0.0), exponent)
-    found: Array = elastic * np.maximum(1.0 + factor * rate / onset, 0.0)
-    return found
+    return elastic_force(depth, stiffness, exponent) * namespace(rate).maximum(1.0 + factor * rate / onset, 0.0)
+
+
+def elastic_force(depth: Number, stiffness: float, exponent: float) -> Number:
+    """K dⁿ, N; 0 where d ≤ 0."""
+    xp = namespace(depth)
+    inside = xp.maximum(depth, 0.0)
+    power = inside * xp.sqrt(inside) if exponent == 1.5 else inside if exponent == 1.0 else xp.power(inside, exponent)
+    return stiffness * power
 
 
 def hertz_stiffness(

@@ -1,0 +1,160 @@
+"""Rates of a free motion as machine code: the walks recorded once, for mechanisms whose efforts are affine in q̈.
+
+Without friction in the joints E(q, q̇, q̈) = E₀ + M q̈: one walk at rest and one for each unit acceleration give M and E₀,
+all at the same pose, so that the poses are computed once. The equation M q̈ = T − E₀ is solved by elimination as part of
+the program. What contacts touch, and what is switched on, decides which program it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.dynamics.rates import Layout, Seen, Walks
+from trunnion.dynamics.state import FreeMotion, Moment
+
+__all__ = ["CompiledRates", "compiled_rates"]
+
+Array = NDArray[np.float64]
+Figures = Callable[[FreeMotion, Moment], list[Number]]  # what a program computes, of a recorded motion
+
+MOST_LANES = 64  # that a program takes at a time
+
+
+def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
+    """The rates as machine code; None where they cannot be: friction, an assembly that is followed, no llvmlite."""
+    braked = any(drive.brake for drive in motion.drives.values())
+    if not motion.affine or motion.sticking or braked or motion.followed or find_spec("llvmlite") is None:
+        return None
+    found = CompiledRates(motion)
+    return found if found.works() else None
+
+
+class CompiledRates:
+    """The rates of `motion`, one program for every set of contacts that touch."""
+
+    def __init__(self, motion: FreeMotion) -> None:
+        self.motion = motion
+        self.walks = Walks(motion)
+        self.layout = Layout.of(motion)
+        self._programs: dict[tuple[Any, ...], _Program] = {}
+
+    def works(self) -> bool:
+        """Whether it can be recorded, with all contacts touching."""
+        n, count = self.layout.coordinates, len(self.motion.contacts.each)
+        parts: Any = [state[1 + k * n : 1 + (k + 1) * n] for k in range(3)]
+        at = Moment(cast("Any", state[0]), *parts, bristles=cast("Any", []), now=now,
+                    onsets=tuple(next(onset) if is_ else None for is_ in touching))  # fmt: skip
+        bare = replace(motion, run=replace(motion.run, values={**constant, **recorded}))
+        with np.errstate(all="ignore"):
+            wanted = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]
+        doubt = graph.constant(0.0)
+        for one in graph.doubts:
+            doubt = graph.apply("max", doubt, graph.as_float(one))
+        outputs = [*wanted, graph.as_float(doubt)]
+        self.lanes, width = MOST_LANES, vector_width()
+        code = MachineCode(program(graph, outputs, width))
+        self.numbers = {path: np.array([float(np.ravel(primal(value))[0])]) for path, value in given.items()}
+        self.numbers.update({name: np.zeros(1) for name in self.onsets})
+        self.numbers.update({name: np.zeros(self.lanes) for name in self.states})
+        self.found = np.zeros((len(outputs), self.lanes))
+        rows = [row[None] for row in self.found]
+        # one state is done as one vector of the same lane
+        self._short = code.bound(self.numbers, rows, (0, 1), (0, width))
+        self._long = code.bound(self.numbers, rows, (0, 1), (0, self.lanes))
+        self.width = width
+
+    def run(self, at: Moment) -> Array:
+        """The numbers, (number, lane)."""
+        lanes = at.q.shape[1]
+        touching = (onset for onset in at.onsets if onset is not None)
+        for name, onset in zip(self.onsets, touching, strict=True):
+            self.numbers[name][0] = onset
+        state = np.vstack([at.time[None], at.q, at.rate, at.integral])
+        if lanes == 1:
+            for name, number in zip(self.states, state[:, 0], strict=True):
+                self.numbers[name][: self.width] = number
+            self._short()
+            return self.found[:, :1].copy()
+        parts = []
+        for low in range(0, lanes, self.lanes):
+            part = state[:, low : low + self.lanes]
+            for name, row in zip(self.states, part, strict=True):
+                self.numbers[name][: part.shape[1]] = row
+                self.numbers[name][part.shape[1] :] = row[-1]
+            self._long()
+            parts.append(self.found[:, : part.shape[1]].copy())
+        return np.hstack(parts)
+
+
+# ---- what is recorded -----------------------------------------------------------------------------------------
+
+
+def _rates_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
+    """Accelerations, rates of the controllers' integrals, works, as `rates.Walks` has them."""
+    count = len(motion.names)
+    nothing: Any = [0.0] * count
+    # from rest and without contacts, whose forces would leave no digits to the differences
+    still = at._replace(rate=nothing, onsets=(None,) * len(at.onsets))
+    zero, columns = _missing(motion, still, nothing), []
+    for k, size in enumerate(unit):
+        step = [size if i == k else 0.0 for i in range(count)]
+        columns.append([(one - rest) / size for one, rest in zip(_missing(motion, still, step), zero, strict=True)])
+    matrix = [list(row) for row in zip(*columns, strict=True)]
+    second = _eliminated(matrix, [-one for one in _missing(motion, at, nothing)])
+    drives = list(motion.drives.values())
+    errors = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(drives)]
+    return [*second, *errors, *_works(motion, at, second)]
+
+
+def _missing(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
+    """E − T of every free coordinate."""
+    back = motion.solve(at, second, {})
+    found = []
+    for i, (name, drive) in enumerate(motion.drives.items()):
+        given = drive.effort(at.time, at.rate[i], second[i], at.integral[i], at.now)
+        found.append(back.efforts[name] - given)
+    return found
+
+
+def _works(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
+    """Powers, as `rates.works_of` has them."""
+    back = motion.solve(at, second, {})
+    stated = motion.system.mechanism.loads
+    drive = sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0)
+    loads = sum((power for name, power in back.load_powers.items() if name in stated), 0.0)
+    springs = sum((state.power for state in back.springs.values()), 0.0)
+    found = [drive, loads, springs, 0.0]
+    if motion.contacts.each:
+        found.append(sum((push.loss for _, push in motion.contacts.pushes(back.walk, at.onsets)), 0.0))
+    return found
+
+
+def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
+    """What `rates.Seen` has, of every contact."""
+    nothing: Any = [0.0] * len(motion.names)
+    found = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
+    parts = [(state.gap, state.rate, state.slip, push.normal) for state, push in found]
+    return [one[i] for i in range(len(Seen._fields)) for one in parts]
+
+
+def _eliminated(matrix: list[list[Number]], right: list[Number]) -> list[Number]:
+    """x of A x = b for a mass matrix, which is symmetric and positive: no pivots are needed."""
+    count = len(right)
+    for k in range(count):
+        for i in range(k + 1, count):
+            share = matrix[i][k] / matrix[k][k]
+            matrix[i] = [a - share * b for a, b in zip(matrix[i], matrix[k], strict=True)]
+            right[i] = right[i] - share * right[k]
+    found: list[Number] = [0.0] * count
+    for i in reversed(range(count)):
+        rest = sum((matrix[i][j] * found[j] for j in range(i + 1, count)), 0.0)
+        found[i] = (right[i] - rest) / matrix[i][i]
+    return found

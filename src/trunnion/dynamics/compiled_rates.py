@@ -7,6 +7,7 @@ the program. What contacts touch, and what is switched on, decides which program
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.rates import Layout, Seen, Walks
+from trunnion.algebra.traced import UntraceableError
+from trunnion.dynamics.rates import Layout, Rates, Seen, Walks
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.solve.compiled_vectors import literals
 
 __all__ = ["CompiledRates", "compiled_rates"]
 
@@ -49,9 +52,60 @@ class CompiledRates:
     def works(self) -> bool:
         """Whether it can be recorded, with all contacts touching."""
         n, count = self.layout.coordinates, len(self.motion.contacts.each)
+        q, rate, integral, none = (np.zeros((k, 1)) for k in (n, n, n, 0))
+        at = Moment(np.zeros(1), q, rate, integral, none, onsets=(1.0,) * count)
+        try:
+            self._program("rates", at)
+        except (UntraceableError, TypeError, ValueError, NotImplementedError):
+            return False
+        return True
+
+    def __call__(self, at: Moment) -> Rates:
+        """The rates; one lane."""
+        n = self.layout.coordinates
+        found = self._program("rates", at).run(at)[:, 0]
+        if found[-1] != 0.0 or not np.all(np.isfinite(found)):
+            return self.walks(at)
+        return Rates(found[:n], found[n : 2 * n], np.empty(0), found[2 * n : -1], True)
+
+    def look(self, at: Moment) -> Seen:
+        """See `rates.Seeing`."""
+        found = self._program("look", at).run(at)
+        if np.any(found[-1]):
+            return self.walks.look(at)
+        return Seen(*found[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
+
+    def _program(self, what: str, at: Moment) -> _Program:
+        touching = tuple(onset is not None for onset in at.onsets)
+        key = what, touching, at.now
+        if key not in self._programs:
+            rates = functools.partial(_rates_of, unit=self.motion.unit.tolist())
+            figures: Figures = rates if what == "rates" else _seen
+            self._programs[key] = _Program(self.motion, figures, touching, at.now)
+        return self._programs[key]
+
+
+class _Program:
+    """Some numbers of a motion as machine code, of lanes of states; the last of them: whether there is any doubt."""
+
+    def __init__(self, motion: FreeMotion, figures: Figures, touching: Sequence[bool], now: float) -> None:
+        from trunnion.engines.graph import POSITION, Graph
+        from trunnion.engines.machine_code import MachineCode, vector_width
+        from trunnion.engines.program import program
+        from trunnion.engines.recorded import Recorded, number_of
+
+        n, graph = len(motion.names), Graph()
+        constant = literals(motion.values)
+        given = {path: value for path, value in motion.values.items() if path not in constant}
+        recorded = {path: Recorded(graph, graph.input(path, 0)) for path in given}
+        self.states = ["time", *(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n))]
+        state = [Recorded(graph, graph.input(name, POSITION)) for name in self.states]
+        self.onsets = [f"onset{k}" for k, is_ in enumerate(touching) if is_]
+        onset = iter([Recorded(graph, graph.input(name, 0)) for name in self.onsets])
+        onsets = tuple(next(onset) if is_ else None for is_ in touching)
         parts: Any = [state[1 + k * n : 1 + (k + 1) * n] for k in range(3)]
-        at = Moment(cast("Any", state[0]), *parts, bristles=cast("Any", []), now=now,
-                    onsets=tuple(next(onset) if is_ else None for is_ in touching))  # fmt: skip
+        q, rate, integral = parts
+        at = Moment(cast("Any", state[0]), q, rate, integral, cast("Any", []), now=now, onsets=onsets)
         bare = replace(motion, run=replace(motion.run, values={**constant, **recorded}))
         with np.errstate(all="ignore"):
             wanted = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]

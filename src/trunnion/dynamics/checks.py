@@ -46,6 +46,7 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
         if link != motion.system.mechanism.fixed_link
         and not np.any(values[f"links.{link}.mass"]) and not np.any(values[f"links.{link}.inertia"])
     ]  # fmt: skip
+    light = [link for link in light if any(name.startswith(f"{link}_in_play_") for name in motion.names)] or light
     names = ", ".join(dict.fromkeys(light)) or "some link"
     what = f"{names} has no mass and is held by nothing while the pins of {', '.join(joints)} are in play"
     remedy = "state its mass and inertia, or let fewer of its joints be in play"

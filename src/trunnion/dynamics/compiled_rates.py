@@ -8,6 +8,7 @@ the program. What contacts touch, and what is switched on, decides which program
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -68,6 +69,17 @@ class CompiledRates:
             return self.walks(at)
         return Rates(found[:n], found[n : 2 * n], np.empty(0), found[2 * n : -1], True)
 
+    def derivative(self, time: float, row: Array, onsets: Sequence[Number | None], now: float) -> Array:
+        """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
+        n, found = self.layout.coordinates, np.empty(len(row))
+        rates = self._program_of("rates", onsets, now).of_row(time, row[: 3 * n], onsets)
+        found[:n], found[n : 3 * n], found[3 * n :] = row[n : 2 * n], rates[: 2 * n], rates[2 * n : -1]
+        if rates[-1] == 0.0 and math.isfinite(found.sum()):
+            return found
+        at = self.layout.moment(np.array([time]), row[:, None], now=now)._replace(onsets=tuple(onsets))
+        told = self.walks(at)
+        return self.layout.row(row[n : 2 * n], told) if told.sound else np.full(len(row), np.nan)
+
     def look(self, at: Moment) -> Seen:
         """See `rates.Seeing`."""
         found = self._program("look", at).run(at)
@@ -76,12 +88,15 @@ class CompiledRates:
         return Seen(*found[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
     def _program(self, what: str, at: Moment) -> _Program:
-        touching = tuple(onset is not None for onset in at.onsets)
-        key = what, touching, at.now
+        return self._program_of(what, at.onsets, at.now)
+
+    def _program_of(self, what: str, onsets: Sequence[Number | None], now: float) -> _Program:
+        touching = tuple(onset is not None for onset in onsets)
+        key = what, touching, now
         if key not in self._programs:
             rates = functools.partial(_rates_of, unit=self.motion.unit.tolist())
             figures: Figures = rates if what == "rates" else _seen
-            self._programs[key] = _Program(self.motion, figures, touching, at.now)
+            self._programs[key] = _Program(self.motion, figures, touching, now)
         return self._programs[key]
 
 
@@ -117,7 +132,8 @@ class _Program:
         code = MachineCode(program(graph, outputs, width))
         self.numbers = {path: np.array([float(np.ravel(primal(value))[0])]) for path, value in given.items()}
         self.numbers.update({name: np.zeros(1) for name in self.onsets})
-        self.numbers.update({name: np.zeros(self.lanes) for name in self.states})
+        self.state = np.zeros((len(self.states), self.lanes))
+        self.numbers.update(zip(self.states, self.state, strict=True))
         self.found = np.zeros((len(outputs), self.lanes))
         rows = [row[None] for row in self.found]
         # one state is done as one vector of the same lane
@@ -127,25 +143,28 @@ class _Program:
 
     def run(self, at: Moment) -> Array:
         """The numbers, (number, lane)."""
-        lanes = at.q.shape[1]
-        touching = (onset for onset in at.onsets if onset is not None)
-        for name, onset in zip(self.onsets, touching, strict=True):
-            self.numbers[name][0] = onset
-        state = np.vstack([at.time[None], at.q, at.rate, at.integral])
-        if lanes == 1:
-            for name, number in zip(self.states, state[:, 0], strict=True):
-                self.numbers[name][: self.width] = number
-            self._short()
-            return self.found[:, :1].copy()
-        parts = []
-        for low in range(0, lanes, self.lanes):
+        state, parts = np.vstack([at.time[None], at.q, at.rate, at.integral]), list[Array]()
+        self._begin(at.onsets)
+        for low in range(0, state.shape[1], self.lanes):
             part = state[:, low : low + self.lanes]
-            for name, row in zip(self.states, part, strict=True):
-                self.numbers[name][: part.shape[1]] = row
-                self.numbers[name][part.shape[1] :] = row[-1]
+            self.state[:, : part.shape[1]], self.state[:, part.shape[1] :] = part, part[:, -1:]
             self._long()
             parts.append(self.found[:, : part.shape[1]].copy())
         return np.hstack(parts)
+
+    def of_row(self, time: float, state: Array, onsets: Sequence[Number | None]) -> Array:
+        """The numbers of one state: coordinates, rates, integrals; overwritten by the next."""
+        self._begin(onsets)
+        self.state[0, : self.width] = time
+        self.state[1:, : self.width] = state[:, None]
+        self._short()
+        found: Array = self.found[:, 0]
+        return found
+
+    def _begin(self, onsets: Sequence[Number | None]) -> None:
+        touching = (onset for onset in onsets if onset is not None)
+        for name, onset in zip(self.onsets, touching, strict=True):
+            self.numbers[name][0] = onset
 
 
 # ---- what is recorded -----------------------------------------------------------------------------------------

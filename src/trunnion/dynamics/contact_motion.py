@@ -22,6 +22,7 @@ from trunnion.dynamics.touching import FIRST, SLOWEST
 __all__ = ["ContactMotion", "Impact"]
 
 Array = NDArray[np.float64]
+Rate = Callable[[float, Array], Array]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
 CLOSELY = 33  # times about a largest force
@@ -107,6 +108,19 @@ class ContactMotion(Integration):
                 ahead = self._changed(crossing, found)
                 return end, found, min(ahead, float(solver.step_size or np.inf))
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
+
+    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
+        """The derivative of a row by time, by machine code where there is any."""
+        derivative = getattr(self.dynamics, "derivative", None)
+        if derivative is None:
+            return super()._rate(sense, now, between)
+
+        def rate(moment: float, numbers: Array) -> Array:
+            self.solution.asked += 1
+            found: Array = derivative(moment, numbers, self.onsets, now)
+            return found
+
+        return rate
 
     # ---- gaps -------------------------------------------------------------------------------------------------
 

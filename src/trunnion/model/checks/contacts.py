@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding
 from trunnion.joints.contact import CONTACT_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import has_play
+from trunnion.model.contact import has_play, play
 
 if TYPE_CHECKING:
     from trunnion.model.joint_parts import Contact, Joint
@@ -71,6 +71,10 @@ def contact_values(joint: Joint, values: Mapping[str, float], where: str) -> Ite
     if contact is None:
         return
     path = f"{where}.contact"
+    clearance = play(joint, where.removeprefix("joints."), values) if has_play(joint) else np.nan
+    if clearance <= 0:
+        what = f"is in play with a clearance of {clearance:g} m"
+        yield Finding(what, path, "give a clearance above 0, or remove the contact")
     restitution = values.get(f"{path}.restitution", np.nan)
     if restitution <= 0 or restitution > 1:
         what = f"is {restitution:g}, which is not above 0 and at most 1"

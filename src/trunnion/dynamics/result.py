@@ -142,6 +142,7 @@ def _turned_over(motion: FreeMotion, solution: Solution) -> float:
     return float(np.nanmax(np.abs(np.concatenate([changes, solution.layout.works(rows)])), initial=0.0))
 
 
+ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
@@ -212,9 +213,10 @@ def _summary(
         efforts = books.arrays["drive_effort"][names.index(name)]
         most = int(np.nanargmax(np.abs(efforts)))
         noun = "drive torque" if turns else "drive force"
-        found.append(
-            Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
-        )
+        if motion.system.mechanism.drivers[name].motor is not None:  # of others it is rounding
+            found.append(
+                Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
+            )
         found += steady_figures(motion, solution, i)
     for i, joint in enumerate(motion.system.joints):
         size = np.sqrt(np.sum(books.arrays["reaction_force"][i] ** 2, axis=0))
@@ -227,7 +229,7 @@ def _summary(
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
     words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction")
     for key, word, work in zip(WORKS, words, books.works[:, done], strict=True):
-        if np.any(np.nan_to_num(books.works[WORKS.index(key)]) != 0.0):
+        if np.nanmax(np.abs(books.works[WORKS.index(key)])) > ROUNDING * turned_over:
             found.append(Figure(f"work_{key}", word, work, "J"))
     worst = float(np.nanmax(np.abs(residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))

@@ -183,12 +183,13 @@ def _findings(motion: FreeMotion, solution: Solution, books: Books) -> Iterator[
 
 
 def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float, float]:
-    """Effort that acts at a time of rest, and the effort at which it would break away that way."""
+    """Effort that acts at a time of rest, and the effort at which it would break away: the way it acts, or the nearer."""
     rows, _ = solution.at(np.array([time]))
     rest, at = Rest(motion, solution.layout), solution.layout.moment(np.array([time]), rows, 1.0, time)
     given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])
     forward, backward = (float(one[0]) for one in rest.beyond(np.array([time]), rows[:, 0], time, time))
-    return given, given - forward if forward >= backward else given + backward
+    ahead = given > 0 or (given == 0 and forward >= backward)
+    return given, given - forward if ahead else given + backward
 
 
 # ---- summary --------------------------------------------------------------------------------------------------

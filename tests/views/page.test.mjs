@@ -87,7 +87,7 @@ globalThis.document = Object.assign(new Element("document"), {
 
 const { start } = await import("../../src/trunnion/views/web/report.js");
 const scene = JSON.parse(readFileSync(process.argv[2], "utf8"));
-const places = Object.fromEntries(["stage", "charts", "polars", "seats"].map((name) => [name, new Element(name)]));
+const places = Object.fromEntries(["stage", "charts", "polars", "seats", "events"].map((name) => [name, new Element(name)]));
 const crank = start(scene, places);
 for (let index = 0; index < scene.count; index += 1) crank.go(index);
 const classes = (name) => (element) => element.attributes.class?.split(" ").includes(name);
@@ -96,9 +96,42 @@ const space = scene.space === "spatial" && scene.solids.length ? steered() : nul
 for (const name of ["beforeprint", "afterprint"]) events[name].forEach((act) => act());
 const seen = (place, name) => places[place].find(classes(name)).length;
 
+const motion = scene.motion ? played() : null;
+
 const alone = { stage: new Element("stage") }; // an animation has no more than the drawing and its player
 start(scene, alone).go(scene.count - 1);
 assert.equal(alone.stage.find(classes("player")).length, 1);
+
+/** What a motion in time shows beside a cycle: its charts, events that are chosen, and what playing it in real time does. */
+function played() {
+  const { charts, stage, events: table } = places;
+  const clicked = scene.motion.events.map(({ at }) => {
+    table.listeners.click({ target: { dataset: { time: String((at / scene.abscissa.values.at(-1)) * scene.motion.duration) } } });
+    return crank.index();
+  });
+  table.listeners.click({ target: {} }); // beside the times
+  let frame = null;
+  globalThis.requestAnimationFrame = (act) => ((frame = act), 1);
+  globalThis.performance = { now: () => 0 };
+  const speed = stage.find(classes("pace"))[0].find((element) => element.name === "select")[0];
+  const chosen = speed.find((element) => element.name === "option" && element.attributes.value === speed.value);
+  const seconds = (1000 * scene.motion.duration) / Number(speed.value); // of the clock, ms
+  crank.go(crank.last + 5);
+  crank.toggle(); // begins again
+  const again = crank.index();
+  for (let time = 0; time <= 0.5 * seconds; time += seconds / 64) frame(time);
+  const half = crank.index();
+  for (let time = 0.5 * seconds; time <= 1.2 * seconds && crank.playing(); time += seconds / 64) frame(time);
+  return {
+    titles: charts.find(classes("title")).map((element) => element.textContent),
+    marks: charts.find((element) => element.attributes.class === "event").length,
+    axes: [...new Set(charts.find(classes("axis")).map((element) => element.textContent.replace(/ \[.*/, "")))],
+    clicked,
+    speed: chosen[0].textContent,
+    last: crank.last,
+    played: { again, half, after: crank.index(), playing: crank.playing() },
+  };
+}
 
 /** What a scene with errors shows of them, at several magnifications through all positions; ends at 1. */
 function enlarged() {
@@ -170,6 +203,7 @@ console.log(
   JSON.stringify({
     space,
     built,
+    motion,
     charts: seen("charts", "chart"),
     polars: seen("polars", "polar"),
     loads: seen("stage", "load"),

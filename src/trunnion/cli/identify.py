@@ -23,6 +23,7 @@ from trunnion.cli.options import (
     TableFile,
     UnitsRow,
     Write,
+    seconds,
     setting,
 )
 from trunnion.cli.result import Shown, check_files, check_model, show_tables
@@ -133,7 +134,7 @@ def identify(
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
-        held, late = held_out(hold_out or []), seconds(delay)
+        held, late = held_out(hold_out or []), seconds(delay, "--delay", "0.2ms")
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         with bar("models evaluated", None) as progress:
             result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts,  # type: ignore[arg-type]
@@ -169,29 +170,6 @@ def parameters(texts: list[str]) -> dict[str, list[str]]:
         remedy = "add --parameter joint_defaults.friction.coefficient, or another number of the model"
         raise MechanismError(Finding("no parameter to identify is given", "--parameter", remedy))
     return found
-
-
-def seconds(text: str | None) -> float | None:
-    """A time above 0 in s, from a number or a text with its unit."""
-    from trunnion.model.quantity import Quantity
-    from trunnion.model.units import KINDS, UnitError
-
-    if text is None:
-        return None
-    try:
-        found = float(Quantity.read(_plain(text), KINDS["time"]).evaluate())
-    except UnitError as error:
-        raise MechanismError(Finding(error.what, "--delay", error.remedy)) from None
-    if not found > 0:
-        raise MechanismError(Finding(f"a delay of {text} is not above 0", "--delay", "write one such as 0.2ms"))
-    return found
-
-
-def _plain(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def held_out(texts: list[str]) -> float | list[str] | None:

@@ -45,6 +45,7 @@ __all__ = [
     "named_file",
     "over",
     "points",
+    "seconds",
     "setting",
 ]
 
@@ -188,6 +189,29 @@ def _plain(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text.strip()
+
+
+def seconds(text: str | None, option: str, usual: str) -> float | None:
+    """A time above 0 in s, from a number or a text with its unit; None if it is not given.
+
+    usual: a time as one would give it, for the remedy. Raises MechanismError if the text is no such time.
+    """
+    from trunnion.model.quantity import Quantity
+    from trunnion.model.units import KINDS, UnitError
+
+    if text is None:
+        return None
+    remedy = f"give a time such as {usual}"
+    try:
+        stated = Quantity.read(_plain(text), KINDS["time"])
+    except UnitError as error:
+        raise MechanismError(Finding(error.what, option, error.remedy or remedy)) from None
+    if stated.names:  # of a model, which is not asked here
+        raise MechanismError(Finding(f"'{text.strip()}' is no time", option, remedy))
+    found = float(stated.evaluate())
+    if not found > 0:
+        raise MechanismError(Finding(f"a time of {text.strip()} is not above 0", option, remedy))
+    return found
 
 
 def over(texts: list[str]) -> dict[str, Any]:

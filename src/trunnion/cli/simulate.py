@@ -17,10 +17,10 @@ from trunnion.cli.options import (
     TableUnits,
     Units,
     UnitsRow,
+    seconds,
 )
 from trunnion.cli.result import Shown, check_files
 from trunnion.cli.terminal import bar
-from trunnion.errors import Finding, MechanismError
 
 __all__ = ["simulate"]
 
@@ -55,7 +55,7 @@ def simulate(
     from trunnion.dynamics.simulate import simulated
 
     check_files(out or [], report, of="motion", kind=kind if out else None)
-    duration = None if time is None else _seconds(time)
+    duration = seconds(time, "--time", "2s")
     mechanism = stated(file, set_, table, friction)
     with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
 
@@ -65,22 +65,3 @@ def simulate(
 
         result = simulated(mechanism, duration, steps, tolerance, told)
     Shown(result, file, ["drivers"], out or [], report, units_row, drawn={"kind": kind}, units=units).finish()
-
-
-def _seconds(text: str) -> float:
-    """A duration, s, from a number or a text with a unit."""
-    from trunnion.model.quantity import Quantity
-    from trunnion.model.units import KINDS, UnitError
-
-    try:
-        return float(Quantity.read(float(text) if _plain(text) else text, KINDS["time"]).evaluate())
-    except UnitError as error:
-        raise MechanismError(Finding(error.what, "--time", error.remedy or "give a time such as 2s")) from None
-
-
-def _plain(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -84,7 +84,7 @@ def result_of(
             "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
             **({"impacts": [one.label for one in impacts]} if stated else {}),
-            "summary": figure_rows(_summary(motion, solution, books, residual, run, impacts)),
+            "summary": figure_rows(_summary(motion, solution, books, residual, turned_over, run, impacts)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
             "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
@@ -164,6 +164,7 @@ def _turned_over(motion: FreeMotion, solution: Solution) -> float:
 
 
 DIFFERS = 0.01  # of a restitution: a difference that is worth a note
+ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
@@ -216,19 +217,26 @@ def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[F
 
 
 def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float, float]:
-    """Effort that acts at a time of rest, and the effort at which it would break away that way."""
+    """Effort that acts at a time of rest, and that at which it would break away: the way it acts, or the nearer."""
     rows, _ = solution.at(np.array([time]))
     rest, at = Rest(motion, solution.layout), solution.layout.moment(np.array([time]), rows, 1.0, time)
     given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])
     forward, backward = (float(one[0]) for one in rest.beyond(np.array([time]), rows[:, 0], time, time))
-    return given, given - forward if forward >= backward else given + backward
+    ahead = given > 0 or (given == 0 and forward >= backward)
+    return given, given - forward if ahead else given + backward
 
 
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
 def _summary(
-    motion: FreeMotion, solution: Solution, books: Books, residual: Array, run: Run, impacts: Sequence[Impact]
+    motion: FreeMotion,
+    solution: Solution,
+    books: Books,
+    residual: Array,
+    turned_over: float,
+    run: Run,
+    impacts: Sequence[Impact],
 ) -> Sequence[Figure]:
     """The figures that one looks at first."""
     found: list[Figure] = []
@@ -246,9 +254,10 @@ def _summary(
         efforts = books.arrays["drive_effort"][names.index(name)]
         most = int(np.nanargmax(np.abs(efforts)))
         noun = "drive torque" if turns else "drive force"
-        found.append(
-            Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
-        )
+        if motion.system.mechanism.drivers[name].motor is not None:  # of others it is rounding
+            found.append(
+                Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
+            )
         found += steady_figures(motion, solution, i)
     for i, joint in enumerate(run.system.joints):
         size = np.sqrt(np.sum(books.arrays["reaction_force"][i] ** 2, axis=0))
@@ -263,9 +272,8 @@ def _summary(
     words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
              "work lost in contacts")  # fmt: skip
     for key, word, works in zip((*WORKS, "contact"), words, books.works, strict=False):
-        work = works[done]
-        if np.any(np.nan_to_num(works) != 0.0):
-            found.append(Figure(f"work_{key}", word, work, "J"))
+        if np.nanmax(np.abs(works)) > ROUNDING * turned_over:
+            found.append(Figure(f"work_{key}", word, works[done], "J"))
     worst = float(np.nanmax(np.abs(residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))
     return found

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
 
-__all__ = ["embedded", "hashed", "inputs_of", "report", "said"]
+__all__ = ["embedded", "hashed", "inputs_of", "page", "report", "said"]
 
 MOST_RANGES = 24  # rows of the table of states
 # Variable, label, unit, what a reader may make of it.
@@ -48,20 +48,31 @@ BALANCE = (
 
 def report(result: xr.Dataset, ideal: xr.Dataset | None = None) -> str:
     """The whole report as HTML; `ideal` is the same run without friction, overlaid where given."""
+    return page(result, scene(result, ideal), compared=ideal is not None)
+
+
+def page(
+    result: xr.Dataset,
+    shown: dict[str, Any],
+    motion: dict[str, Any] | None = None,
+    quality: Sequence[dict[str, str]] = (),
+    compared: bool = False,
+) -> str:
+    """The report of a result whose scene is `shown`; motion: what it says of a motion in time, quality: rows beside."""
     from markupsafe import Markup  # with jinja2 only needed here, and slow to import
 
-    shown = scene(result, ideal)
     style, script = web_text("report.css"), bundle("report.js")
     runs = intervals(result)
     context = {
-        "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": ideal is not None,
+        "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": compared,
+        "motion": motion, "closed": shown["abscissa"]["closed"],
         "spatial": shown.get("space") == "spatial",
         "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
         "summary": _summary(result),
         "holding": _holding(result), "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(shown["built"] and shown["built"]["seats"]),
-        "balance": _balance(result), "inputs": inputs_of(result),
+        "balance": [*quality, *_balance(result)], "inputs": inputs_of(result),
         **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(shown)),
     }  # fmt: skip

@@ -13,30 +13,17 @@ from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Abscissa, abscissa, names
 from trunnion.views.common.figures import MUTED, PALETTE, along, curve, dress, legend, new, style_of
 from trunnion.views.common.lettering import plain
+from trunnion.views.motion.shown import Shown, energies, shown
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "as_positions", "check_kind", "figure", "sheet"]
+__all__ = ["KINDS", "check_kind", "figure", "sheet"]
 
 PANEL = 2.6  # height, inches
 MOST_MARKED = 12  # events drawn; of more, marks would hide the curves
-WORDS = {"break-away": "starts", "rest": "rests", "lock": "locks"}
-ENERGIES = (
-    ("work_drive", "work of the drivers"),
-    ("work_loads", "work of the loads"),
-    ("work_springs", "work of the springs"),
-    ("work_friction", "lost to friction"),
-    ("kinetic_energy", "kinetic energy"),
-    ("potential_energy", "potential energy"),
-)
-
-
-def as_positions(result: xr.Dataset) -> xr.Dataset:
-    """The result with its times as positions, as the views of a cycle take it."""
-    return result.rename_dims(time="position").drop_vars("time").assign_coords(time=("position", result["time"].values))
 
 
 def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
@@ -46,7 +33,7 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
         return sheet(result)
     title, draw = KINDS[kind]
     made = new(title, result, height=4.3)
-    _panel(made.subplots(), result, draw)
+    _panel(made.subplots(), shown(result), draw)
     return made
 
 
@@ -59,20 +46,21 @@ def check_kind(kind: str) -> None:
 def sheet(result: xr.Dataset) -> Figure:
     """Everything over time, one panel under the other."""
     over_time = {kind: one for kind, one in KINDS.items() if kind != "phase"}
+    motion = shown(result)
     made = new("Motion in time", result, height=1.0 + PANEL * len(over_time))
     panels = made.subplots(len(over_time), 1, squeeze=False)[:, 0]
     for axes, (_, draw) in zip(panels, over_time.values(), strict=True):
-        _panel(axes, result, draw)
+        _panel(axes, motion, draw)
         if axes is not panels[-1]:
             axes.set_xlabel("")
     return made
 
 
-def _panel(axes: Axes, result: xr.Dataset, draw: Callable[[Axes, xr.Dataset, Abscissa], None]) -> None:
-    over = abscissa(as_positions(result))
-    draw(axes, result, over)
+def _panel(axes: Axes, motion: Shown, draw: Callable[[Axes, xr.Dataset, Abscissa], None]) -> None:
+    over = abscissa(motion.rows)
+    draw(axes, motion.rows, over)
     if draw is not _phase:
-        _events(axes, result, over)
+        _events(axes, motion, over)
     legend(axes)
 
 
@@ -110,12 +98,10 @@ def _reactions(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
 
 
 def _energy(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
-    curves = [(text, result[name].values) for name, text in ENERGIES]
-    curves[-1] = (curves[-1][0], curves[-1][1] - curves[-1][1][0])
-    known = [(text, values) for text, values in curves if _largest(values) > 0]
-    factor, label = prefixed(max((_largest(values) for _, values in known), default=0.0), "J")
+    known = energies(result)
+    factor, label = prefixed(max((_largest(values) for *_, values in known), default=0.0), "J")
     along(axes, over, f"energy [{label}]")
-    for k, (text, values) in enumerate(known):
+    for k, (_, text, values) in enumerate(known):
         curve(axes, over, values * factor, text, **style_of(k))
 
 
@@ -134,17 +120,18 @@ def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _events(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
+def _events(axes: Axes, motion: Shown, over: Abscissa) -> None:
     """Thin lines where something happens, with a word above."""
-    rows, times = attribute(result, "events"), result["event_time"].values
-    if len(rows) > MOST_MARKED or not len(over.values):
+    events, last = motion.events, float(motion.rows["time"].values[-1])
+    if len(events) > MOST_MARKED or not last > 0:
         return
-    factor = over.values[-1] / float(result["time"].values[-1])
-    for (kind, *_), time in zip(rows, times, strict=True):
-        axes.axvline(time * factor, color=MUTED, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1.2)
+    for one in events:
+        at = over.values[-1] * min(one.time, last) / last
+        axes.axvline(at, color=MUTED, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1.2)
+        before = at > 0.9 * over.values[-1]  # of the line, where there is no room behind it
         axes.annotate(
-            WORDS.get(kind, kind), (time * factor, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -3),
-            textcoords="offset points", fontsize=7.5, color=MUTED, va="top",
+            one.word, (at, 1.0), xycoords=("data", "axes fraction"), xytext=(-3 if before else 3, -3),
+            textcoords="offset points", fontsize=7.5, color=MUTED, va="top", ha="right" if before else "left",
         )  # fmt: skip
 
 

@@ -114,6 +114,7 @@ function draw(chart, width) {
       { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describe(chart) },
       ...shading(chart, frame),
       ...axes(scene.abscissa, frame, [x0, x1], [y0, y1]),
+      ...events(scene, frame),
       ...chart.marks.map((index) => mark(frame, scene.abscissa.values[index])),
       clipped(box, ...curves, bars),
       chart.cursor,
@@ -122,6 +123,21 @@ function draw(chart, width) {
     ),
   );
   moveCursor(chart);
+}
+
+/** The events of a motion in time: a dashed line each, with a word where there is room for it. */
+function events(scene, frame) {
+  let free = MARGIN.left;
+  return (scene.motion?.events ?? []).flatMap(({ at, word }) => {
+    const x = frame.x(at);
+    const line = svg("line", { class: "event", x1: x, x2: x, y1: MARGIN.top, y2: frame.bottom });
+    line.append(svg("title", {}, word));
+    const wide = 6 * word.length + 6;
+    const before = x + wide > frame.right; // of the line, where there is no room behind it
+    if (before ? x - wide < free : x < free) return [line];
+    free = before ? x : x + wide;
+    return [line, svg("text", { class: before ? "mark end" : "mark", x: before ? x - 4 : x + 4, y: MARGIN.top + 11 }, word)];
+  });
 }
 
 /** A dotted line up through the chart. */

@@ -6,6 +6,7 @@ import { at, full, magnitude, peak, solved, state, total, usualPeak } from "./da
 import { html, svg } from "./dom.js";
 import { fixed, quantity } from "./format.js";
 import { mechanismView } from "./mechanism.js";
+import { energyChart, listenToEvents, speedCharts, stateRows } from "./motion.js";
 import { listenToKeys, player } from "./player.js";
 import { polarChart } from "./polar.js";
 import { seatCharts } from "./seat.js";
@@ -18,43 +19,50 @@ function kindOf(order) {
 
 /** Every chart of the scene that has something to show, as [{show, element}]. */
 function charts(scene, kinds, pick) {
-  const { count, sums, drivers, joints } = scene;
-  const list = drivers.map((driver) => effortChart(scene, driver, pick));
-  const losses = joints
-    .map((joint) => ({ label: joint.name, values: full(joint.friction_power, count), kind: kinds.get(joint.name) }))
-    .filter((one) => peak(one.values) > 0);
+  const { count, sums, drivers, joints, motion } = scene;
   const lost = total(
     joints.map((joint) => joint.friction_power),
     count,
   );
-  if (losses.length)
-    list.push(
-      lineChart(scene, {
-        title: "Friction power by joint",
-        unit: "W",
-        pick,
-        series: [{ label: "all", values: lost, kind: "ink" }, ...losses],
-      }),
-    );
-  list.push(reactionChart(scene, kinds, pick));
-  if (scene.space === "spatial") list.push(momentChart(scene, kinds, pick));
-  list.push(powerChart(scene, lost, pick));
-  if (sums.efficiency_instant) {
-    const values = full(sums.efficiency_instant, count).map((value) => (value === null ? null : 100 * value));
-    const whole = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}. `;
-    const far = peak(values) > 100 ? "Values beyond ±100 %, near zero drive power, are not shown." : "";
-    list.push(
-      lineChart(scene, {
-        title: "Efficiency at each position",
-        unit: "%",
-        pick,
-        limits: [-100, 100],
-        note: whole + far,
-        series: [{ label: "efficiency", values, kind: "k2" }],
-      }),
-    );
-  }
+  const driven = motion ? drivers.filter((driver) => peak(driver.effort) > 0) : drivers;
+  const efforts = driven.map((driver) => effortChart(scene, driver, pick));
+  const losses = lossChart(scene, kinds, lost, pick);
+  const reactions = [reactionChart(scene, kinds, pick)];
+  if (scene.space === "spatial") reactions.push(momentChart(scene, kinds, pick));
+  const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost, pick)];
+  const list = motion
+    ? [...speedCharts(scene, pick), ...efforts, ...energyChart(scene, pick), ...reactions, ...losses, ...power]
+    : [...efforts, ...losses, ...reactions, ...power];
+  if (sums.efficiency_instant) list.push(efficiencyChart(scene, pick));
   return [...list, ...errorCharts(scene, kinds, pick)];
+}
+
+/** Whether power goes through it; only masses exchange theirs where there is none. */
+function moved(scene, lost) {
+  return peak(lost, full(scene.sums.useful_power, scene.count), ...scene.drivers.map(({ power }) => power)) > 0;
+}
+
+function lossChart(scene, kinds, lost, pick) {
+  const losses = scene.joints
+    .map((joint) => ({ label: joint.name, values: full(joint.friction_power, scene.count), kind: kinds.get(joint.name) }))
+    .filter((one) => peak(one.values) > 0);
+  if (!losses.length) return [];
+  const series = [{ label: "all", values: lost, kind: "ink" }, ...losses];
+  return [lineChart(scene, { title: "Friction power by joint", unit: "W", pick, series })];
+}
+
+function efficiencyChart(scene, pick) {
+  const values = full(scene.sums.efficiency_instant, scene.count).map((value) => (value === null ? null : 100 * value));
+  const whole = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}. `;
+  const far = peak(values) > 100 ? "Values beyond ±100 %, near zero drive power, are not shown." : "";
+  return lineChart(scene, {
+    title: "Efficiency at each position",
+    unit: "%",
+    pick,
+    limits: [-100, 100],
+    note: whole + far,
+    series: [{ label: "efficiency", values, kind: "k2" }],
+  });
 }
 
 /** Errors of the worst points and of the outputs, and how the pins lie; dotted where a joint loses contact. */
@@ -157,6 +165,7 @@ function readout(scene) {
   const rows = [
     [abscissa.label, (index) => fixed(abscissa.values[index], peak(abscissa.values)) + gap + abscissa.unit],
     ...(abscissa.label === "time" ? [] : [["time", (index) => quantity(at(scene.time, index), "s", peak(scene.time))]]),
+    ...stateRows(scene),
     ...drivers.map(({ name, unit, effort }) => [
       `${unit === "N" ? "force" : "torque"} ${name}`,
       (index) => quantity(at(effort, index), unit, usualPeak(scene, effort)),
@@ -244,7 +253,10 @@ export function start(scene, places) {
   const mechanism = spatial ? spaceView(scene, kinds) : mechanismView(scene, kinds);
   const figures = readout(scene);
   const views = [mechanism, figures];
-  const crank = player(scene.count, figures.words, (index) => views.forEach((view) => view.show(index)), { svg });
+  const crank = player(scene.count, figures.words, (index) => views.forEach((view) => view.show(index)), {
+    svg,
+    duration: scene.motion?.duration ?? null,
+  });
   const pick = (index, firm) => {
     if (firm) crank.go(index);
     else if (!crank.playing()) crank.go(index);
@@ -257,7 +269,8 @@ export function start(scene, places) {
   const hint = html(
     "p",
     { class: "hint" },
-    "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve to move the crank." +
+    "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve " +
+      (scene.motion ? "to go to that time." : "to move the crank.") +
       (spatial ? " Drag turns the mechanism, with Shift or the right button it shifts, the wheel zooms; so do the keys ← → ↑ ↓ + − 0 once it has the focus." : "") +
       (scene.apart ? " Joints on one spot are drawn apart along their axes; between them the scale does not hold." : ""),
   );
@@ -267,6 +280,7 @@ export function start(scene, places) {
     ...[mechanism.element, crank.element, errors, figures.element, vectors, mechanism.controls, hint].filter(Boolean),
   );
   places.charts?.append(...curves.map((chart) => chart.element));
+  listenToEvents(places.events, scene, crank);
   listenToKeys(document, crank);
   crank.go(0);
   if (places.stage.dataset?.plays && !globalThis.matchMedia?.("(prefers-reduced-motion: reduce)").matches) crank.toggle();
@@ -277,5 +291,5 @@ if (globalThis.document) {
   const find = (id) => document.getElementById(id);
   const data = find("scene");
   if (data)
-    start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars"), seats: find("seats") });
+    start(JSON.parse(data.textContent), { stage: find("stage"), charts: find("charts"), polars: find("polars"), seats: find("seats"), events: find("happened") });
 }

@@ -1,0 +1,59 @@
+"""A motion in time as plain data for the browser: the scene of a cycle with speeds, energies and events beside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.results.attributes import attribute
+from trunnion.views.common.cycle import abscissa, names, series
+from trunnion.views.cycle.scene import scene
+from trunnion.views.motion.shown import Shown, energies
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["MOST_ROWS", "motion_scene"]
+
+MOST_ROWS = 1200  # more than a cycle has: turns follow each other
+RESTS, NONE = -1, 99  # statuses that a cycle does not have
+STATES = {RESTS: "at rest: friction holds it", NONE: "there is no motion"}
+
+
+def motion_scene(shown: Shown) -> dict[str, Any]:
+    """The motion as JSON-able data, its rows thinned evenly to MOST_ROWS; see `cycle.scene.scene`."""
+    rows = shown.rows
+    found = scene(rows, max_positions=MOST_ROWS)
+    kept = rows.isel(position=np.arange(0, rows.sizes["position"], -(-rows.sizes["position"] // MOST_ROWS)))
+    status = np.where(kept["resting"].values == 1, RESTS, kept["status"].values)
+    status = np.where(np.isfinite(kept["kinetic_energy"].values), status, NONE)
+    over = abscissa(rows)
+    last = float(kept["time"].values[-1])
+    factor = over.values[-1] / float(rows["time"].values[-1]) if last > 0 else 1.0
+    own = {
+        "duration": last,
+        "free": _free(kept),
+        "energies": [{"label": text, "values": series(values)} for _, text, values in energies(kept)],
+        "events": [{"at": float(f"{min(one.time, last) * factor:.9g}"), "word": one.word} for one in shown.events],
+    }
+    return found | {
+        "status": [int(code) for code in status],
+        "states": found["states"] | {str(code): text for code, text in STATES.items()},
+        "gaps": [],
+        "sums": {name: values for name, values in found["sums"].items() if name != "efficiency_instant"},
+        "ease": [1.0],  # no peak is cut: a motion in time has no dead centre that forces it
+        "motion": own,
+    }
+
+
+def _free(rows: xr.Dataset) -> list[dict[str, Any]]:
+    """Coordinate and rate of every free driver."""
+    free, units = attribute(rows, "free_drivers"), attribute(rows, "driver_units")
+    found = []
+    for i, name in enumerate(names(rows, "driver")):
+        if name in free:
+            unit = "rad" if units[i] == "N m" else "m"
+            coordinate, rate = rows["drive_coordinate"].values[i], rows["drive_rate"].values[i]
+            found.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
+    return found

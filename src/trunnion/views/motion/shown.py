@@ -1,0 +1,108 @@
+"""What the views of a motion in time share: its rows as positions, its events, the names of its energies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ENERGIES", "Happening", "Shown", "as_positions", "energies", "happenings", "shown"]
+
+Array = NDArray[np.float64]
+WORDS = {"break-away": "starts", "rest": "rests", "lock": "locks"}
+ENERGIES = (
+    ("work_drive", "work of the drivers"),
+    ("work_loads", "work of the loads"),
+    ("work_springs", "work of the springs"),
+    ("work_friction", "lost to friction"),
+    ("kinetic_energy", "kinetic energy"),
+    ("potential_energy", "potential energy"),
+)
+
+
+NOISE = 1e-12  # of the largest reaction times 1 m, or of the largest energy: below is rounding
+# findings that tell where a motion ends early
+ENDS = {f"simulate.{code}" for code in ("range", "no_acceleration", "not_assembled", "step", "events", "stopped")}
+
+
+class Happening(NamedTuple):
+    """An event as views tell it: its time, s, a word, the driver or joint, and its figure with the unit."""
+
+    time: float
+    word: str
+    of: str
+    figure: str
+
+
+class Shown(NamedTuple):
+    """A motion as it is shown: its rows up to where it ends, as positions; that end and the time asked for, s."""
+
+    rows: xr.Dataset
+    end: float
+    asked: float
+    events: tuple[Happening, ...]
+
+    @property
+    def early(self) -> bool:
+        """Whether it ends before the time that was asked for."""
+        return self.end < self.asked * (1 - 1e-12)
+
+
+def shown(result: xr.Dataset) -> Shown:
+    """The motion without the rows after its end, which have no values; of one that does not begin its first row."""
+    time = result["time"].values
+    known = np.flatnonzero(np.isfinite(result["kinetic_energy"].values))
+    last = int(known[-1]) if known.size else 0
+    rows = as_positions(_without_noise(result.isel(time=slice(0, last + 1))))
+    ends = [row["figures"]["time"] for row in attribute(result, "findings") if row.get("code") in ENDS]
+    end = float(min([time[-1], *ends])) if known.size else 0.0
+    return Shown(rows, end, float(time[-1]), happenings(result))
+
+
+def energies(rows: xr.Dataset) -> list[tuple[str, str, Array]]:
+    """Name, title and course of every work and energy since the start, J, of those that are more than rounding."""
+    changes = [(name, text, rows[name].values - rows[name].values[0]) for name, text in ENERGIES]
+    sizes = [float(np.nanmax(np.abs(change), initial=0.0)) for *_, change in changes]
+    return [one for one, size in zip(changes, sizes, strict=True) if size > NOISE * max(sizes)]
+
+
+def as_positions(result: xr.Dataset) -> xr.Dataset:
+    """The result with its times as positions, as the views of a cycle take it."""
+    return result.rename_dims(time="position").drop_vars("time").assign_coords(time=("position", result["time"].values))
+
+
+def _without_noise(result: xr.Dataset) -> xr.Dataset:
+    """The result with 0 where rounding is all there is: powers at rest, and the effort of a driver without a motor."""
+    resting = result["resting"] == 1
+    forces = np.abs(result["reaction_force"].values)
+    most = float(np.nanmax(forces, initial=0.0)) if forces.size else 0.0
+    efforts = abs(result["drive_effort"])
+    idle = efforts.max("time") < NOISE * most
+    zero = {"drive_power": resting | idle, "friction_power": resting}
+    zero |= {name: idle for name in ("drive_effort", "drive_effort_lower", "drive_effort_upper") if name in result}
+    return result.assign({name: result[name].where(~where, 0.0) for name, where in zero.items()})
+
+
+def happenings(result: xr.Dataset) -> tuple[Happening, ...]:
+    """The events of a motion in order, its end with them where it ends early."""
+    rows = zip(attribute(result, "events"), result["event_time"].values, strict=True)
+    found = [Happening(float(time), WORDS.get(row[0], row[0]), row[1], _figure(*row)) for row, time in rows]
+    ends = [row for row in attribute(result, "findings") if row.get("code") in ENDS]
+    found += [Happening(float(row["figures"]["time"]), "ends", row["where"].partition(".")[2], "") for row in ends]
+    return tuple(found)
+
+
+def _figure(kind: str, of: str, figure: float | None, unit: str) -> str:
+    """What an event comes with: the way it starts, the energy that a stop takes; nothing of others."""
+    if figure is None:
+        return ""
+    if kind == "break-away":
+        return "forward" if figure > 0 else "backward"
+    return quantity(figure, unit)

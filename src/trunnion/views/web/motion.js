@@ -1,0 +1,43 @@
+// What a motion in time has beside a cycle: speeds and energies over time, its events, figures of the present time.
+
+import { lineChart } from "./chart.js";
+import { at, full, nearest, peak } from "./data.js";
+import { quantity } from "./format.js";
+
+/** The speeds of the free drivers; angles and lengths in charts of their own. */
+export function speedCharts(scene, pick) {
+  return ["rad", "m"].flatMap((unit) => {
+    const drivers = scene.motion.free.filter((one) => one.unit === unit);
+    const series = drivers.map(({ name, rate }, order) => ({ label: name, values: full(rate, scene.count), kind: `k${order % 6}` }));
+    return series.length ? [lineChart(scene, { title: "Speed", unit: `${unit}/s`, series, pick })] : [];
+  });
+}
+
+/** Works since the start and energies; none where there is neither. */
+export function energyChart(scene, pick) {
+  const series = scene.motion.energies.map(({ label, values }, order) => ({
+    label,
+    values: full(values, scene.count),
+    kind: `k${order % 6}`,
+  }));
+  return series.length ? [lineChart(scene, { title: "Works and energies", unit: "J", series, pick })] : [];
+}
+
+/** Coordinate and speed of every free driver at the present time, as [label, index => text]. */
+export function stateRows({ motion }) {
+  return (motion?.free ?? []).flatMap(({ name, unit, coordinate, rate }) => [
+    [`${unit === "rad" ? "angle" : "slide"} ${name}`, (index) => quantity(at(coordinate, index), unit, peak(coordinate))],
+    [`speed ${name}`, (index) => quantity(at(rate, index), `${unit}/s`, peak(rate))],
+  ]);
+}
+
+/** Let the times in the table of events move the motion there. */
+export function listenToEvents(table, scene, crank) {
+  if (!scene.motion) return;
+  const { values } = scene.abscissa;
+  const scale = scene.motion.duration > 0 ? values[values.length - 1] / scene.motion.duration : 1;
+  table?.addEventListener("click", (event) => {
+    const time = event.target.dataset?.time;
+    if (time !== undefined) crank.go(nearest(scene.abscissa, Number(time) * scale));
+  });
+}

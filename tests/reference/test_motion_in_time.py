@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from timed import LINEAR, slider_crank, three_posts, wheel
+from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
 from trunnion import analyse, read, simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
@@ -159,6 +159,31 @@ def test_andrews_squeezer_in_time() -> None:
     turned = (links[:, -1] - links[:, 0]) - np.array(wanted)
     assert at(result, "drive_coordinate", 0.03) == pytest.approx(WANTED[0], rel=1e-9)
     assert np.angle(np.exp(1j * turned)) == pytest.approx(0.0, abs=1e-8)
+
+
+# ---- stick and slip: closed form and published solution ---------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_mass_on_a_belt_sticks_and_slips() -> None:
+    """Slip 2/ω (π − atan(ω Δ/v)), stick 2 Δ/v, Δ = (F_s − F_k)/k (THEORY 8); from rest where the spring is free."""
+    result = simulate(mass_on_a_belt(), 1.0, 10, 1e-10)
+    (first, second), (_, stop) = events(result, "break-away"), events(result, "rest")
+    assert first == pytest.approx(0.15, abs=1e-11)
+    assert stop - first == pytest.approx(0.5355890089177974, abs=1e-9)
+    assert second - stop == pytest.approx(0.1, abs=1e-9)
+    assert np.abs(result["energy_residual"].values).max() < 1e-8 * float(result["work_drive"].values.max())
+
+
+@pytest.mark.slow
+def test_a_pulled_mass_with_bristles() -> None:
+    """Canudas de Wit's experiment, the end of the spring moved by a prescribed driver: place after several slips."""
+    result = simulate(pulled_mass(), 25.0, 1, 1e-8)
+    assert at(result, "drive_coordinate", 25.0) == pytest.approx(1.908839199, abs=1e-7)
+    speed, force = at(result, "drive_rate", 25.0), -float(result["friction_force"].sel(joint="S").values[-1])
+    steady, damping = 1 + 0.5 * np.exp(-((speed / 1e-3) ** 2)), np.sqrt(1e5)
+    bristles = (force - (damping + 0.4) * speed) / (1e5 - damping * 1e5 * abs(speed) / steady)
+    assert bristles == pytest.approx(1.18168e-5, abs=5e-11)
 
 
 # ---- against an integration in maximal coordinates, written here --------------------------------------------------

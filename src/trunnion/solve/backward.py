@@ -50,12 +50,14 @@ class Given:
     zero_slip: share of what resists the joint to take where the relative speed is zero, with the sign of the slip that
     is about to begin, from −1 to 1; one for each contact of the joint or one for all; 0 if not stated. deflections: of
     the bristles of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how
-    links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way.
+    links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way. sliding: whether what
+    has no speed has begun to slide, so that no law takes its value at rest.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
     deflections: Mapping[str, Number] = field(default_factory=dict)
     travel: Mapping[str, Travel] = field(default_factory=dict)
+    sliding: bool = False
 
 
 def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Share:
@@ -65,13 +67,16 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
 
 
 def held(
-    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share
+    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share, sliding: bool = False
 ) -> tuple[FrictionLaw, dict[str, Number], Number]:
-    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests."""
+    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests. sliding: see Given"""
     if not np.any(zero):
         return law, parameters, speed
     forced = np.sign(sense) * np.maximum(np.abs(primal(speed)), 1e-300)
     speed = namespace(speed).where(zero, forced, speed)
+    if law.at_rest is not None and not sliding:
+        law = replace(law, function=functools.partial(_resting, law.function, law.at_rest))
+        parameters = {**parameters, "resting": np.where(zero, 1.0, 0.0)}
     if law.interval_at_rest and np.any(np.abs(sense) < 1.0) and np.any(sense):
         share = np.where(zero, np.abs(sense), 1.0)
         return replace(law, function=functools.partial(_shared, law.function)), {**parameters, "share": share}, speed
@@ -81,6 +86,14 @@ def held(
 def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Number, **parameters: Number) -> Number:
     """A share of what the law says."""
     return share * function(normal, slip, **parameters)
+
+
+def _resting(
+    function: LawFunction, at_rest: LawFunction, normal: Number, slip: Number, *, resting: Number, **parameters: Number
+) -> Number:
+    """What the law says at rest, where it rests."""
+    moving = function(normal, slip, **parameters)
+    return namespace(moving).where(resting > 0, at_rest(normal, slip, **parameters), moving)
 
 
 @dataclass(frozen=True)
@@ -306,7 +319,8 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Ru
     """One contact of a joint, its i-th, as `friction` sees it."""
     walk, law = back.walk, law_of(back.walk.system, joint)
     parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
-    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense_of(given.zero_slip, joint, i))
+    sense = sense_of(given.zero_slip, joint, i)
+    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense, given.sliding)
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
     first, second = walk.system.joints[joint][1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -41,8 +41,12 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
     if not any(_inert(mechanism)):
         remedy = "state a mass or an inertia of a link that it moves, or the inertia of its motor"
         yield Finding("no mass moves with it, so it has no acceleration", f"drivers.{free[0]}", remedy)
-    if len(free) < 2:
-        return
+    if len(free) > 1:
+        yield from _sticking(mechanism, free)
+
+
+def _sticking(mechanism: Mechanism, free: Sequence[str]) -> Iterator[Finding]:
+    """What may hold one joint at rest while others move."""
     for name in free:
         motor = mechanism.drivers[name].motor
         if motor is not None and motor.efficiency is not None and motor.efficiency.source != 1:
@@ -56,6 +60,9 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         if law and FRICTION_LAWS[law].interval_at_rest:
             what = f"the law {law} lets a joint stick, and with {len(free)} free drivers joints stick one by one"
             yield Finding(what, f"joints.{name}.friction", f"use a law that is smooth at rest: {', '.join(smooth)}")
+        if joint.losses is not None and joint.losses.constant is not None:
+            what = f"it may hold the joint at rest, and with {len(free)} free drivers joints stick one by one"
+            yield Finding(what, f"joints.{name}.losses.constant", "state viscous instead, or use one free driver")
     for name, load in mechanism.loads.items():
         if load.joint is not None:
             what = f"it may hold its joint at rest, and with {len(free)} free drivers joints stick one by one"

@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.entry import Direction, Name, Part, forms, known, problem
-from trunnion.model.quantity import Angle, AnyQuantity, Length, Quantity
+from trunnion.model.quantity import Angle, AnyQuantity, Damping, ForceOrMoment, Length, Quantity
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
@@ -37,6 +37,7 @@ __all__ = [
     "Joint",
     "JointDefaults",
     "LoopJoint",
+    "Losses",
     "Misalignment",
     "Pin",
     "Seat",
@@ -205,6 +206,16 @@ class Friction(BaseModel):
         return long["coefficient"] if list(long) == ["coefficient"] else long
 
 
+class Losses(Part):
+    """What resists a joint whatever its load, beside its friction: of a seal, of grease.
+
+    constant: torque or force against the motion, an interval at rest; viscous: the same per speed.
+    """
+
+    constant: ForceOrMoment | None = None
+    viscous: Damping | None = None
+
+
 class JointDefaults(Part):
     """What every joint has unless it says otherwise: pins where it turns, guides where it slides."""
 
@@ -227,6 +238,7 @@ class Joint(Part):
     pin: Pin | None = None
     guide: Guide | None = None
     friction: Friction | None = None
+    losses: Losses | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
     seat_on: Name | None = None
@@ -246,6 +258,7 @@ class LoopJoint(Part):
     pin: Pin | None = None
     guide: Guide | None = None
     friction: Friction | None = None
+    losses: Losses | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
     seat_on: Name | None = None

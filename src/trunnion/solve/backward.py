@@ -22,7 +22,7 @@ from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links, power_of, teeth
-from trunnion.solve.loads import LoadAction, Share, SpringState, springs, stated_loads
+from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
@@ -112,7 +112,8 @@ class Backward:
     friction and drive effort not included, in the plane about the joint's point on the second, in space about the
     origin; friction: torque about the axis, N m, of a ball or a cross about the relative angular velocity, or force
     along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction is;
-    losses: power of friction, W; contacts: those of each joint that rubs; settled: per module; undefined: where each
+    losses: power of friction, W; drags: effort and power, W, of losses that do not follow the load, which are part of
+    both; contacts: those of each joint that rubs; settled: per module; undefined: where each
     load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the share of its
     friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
     N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
@@ -128,6 +129,7 @@ class Backward:
     friction: dict[str, Number] = field(default_factory=dict)
     friction_wrenches: dict[str, Any] = field(default_factory=dict)
     losses: dict[str, Number] = field(default_factory=dict)
+    drags: dict[str, tuple[Number, Number]] = field(default_factory=dict)
     efforts: dict[str, Number] = field(default_factory=dict)
     settled: list[Settled] = field(default_factory=list)
     load_powers: dict[str, Number] = field(default_factory=dict)
@@ -149,7 +151,8 @@ class Backward:
     def lost(self, joint: str) -> Number:
         """What a joint takes out and its driver does not put in, W: friction, and the load on its seat's way."""
         driven = self.efforts[joint] * self.walk.rate(joint) if joint in self.efforts else 0.0
-        return driven - self.passed[joint]
+        dragged = self.drags[joint][1] if joint in self.drags else 0.0
+        return driven - self.passed[joint] + dragged
 
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
@@ -269,6 +272,10 @@ def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense]) -> None:
     for name, action in stated_loads(back.walk, senses):
         back.load_powers[name] = action.power
         _act(back, f"loads.{name}", action)
+    for name, action, effort in losses(back.walk, senses):
+        back.drags[name] = effort, -action.power
+        for link, wrench in action.on:
+            back.add(link, wrench)
     for name, action, state in springs(back.walk):
         back.springs[name] = state
         _act(back, f"springs.{name}", action)
@@ -347,6 +354,8 @@ def _record(
         if contact.own is not None:
             wrench = algebra.minus(wrench, part)
     back.friction_wrenches[joint], back.friction[joint], back.losses[joint] = friction, amount, loss
+    if joint in back.drags:
+        _drag(back, joint)
     whole, back.reactions[joint] = algebra.added(wrench, friction), wrench if driven else walk.bare(joint, wrench)
     if driven:
         motion, unit = walk.freedom(joint, walk.system.turns(joint))
@@ -358,6 +367,15 @@ def _record(
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, whole if link == second else algebra.times(-1.0, whole), joint))
+
+
+def _drag(back: Backward, joint: str) -> None:
+    """Add what a joint loses whatever its load to its friction; the links bear it already."""
+    walk, algebra, (effort, loss) = back.walk, back.walk.algebra, back.drags[joint]
+    wrench = algebra.times(effort, walk.axis(joint, walk.system.turns(joint))[1])
+    back.friction_wrenches[joint] = algebra.added(back.friction_wrenches[joint], wrench)
+    back.friction[joint] = back.friction[joint] + effort
+    back.losses[joint] = back.losses[joint] + loss
 
 
 def _push(back: Backward, number: int, done: Sequence[Any]) -> None:

@@ -78,3 +78,55 @@ def slider_crank(friction: float | dict[str, Any] = 0.1, **more: Any) -> Mechani
         "assembly": {"Q": [0.155, 0]},
     }
     return Mechanism(**{**data, **more})
+
+
+def _slide(x: float = 0.0) -> dict[str, Any]:
+    return {"at": [x, 0], "axis": [1, 0]}
+
+
+def pulled_mass() -> Mechanism:
+    """C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419-425: 1 kg under 1 N of load, with bristles, is
+    pulled by a spring whose end moves at 0.1 m/s."""
+    law = {
+        "law": "lugre", "coefficient": 1, "static": 1.5, "stribeck_speed": 1e-3, "stiffness": 1e5,
+        "damping": np.sqrt(1e5), "viscous": 0.4,
+    }  # fmt: skip
+    return Mechanism(
+        gravity=[0, -1],
+        links={
+            "ground": {"points": {"S": _slide(), "E": _slide()}},
+            "mass": {"points": {"S": _slide()}, "mass": 1},
+            "end": {"points": {"E": _slide(), "P": [1, 0]}},
+        },
+        joints={
+            "S": {"type": "prismatic", "links": ["ground", "mass"], "guide": {"length": 0.1}, "friction": law},
+            "E": {"type": "prismatic", "links": ["ground", "end"]},
+        },
+        drivers={
+            "S": {"range": [0, 2.5], "speed": 0.1, "free": True, "initial": {"coordinate": 0, "speed": 0}},
+            "E": {"range": [0, 2.5], "speed": 0.1},
+        },
+        springs={"pull": {"between": ["mass.S", "end.P"], "stiffness": 2, "free_length": 1}},
+    )
+
+
+def mass_on_a_belt() -> Mechanism:
+    """1 kg on a belt at 0.1 m/s, held by a spring of 100 N/m; 1.5 N at rest, 1 N of sliding."""
+    law = {"law": "stiction", "coefficient": 0.1, "static": 0.15}
+    return Mechanism(
+        gravity=[0, -10],
+        links={
+            "ground": {"points": {"B": _slide(), "F": [-1, 0]}},
+            "belt": {"points": {"B": _slide(), "S": _slide()}},
+            "mass": {"points": {"S": _slide()}, "mass": 1},
+        },
+        joints={
+            "B": {"type": "prismatic", "links": ["ground", "belt"]},
+            "S": {"type": "prismatic", "links": ["belt", "mass"], "guide": {"length": 0.1}, "friction": law},
+        },
+        drivers={
+            "B": {"range": [0, 0.5], "speed": 0.1},
+            "S": {"range": [0, -0.5], "speed": -0.1, "free": True, "initial": {"coordinate": 0, "speed": 0}},
+        },
+        springs={"hold": {"between": ["ground.F", "mass.S"], "stiffness": 100, "free_length": 1}},
+    )

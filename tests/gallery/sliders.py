@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+import trunnion
 from gallery.entry import STEPS, Entry, Outcome
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 from trunnion.studies.design import design
 
@@ -97,7 +99,33 @@ def swing_by_hand() -> float:
     return at_pivot(0.95 + 0.75) - at_pivot(0.95)
 
 
+# ---- stick-slip-drive: how long it slips ----------------------------------------------------------------------------
+
+
+def slip_of(one: Outcome) -> float:
+    """From the first break-away to the rest after it, s."""
+    result = trunnion.simulate(one.mechanism, 0.45, 1)
+    kinds = [kind for kind, *_ in attribute(result, "events")]
+    begin = kinds.index("break-away")
+    times = result["event_time"].values
+    return float(times[kinds.index("rest", begin)] - times[begin])
+
+
+def slip_by_hand() -> float:
+    """2/ω (π − atan(Δ ω/v)), Δ = (f_s − f) m g/k: an oscillation from Δ too long a stretch, at the feed's speed."""
+    omega, over = np.sqrt(40e3 / 40), 0.05 * 40 * 9.81 / 40e3
+    return float(2 / omega * (np.pi - np.arctan(over * omega / 0.005)))
+
+
 ENTRIES = {
+    "stick-slip-drive": Entry(
+        says="How long the carriage slips",
+        unit="s",
+        found=slip_of,
+        expected=slip_by_hand,
+        source="the oscillation on a spring with constant friction, in closed form",
+        tolerance=1e-8,
+    ),
     "slider-crank": Entry(
         says="Acceleration of the piston at the top dead centre",
         unit="m/s^2",

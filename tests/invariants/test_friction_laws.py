@@ -23,6 +23,7 @@ CURVE = 0.12 + 0.08 * exp(-4.0)  # f + (f_s − f) exp(−(v/v_s)²), v = 2 v_s
 FORCES = {
     "coulomb": -4 / 3 * 0.12 * N,
     "viscous": -(4 / 3 * 0.12 + 0.5 * V) * N,
+    "stiction": -0.12 * N,
     "stribeck": -(CURVE + 0.5 * V) * N,
     "brown-mcphee": -(0.12 * tanh(8.0) + 0.08 * 2 / 1.75**2 + 0.5 * V) * N,
     "dahl": -0.12 * N,
@@ -60,3 +61,13 @@ def test_bristles_forget_over_the_way_that_bends_them() -> None:
         assert known.relaxation is not None
         decay = known.relaxation(V, **{name: NUMBERS[name] for name in known.parameters})
         assert V / decay == pytest.approx(bent, rel=1e-12)
+
+
+def test_what_jumps_where_sliding_begins_is_larger_at_rest() -> None:
+    """The value at rest has the sense of the slip about to begin, as that of sliding has."""
+    for law in FRICTION_LAWS.values():
+        if law.at_rest is not None:
+            numbers = {name: NUMBERS[name] for name in law.parameters}
+            assert law.at_rest(N, 1e-300, **numbers) == pytest.approx(-0.2 * N, rel=1e-12)
+            assert law.at_rest(N, -1e-300, **numbers) == pytest.approx(0.2 * N, rel=1e-12)
+            assert law.interval_at_rest

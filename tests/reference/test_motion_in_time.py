@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from timed import LINEAR, slider_crank, three_posts, wheel
+from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
 from trunnion import analyse, read, simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
@@ -51,6 +51,16 @@ def test_a_flywheel_runs_down(grease: float, time: float, angle: float) -> None:
     assert at(result, "drive_coordinate", 12.0) == pytest.approx(angle, rel=1e-10)
     assert at(result, "drive_rate", 12.0) == 0.0
     assert result["resting"].values[-1] == 1
+
+
+def test_a_flywheel_runs_down_by_the_losses_of_its_joint() -> None:
+    """The same, stated with the joint; all that it turns over is lost to friction."""
+    data = wheel(None, 0.0, 0.0, initial={"speed": 127.5}).data()
+    data["joints"]["A"]["losses"] = {"constant": 0.6, "viscous": 0.004}
+    result = simulate(Mechanism(**data), 12.0, 12, 1e-12)
+    assert events(result, "rest") == [pytest.approx(7.689820488627919, rel=1e-10)]
+    assert at(result, "drive_coordinate", 12.0) == pytest.approx(440.27692670581223, rel=1e-10)
+    assert float(result["work_friction"].values[-1]) == pytest.approx(0.5 * 0.05 * 127.5**2, rel=1e-9)
 
 
 def test_an_induction_motor_runs_up_by_kloss() -> None:
@@ -159,6 +169,31 @@ def test_andrews_squeezer_in_time() -> None:
     turned = (links[:, -1] - links[:, 0]) - np.array(wanted)
     assert at(result, "drive_coordinate", 0.03) == pytest.approx(WANTED[0], rel=1e-9)
     assert np.angle(np.exp(1j * turned)) == pytest.approx(0.0, abs=1e-8)
+
+
+# ---- stick and slip: closed form and published solution ---------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_mass_on_a_belt_sticks_and_slips() -> None:
+    """Slip 2/ω (π − atan(ω Δ/v)), stick 2 Δ/v, Δ = (F_s − F_k)/k (THEORY 8); from rest where the spring is free."""
+    result = simulate(mass_on_a_belt(), 1.0, 10, 1e-10)
+    (first, second), (_, stop) = events(result, "break-away"), events(result, "rest")
+    assert first == pytest.approx(0.15, abs=1e-11)
+    assert stop - first == pytest.approx(0.5355890089177974, abs=1e-9)
+    assert second - stop == pytest.approx(0.1, abs=1e-9)
+    assert np.abs(result["energy_residual"].values).max() < 1e-8 * float(result["work_drive"].values.max())
+
+
+@pytest.mark.slow
+def test_a_pulled_mass_with_bristles() -> None:
+    """Canudas de Wit's experiment, the end of the spring moved by a prescribed driver: place after several slips."""
+    result = simulate(pulled_mass(), 25.0, 1, 1e-8)
+    assert at(result, "drive_coordinate", 25.0) == pytest.approx(1.908839199, abs=1e-7)
+    speed, force = at(result, "drive_rate", 25.0), -float(result["friction_force"].sel(joint="S").values[-1])
+    steady, damping = 1 + 0.5 * np.exp(-((speed / 1e-3) ** 2)), np.sqrt(1e5)
+    bristles = (force - (damping + 0.4) * speed) / (1e5 - damping * 1e5 * abs(speed) / steady)
+    assert bristles == pytest.approx(1.18168e-5, abs=5e-11)
 
 
 # ---- against an integration in maximal coordinates, written here --------------------------------------------------

@@ -106,6 +106,9 @@ def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: st
         elif law and FRICTION_LAWS[law].interval_at_rest:
             what = f"the law {law} lets a joint stick, and {one_by_one}"
             yield Finding(what, f"joints.{name}.friction", f"use a law that is smooth at rest: {', '.join(smooth)}")
+        if joint.losses is not None and joint.losses.constant is not None:
+            what = f"it may hold the joint at rest, and {one_by_one}"
+            yield Finding(what, f"joints.{name}.losses.constant", "state viscous instead, or use one free driver")
     for name, load in mechanism.loads.items():
         if load.joint is not None:
             what = f"it may hold its joint at rest, and {one_by_one}"

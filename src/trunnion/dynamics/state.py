@@ -138,12 +138,16 @@ class FreeMotion:
         """Motion alone."""
         return forward(self.system, self.values_at(at, second), self.assembly, at.time)
 
-    def solve(self, at: Moment, second: Array, zero_slip: Mapping[str, Sense] | None = None) -> Backward:
-        """Motion and forces. zero_slip: see `backward.Given`; of one coordinate what begins to move in its sense."""
+    def solve(
+        self, at: Moment, second: Array, zero_slip: Mapping[str, Sense] | None = None, sliding: bool = False
+    ) -> Backward:
+        """Motion and forces. zero_slip, sliding: see `backward.Given`; of one coordinate what begins to move in its
+        sense."""
         given = Given(
             self.beginning(at) if zero_slip is None else zero_slip,
             dict(zip(self.bristles, at.bristles, strict=True)),
             acting=self._acting(at.onsets),
+            sliding=sliding,
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
 
@@ -203,7 +207,7 @@ class FreeMotion:
 
     def missing(self, at: Moment, second: Array, zero_slip: Mapping[str, Sense]) -> Array:
         """E − T, (coordinate, lane)."""
-        back = self.solve(at, second, zero_slip)
+        back = self.solve(at, second, zero_slip, sliding=True)
         found: Array = self.demanded(back, at.q.shape) - self.given(at, second)
         return found
 
@@ -228,9 +232,13 @@ class FreeMotion:
                 break
             if np.all(~np.isfinite(step) | (np.abs(step) <= CLOSE * DIFFERENCE * largest)):
                 break
+            back = self.solve(at, second, senses, sliding=True)  # most are there after one step, as this walk tells
+            step = -_solved(slopes, self.demanded(back, at.q.shape) - self.given(at, second))
+            if np.all(np.abs(step) <= SETTLED * largest) and not np.any(turned):
+                return Accelerated(second, back, turned, np.ones(lanes, bool))
         converged = np.all(np.isfinite(second) & (self.affine | (np.abs(step) <= 1e-8 * largest)), axis=0)
         second = np.where(turned, np.nan, second)
-        return Accelerated(second, self.solve(at, second, senses), turned, converged)
+        return Accelerated(second, self.solve(at, second, senses, sliding=True), turned, converged)
 
     def inertia(self, at: Moment) -> Array:
         """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""

@@ -44,7 +44,7 @@ PANELS = 32  # of a turn, or of a range, to begin with
 DOUBLINGS = 5
 EXACT = 1e-11  # of the largest of each number over the way
 SMALL = 1e-3  # of the largest number of its kind: of what is below, the share of that counts
-POWERS = 4  # numbers after the columns and slips
+POWERS = 6  # numbers after the columns and slips
 FIXED = 5  # columns before those of the friction forces: q̈, q̇², q̇, loads forward, loads backward
 
 
@@ -229,8 +229,19 @@ def _numbers(motion: FreeMotion, rubs: Sequence[Rub], q: Array) -> Array:
                 columns[FIXED + k][1 + rows.start + i] = columns[FIXED + k][1 + rows.start + i] + number
     flat_rows: list[Any] = [columns[j][i] for i in range(len(columns[0])) for j in range(len(columns))]
     flat_rows += [one.slip for _, one in contacts]
-    flat_rows += [*powers, (spring_power - both) / 2, -(spring_power + both) / 2]
+    flat_rows += [*powers, (spring_power - both) / 2, -(spring_power + both) / 2, *_dragged(moving)]
     return np.array([np.broadcast_to(np.asarray(primal(row), float), q.shape) for row in flat_rows])
+
+
+def _dragged(moving: Forward) -> tuple[Any, Any]:
+    """Power of the losses of joints that do not follow the load: per speed, and per its square."""
+    steady: Any = 0.0
+    square: Any = 0.0
+    for joint in moving.system.lossy:
+        speed, path = moving.speed(joint), f"joints.{joint}.losses"
+        steady = steady + np.abs(primal(speed)) * moving.values.get(f"{path}.constant", 0.0)
+        square = square + speed * speed * moving.values.get(f"{path}.viscous", 0.0)
+    return steady, square
 
 
 def _senses(motion: FreeMotion, moving: Forward, sense: float) -> dict[str, Sense]:

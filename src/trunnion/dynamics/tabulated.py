@@ -103,10 +103,11 @@ class TabulatedRates:
         if solved is None:
             return self.walks(at)
         second, friction = solved
-        forward, backward, static, damped = numbers[self._size * wide + count :]
+        forward, backward, static, damped, dragged, greased = numbers[self._size * wide + count :]
         effort = matrix[0, 0] * second + forces.known[0] + matrix[0, FIXED:] @ friction
         loads = forward if forces.through > 0 else -backward
-        works = np.array([effort, loads, static - damped * speed, -(friction @ slips)]) * speed
+        lost = (dragged if speed >= 0 else -dragged) + greased * speed - friction @ slips
+        works = np.array([effort, loads, static - damped * speed, lost]) * speed
         remembering = [(rub, slip) for rub, slip in zip(self.tables.rubs, slips, strict=True) if rub.bristle >= 0]
         memory = [_relaxed(self.tables, rub, float(slip) * speed, at) for rub, slip in remembering]
         error = self.drive.error(at.time, at.rate[0], at.integral[0], at.now) if self.drive.controlled else [0.0]

@@ -22,6 +22,8 @@ __all__ = [
     "dahl",
     "lugre",
     "rolling_bearing",
+    "stiction",
+    "stiction_at_rest",
     "stribeck",
     "viscous",
 ]
@@ -63,6 +65,8 @@ class FrictionLaw:
     relaxation: of a law with bristles, `(slip, **parameters)` → d in ż = slip − d z, 1/s. Their deflection z, m,
     depends on the slip alone; it is integrated along the cycle (`solve.bristles`) and given to the function as
     `deflection`. Without it the function takes that of steady sliding, slip/d.
+    at_rest: of a law that jumps where sliding begins, its value at rest, to which the interval reaches; the same
+    signature, with the slip about to begin. Without it that is the limit of the function.
     """
 
     function: LawFunction
@@ -72,6 +76,7 @@ class FrictionLaw:
     interval_at_rest: bool = True
     relaxation: LawRelaxation | None = None
     scale: str = ""
+    at_rest: LawFunction | None = None
 
 
 def coulomb(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -94,6 +99,20 @@ def viscous(normal: Number, slip: Number, **parameters: Number) -> Number:
     compensation, Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X, section 2.
     """
     return coulomb(normal, slip, **parameters) - parameters["viscous"] * slip * normal
+
+
+def stiction(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """Coulomb friction whose coefficient at rest, f_s = static, falls to f = coefficient at once where sliding begins.
+
+    Source: C. A. Coulomb, Théorie des machines simples, 1785; B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit,
+    Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7, section 2.
+    """
+    return -namespace(normal, slip).sign(slip) * parameters["coefficient"] * normal
+
+
+def stiction_at_rest(normal: Number, slip: Number, **parameters: Number) -> Number:
+    """−sgn(slip about to begin) f_s N."""
+    return -namespace(normal, slip).sign(slip) * parameters["static"] * normal
 
 
 def stribeck(normal: Number, slip: Number, **parameters: Number) -> Number:
@@ -207,6 +226,13 @@ FRICTION_LAWS: dict[str, FrictionLaw] = {
         },
         source="H. Olsson et al., Eur. J. Control 4 (1998) 176-195, doi:10.1016/S0947-3580(98)70113-X",
         validity="lubricated sliding; the viscous part is assumed proportional to the load",
+    ),
+    "stiction": FrictionLaw(
+        stiction,
+        {"coefficient": _COEFFICIENT, "static": _STATIC},
+        source="B. Armstrong-Hélouvry et al., Automatica 30 (1994) 1083-1138, doi:10.1016/0005-1098(94)90209-7",
+        validity="dry sliding that begins with a jerk; speed-independent; the coefficient at rest counts at rest alone",
+        at_rest=stiction_at_rest,
     ),
     "stribeck": FrictionLaw(
         stribeck,

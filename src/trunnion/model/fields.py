@@ -96,6 +96,7 @@ class Fields(Part):
                 pin=row.pin,
                 guide=row.guide,
                 friction=row.friction,
+                losses=row.losses,
                 misalignment=row.misalignment,
                 seat_on=row.seat_on,
                 seat=row.seat,

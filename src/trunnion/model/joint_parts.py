@@ -26,7 +26,16 @@ from trunnion.joints.contact import CONTACT_LAWS, ContactLaw
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.entry import Direction, Name, Part, forms, known, problem
-from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Length, Pressure, Quantity
+from trunnion.model.quantity import (
+    Angle,
+    AnyQuantity,
+    Damping,
+    Dimensionless,
+    ForceOrMoment,
+    Length,
+    Pressure,
+    Quantity,
+)
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
@@ -39,6 +48,7 @@ __all__ = [
     "Joint",
     "JointDefaults",
     "LoopJoint",
+    "Losses",
     "Misalignment",
     "Pin",
     "Seat",
@@ -244,6 +254,16 @@ class Friction(BaseModel):
         return long["coefficient"] if list(long) == ["coefficient"] else long
 
 
+class Losses(Part):
+    """What resists a joint whatever its load, beside its friction: of a seal, of grease.
+
+    constant: torque or force against the motion, an interval at rest; viscous: the same per speed.
+    """
+
+    constant: ForceOrMoment | None = None
+    viscous: Damping | None = None
+
+
 class JointDefaults(Part):
     """What every joint has unless it says otherwise: pins where it turns, guides where it slides."""
 
@@ -268,6 +288,7 @@ class Joint(Part):
     guide: Guide | None = None
     contact: Contact | None = None
     friction: Friction | None = None
+    losses: Losses | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
     seat_on: Name | None = None
@@ -287,6 +308,7 @@ class LoopJoint(Part):
     pin: Pin | None = None
     guide: Guide | None = None
     friction: Friction | None = None
+    losses: Losses | None = None
     misalignment: Misalignment | None = None
     seat: SeatChoice | None = None
     seat_on: Name | None = None

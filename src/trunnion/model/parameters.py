@@ -25,7 +25,7 @@ from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
-from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Point, Spring, freedoms
+from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 
@@ -181,12 +181,16 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
     yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"))
-    for key in ("pin", "guide", "friction", "seat"):
-        part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key)
+    for key in ("pin", "guide", "friction", "losses", "seat"):
+        part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
         own = f"joints.{name}.{key}"
         shared = {one.path: one.quantity for one in _walk(default, own, ())}
         for entry in _walk(part, own, (*location, key)):
-            kind = _law_kind(part, str(entry.location[-1])) if isinstance(part, Friction) else entry.kind
+            number, kind = str(entry.location[-1]), entry.kind
+            if isinstance(part, Friction):
+                kind = _law_kind(part, number)
+            elif isinstance(part, Losses):
+                kind = _resistance_kind(number, "rotation" in freedoms(joint.type))
             follows = shared.get(entry.path) is entry.quantity
             alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
             yield Entry(entry.path, entry.location, entry.quantity, kind, alias)
@@ -275,11 +279,17 @@ def _spring_kind(mechanism: Fields, spring: Spring, entry: Entry) -> Kind:
     joint = mechanism.effective_joints.get(spring.joint or "")
     turns = joint is not None and "rotation" in freedoms(joint.type)
     match entry.location[-1]:
-        case "stiffness" | "damping" as key:
-            return KINDS[f"torsional {key}" if turns else key]
-        case "preload":
-            return KINDS["moment" if turns else "force"]
+        case "stiffness" | "damping" | "preload" as key:
+            return _resistance_kind(key, turns)
     return entry.kind
+
+
+def _resistance_kind(key: str, turns: bool) -> Kind:
+    """What a stiffness, a damping or an effort in a joint measures."""
+    if key in ("preload", "constant"):
+        return KINDS["moment" if turns else "force"]
+    acts = "damping" if key == "viscous" else key
+    return KINDS[f"torsional {acts}" if turns else acts]
 
 
 def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:

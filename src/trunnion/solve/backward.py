@@ -22,7 +22,7 @@ from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
 from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links, power_of, teeth
-from trunnion.solve.loads import LoadAction, Share, SpringState, springs, stated_loads
+from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
@@ -51,13 +51,15 @@ class Given:
     is about to begin, from −1 to 1; one for each contact of the joint or one for all; 0 if not stated. deflections: of
     the bristles of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how
     links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way. acting: what acts on
-    the links of a walk beside the loads and springs of the model, by name.
+    the links of a walk beside the loads and springs of the model, by name. sliding: whether what has no speed has begun
+    to slide, so that no law takes its value at rest.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
     deflections: Mapping[str, Number] = field(default_factory=dict)
     travel: Mapping[str, Travel] = field(default_factory=dict)
     acting: Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None = None
+    sliding: bool = False
 
 
 def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Share:
@@ -67,13 +69,16 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
 
 
 def held(
-    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share
+    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share, sliding: bool = False
 ) -> tuple[FrictionLaw, dict[str, Number], Number]:
-    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests."""
+    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests. sliding: see Given"""
     if not np.any(zero):
         return law, parameters, speed
     forced = np.sign(sense) * np.maximum(np.abs(primal(speed)), 1e-300)
     speed = namespace(speed).where(zero, forced, speed)
+    if law.at_rest is not None and not sliding:
+        law = replace(law, function=functools.partial(_resting, law.function, law.at_rest))
+        parameters = {**parameters, "resting": np.where(zero, 1.0, 0.0)}
     if law.interval_at_rest and np.any(np.abs(sense) < 1.0) and np.any(sense):
         share = np.where(zero, np.abs(sense), 1.0)
         return replace(law, function=functools.partial(_shared, law.function)), {**parameters, "share": share}, speed
@@ -83,6 +88,14 @@ def held(
 def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Number, **parameters: Number) -> Number:
     """A share of what the law says."""
     return share * function(normal, slip, **parameters)
+
+
+def _resting(
+    function: LawFunction, at_rest: LawFunction, normal: Number, slip: Number, *, resting: Number, **parameters: Number
+) -> Number:
+    """What the law says at rest, where it rests."""
+    moving = function(normal, slip, **parameters)
+    return namespace(moving).where(resting > 0, at_rest(normal, slip, **parameters), moving)
 
 
 @dataclass(frozen=True)
@@ -101,7 +114,8 @@ class Backward:
     friction and drive effort not included, in the plane about the joint's point on the second, in space about the
     origin; friction: torque about the axis, N m, of a ball or a cross about the relative angular velocity, or force
     along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction is;
-    losses: power of friction, W; contacts: those of each joint that rubs; settled: per module; undefined: where each
+    losses: power of friction, W; drags: effort and power, W, of losses that do not follow the load, which are part of
+    both; contacts: those of each joint that rubs; settled: per module; undefined: where each
     load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the share of its
     friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
     N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
@@ -117,6 +131,7 @@ class Backward:
     friction: dict[str, Number] = field(default_factory=dict)
     friction_wrenches: dict[str, Any] = field(default_factory=dict)
     losses: dict[str, Number] = field(default_factory=dict)
+    drags: dict[str, tuple[Number, Number]] = field(default_factory=dict)
     efforts: dict[str, Number] = field(default_factory=dict)
     settled: list[Settled] = field(default_factory=list)
     load_powers: dict[str, Number] = field(default_factory=dict)
@@ -138,7 +153,8 @@ class Backward:
     def lost(self, joint: str) -> Number:
         """What a joint takes out and its driver does not put in, W: friction, and the load on its seat's way."""
         driven = self.efforts[joint] * self.walk.rate(joint) if joint in self.efforts else 0.0
-        return driven - self.passed[joint]
+        dragged = self.drags[joint][1] if joint in self.drags else 0.0
+        return driven - self.passed[joint] + dragged
 
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
@@ -261,6 +277,10 @@ def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense]) -> None:
     for name, action in stated_loads(back.walk, senses):
         back.load_powers[name] = action.power
         _act(back, f"loads.{name}", action)
+    for name, action, effort in losses(back.walk, senses):
+        back.drags[name] = effort, -action.power
+        for link, wrench in action.on:
+            back.add(link, wrench)
     for name, action, state in springs(back.walk):
         back.springs[name] = state
         _act(back, f"springs.{name}", action)
@@ -311,7 +331,8 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Ru
     """One contact of a joint, its i-th, as `friction` sees it."""
     walk, law = back.walk, law_of(back.walk.system, joint)
     parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
-    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense_of(given.zero_slip, joint, i))
+    sense = sense_of(given.zero_slip, joint, i)
+    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense, given.sliding)
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
     first, second = walk.system.joints[joint][1]
@@ -338,6 +359,8 @@ def _record(
         if contact.own is not None:
             wrench = algebra.minus(wrench, part)
     back.friction_wrenches[joint], back.friction[joint], back.losses[joint] = friction, amount, loss
+    if joint in back.drags:
+        _drag(back, joint)
     whole, back.reactions[joint] = algebra.added(wrench, friction), wrench if driven else walk.bare(joint, wrench)
     if driven:
         motion, unit = walk.freedom(joint, walk.system.turns(joint))
@@ -349,6 +372,15 @@ def _record(
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, whole if link == second else algebra.times(-1.0, whole), joint))
+
+
+def _drag(back: Backward, joint: str) -> None:
+    """Add what a joint loses whatever its load to its friction; the links bear it already."""
+    walk, algebra, (effort, loss) = back.walk, back.walk.algebra, back.drags[joint]
+    wrench = algebra.times(effort, walk.axis(joint, walk.system.turns(joint))[1])
+    back.friction_wrenches[joint] = algebra.added(back.friction_wrenches[joint], wrench)
+    back.friction[joint] = back.friction[joint] + effort
+    back.losses[joint] = back.losses[joint] + loss
 
 
 def _push(back: Backward, number: int, done: Sequence[Any]) -> None:

@@ -24,6 +24,7 @@ __all__ = [
     "SpringState",
     "Stated",
     "Switch",
+    "losses",
     "spring_state",
     "springs",
     "stated_loads",
@@ -187,10 +188,15 @@ def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share
     """
     joint = load.joint or ""
     speed = walk.rates(joint)[0 if turns else 1]
-    sign = np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
+    sign = _sense(walk, joint, turns, speed, at_rest)
     if load.only is not None:
         sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, joint, -sign * size, turns, speed)
+
+
+def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share) -> Number:
+    """Sign of the speed of a joint; where there is no motion the share that acts there."""
+    return np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
 
 
 def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> LoadAction:
@@ -199,6 +205,20 @@ def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Num
     wrench, times = walk.axis(joint, turns)[1], walk.algebra.times
     on = [(link, walk.on_link(link, times(size, wrench), joint)) for link, size in ((second, effort), (first, -effort))]
     return LoadAction(on, effort * speed)
+
+
+# ---- losses of joints ------------------------------------------------------------------------------------------
+
+
+def losses(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, LoadAction, Number]]:
+    """What resists the joints whatever their load: −sgn(v) constant − viscous v, its power, and the effort itself."""
+    for joint in walk.system.lossy:
+        turns, path = walk.system.turns(joint), f"joints.{joint}.losses"
+        speed = walk.rates(joint)[0 if turns else 1]
+        constant, viscous = (walk.values.get(f"{path}.{key}", 0.0) for key in ("constant", "viscous"))
+        sign = _sense(walk, joint, turns, speed, zero_slip.get(joint, 0.0))
+        effort = -sign * constant - viscous * speed
+        yield joint, _in_joint(walk, joint, effort, turns, speed), effort
 
 
 # ---- springs --------------------------------------------------------------------------------------------------

@@ -175,8 +175,7 @@ def _switches(system: System) -> bool:
 
 def _followed(system: System) -> list[str]:
     """Joints whose sense of motion decides a friction or a load."""
-    resisted = [load.joint for load in system.mechanism.loads.values() if load.joint is not None]
-    return list(dict.fromkeys([*rubbing(system), *resisted]))
+    return list(dict.fromkeys([*rubbing(system), *system.resisted]))
 
 
 def _lets_go(system: System, spring: Spring) -> bool:

@@ -22,6 +22,7 @@ from trunnion.groups.general import OUTER, General, GroupJoint
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.joint_parts import Losses
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve import shifts
 from trunnion.structure.decompose import Module, Plan
@@ -249,9 +250,18 @@ class System:
         return frozenset(place.joint for places in self.places for place in places if place.reversed_)
 
     @cached_property
+    def lossy(self) -> dict[str, Losses]:
+        """Joints with losses that do not follow their load."""
+        joints = self.mechanism.effective_joints.items()
+        return {name: joint.losses for name, joint in joints if joint.losses is not None}
+
+    @cached_property
     def resisted(self) -> dict[str, set[bool]]:
-        """Of every joint that loads resist, whether its turn (True) or its slide is."""
+        """Of every joint that loads or a constant loss resist, whether its turn (True) or its slide is."""
         found: dict[str, set[bool]] = {}
+        for name, joint in self.lossy.items():
+            if joint.constant is not None:
+                found.setdefault(name, set()).add(self.turns(name))
         for load in self.mechanism.loads.values():
             if load.joint is not None:
                 found.setdefault(load.joint, set()).add(load.resisting_torque is not None)

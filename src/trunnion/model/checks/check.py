@@ -20,7 +20,7 @@ from trunnion.model.checks.costs import cost_names, cost_values
 from trunnion.model.checks.errors import errors, joint_errors
 from trunnion.model.checks.free_motion import FREE, free_motion
 from trunnion.model.checks.gears import gears
-from trunnion.model.checks.loads import motion_dimensions, springs, tables, unknown_name, unread
+from trunnion.model.checks.loads import losses, motion_dimensions, springs, tables, unknown_name, unread
 from trunnion.model.checks.measures import check_measure, measure_values, point_exists
 from trunnion.model.checks.space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.checks.tolerances import stated_entries, tolerance_names, tolerance_values
@@ -201,6 +201,7 @@ def _joints(mechanism: Numbers) -> Iterator[Finding]:
         yield from contact(joint, where, mechanism.space == "spatial")
         if joint.contact is not None:
             yield from contact_law(mechanism, name, joint, joint.contact)
+        yield from losses(joint, f"{where}.losses")
         if joint.friction is not None:
             own = mechanism.stated_joints[name].friction
             yield from _parameters_of_law(

@@ -13,14 +13,23 @@ from trunnion.errors import Finding, Severity
 from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.names import as_key, nearest
-from trunnion.model.parts import Spring, freedoms
+from trunnion.model.parts import Joint, Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["motion_dimensions", "spring_values", "springs", "table_values", "tables", "unknown_name", "unread"]
+__all__ = [
+    "losses",
+    "motion_dimensions",
+    "spring_values",
+    "springs",
+    "table_values",
+    "tables",
+    "unknown_name",
+    "unread",
+]
 
 Values = Mapping[str, Number]
 Dimensions = Mapping[str, Dimension | None]
@@ -192,6 +201,20 @@ def _cycle(mechanism: Numbers, over: str, values: Values) -> tuple[float | None,
         if span.periodic and np.isfinite(span.duration) and span.duration > 0:
             return float(span.duration), "s"
     return None, "s"
+
+
+# ---- losses of joints ------------------------------------------------------------------------------------------
+
+
+def losses(joint: Joint, where: str) -> Iterator[Finding]:
+    """Whether the losses of a joint state something and have an axis to act about or along."""
+    if joint.losses is None:
+        return
+    if joint.losses.constant is None and joint.losses.viscous is None:
+        yield Finding("states no loss", where, "state constant: …, viscous: … or both")
+    elif not motions(joint.type):
+        remedy = "give losses to a revolute, prismatic, cylindrical or helical joint"
+        yield Finding(f"a {joint.type} joint has no one axis for a loss to act about or along", where, remedy)
 
 
 # ---- springs --------------------------------------------------------------------------------------------------

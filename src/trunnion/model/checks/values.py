@@ -116,6 +116,10 @@ def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Fin
         return entry.alias or entry.path
 
     yield from contact_values(joint, numbers.nominal, where)
+    for key in ("constant", "viscous"):
+        if value(f"losses.{key}") < 0:
+            what = f"is {value(f'losses.{key}'):g}, which is negative"
+            yield Finding(what, f"{where}.losses.{key}", "give a value of at least 0")
     if joint.friction and joint.friction.law:
         for parameter, declared in FRICTION_LAWS[joint.friction.law].parameters.items():
             if parameter in joint.friction.parameters:

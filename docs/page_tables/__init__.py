@@ -25,6 +25,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "laws": choices.laws_table,
     "motion": choices.motion_table,
     "motors": choices.motors_table,
+    "contact_laws": choices.contact_laws_table,
     "pairs": choices.pairs_table,
     "groups": choices.groups_table,
     "plots": results.plots_table,

@@ -125,6 +125,17 @@ def motors_table() -> str:
     return rows_of(("`kind`", "needs", "takes", "validity", "source"), rows)
 
 
+def contact_laws_table() -> str:
+    """Every contact law, with what it returns of a stated restitution."""
+    from trunnion.joints.contact import CONTACT_LAWS, restitution_of
+
+    rows = []
+    for name, law in CONTACT_LAWS.items():
+        returned = (restitution_of(law.factor(stated)) for stated in (0.9, 0.5, 0.2))
+        rows.append((code(name), *(f"{one:.4f}" for one in returned), law.validity, law.source))
+    return rows_of(("`law`", "returns of 0.9", "of 0.5", "of 0.2", "validity", "source"), rows)
+
+
 def pairs_table() -> str:
     """Every pair of the model file: where it exists and what it needs."""
     from trunnion.joints.clearance import CLEARANCE_MODELS

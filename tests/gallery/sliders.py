@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 import trunnion
 from gallery.entry import STEPS, Entry, Outcome
@@ -70,6 +71,37 @@ def ratio_of_whitworth() -> float:
     return float((2 * np.pi - fast) / fast)
 
 
+# ---- worn-gudgeon-pin: how fast the pin first strikes its hole ----------------------------------------------------
+
+
+def strikes_at(one: Outcome) -> float:
+    return float(trunnion.simulate(one.mechanism, 5e-4, 1)["impact_approach"][0])
+
+
+def strikes_at_by_hand() -> float:
+    """The rod swings freely about the crank pin and the slider stands still until the pin is at the wall."""
+    r, length, mass, inertia, clearance, w = 0.05, 0.12, 0.21, 2.5e-4, 2.5e-4, 100 * np.pi
+    half, x = length / 2, r + length
+
+    def offset(t: float, y: list[float]) -> tuple[float, float]:
+        return (r * np.cos(w * t) + length * np.cos(y[0]) - x, r * np.sin(w * t) + length * np.sin(y[0]))
+
+    def rate(t: float, y: list[float]) -> list[float]:
+        moment = np.cos(w * t) * np.sin(y[0]) - np.sin(w * t) * np.cos(y[0])
+        return [y[1], -mass * half * r * w**2 * moment / (inertia + mass * half**2)]
+
+    def gap(t: float, y: list[float]) -> float:
+        return clearance - float(np.hypot(*offset(t, y)))
+
+    gap.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(rate, (0, 1e-3), [0.0, -w * r / length], events=gap, rtol=1e-12, atol=1e-14)
+    t, (angle, speed) = found.t_events[0][0], found.y_events[0][0]
+    cx, cy = offset(t, [angle])
+    ux = -r * w * np.sin(w * t) - length * speed * np.sin(angle)
+    uy = r * w * np.cos(w * t) + length * speed * np.cos(angle)
+    return float((cx * ux + cy * uy) / np.hypot(cx, cy))
+
+
 # ---- scotch-yoke, elliptic-trammel: exact curves ------------------------------------------------------------------
 
 
@@ -118,6 +150,15 @@ def slip_by_hand() -> float:
 
 
 ENTRIES = {
+    "worn-gudgeon-pin": Entry(
+        says="Speed at which the gudgeon pin first strikes the wall of its hole",
+        unit="m/s",
+        found=strikes_at,
+        expected=strikes_at_by_hand,
+        source="the rod as a pendulum on the crank pin, integrated on its own (SciPy)",
+        tolerance=1e-8,
+        figures=("mechanism", "torque"),
+    ),
     "stick-slip-drive": Entry(
         says="How long the carriage slips",
         unit="s",

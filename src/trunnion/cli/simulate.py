@@ -41,14 +41,18 @@ def simulate(
     table: TableFile = None,
     friction: FrictionLaw = None,
     kind: Annotated[
-        str, typer.Option("--kind", help="Figure to write: sheet, speed, effort, reactions, energy or phase.")
+        str,
+        typer.Option(
+            "--kind",
+            help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit.",
+        ),
     ] = "sheet",
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
     units: Units = TableUnits.si,
 ) -> None:
-    """Motion in time: start-up, run-down, rest, locking.
+    """Motion in time: start-up, run-down, rest, locking, pins in play.
 
     The motion of drivers that are free or have a motor, with friction, stick and slip, forces, energy and events.
     """

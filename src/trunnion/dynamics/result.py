@@ -17,6 +17,7 @@ from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.steady import steady_figures
+from trunnion.dynamics.touching import PinContact
 from trunnion.errors import Finding
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
@@ -83,7 +84,7 @@ def result_of(
             "spring_units": spring_units(system),
             "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
-            **({"impacts": [one.label for one in impacts]} if stated else {}),
+            **(_named_contacts(motion, impacts) if stated else {}),
             "summary": figure_rows(_summary(motion, solution, books, residual, turned_over, run, impacts)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
@@ -105,6 +106,12 @@ def result_of(
         return dataset_of("motion", found, labels, attributes, time)
 
     return Result(attributes, build)
+
+
+def _named_contacts(motion: FreeMotion, impacts: Sequence[Impact]) -> dict[str, list[str]]:
+    """The contact of every impact, and the contacts that are pins in holes."""
+    pins = [one.label for one in motion.contacts.each if isinstance(one, PinContact)]
+    return {"impacts": [one.label for one in impacts], "contact_pins": pins}
 
 
 def _shown(motion: FreeMotion, run: Run) -> list[str]:

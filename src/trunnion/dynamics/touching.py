@@ -25,7 +25,7 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import play_of
 
-__all__ = ["Contact", "ContactState", "Contacts", "Push", "contacts_of"]
+__all__ = ["Contact", "ContactState", "Contacts", "PinContact", "Push", "contacts_of"]
 
 Array = NDArray[np.float64]
 Vector = tuple[Number, Number]

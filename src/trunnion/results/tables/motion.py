@@ -14,8 +14,13 @@ from trunnion.results.tables.column import Column, column
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["events", "times"]
+__all__ = ["events", "impacts", "times"]
 
+CONTACT = ("contact_gap", "contact_normal_force", "contact_friction_force", "contact_slip", "contact_touching")
+IMPACT = (
+    ("begin", "s"), ("end", "s"), ("approach", "m/s"), ("separation", "m/s"), ("force", "N"), ("depth", "m"),
+    ("wear", "J"),
+)  # fmt: skip
 ENERGY = (
     *("work_drive", "work_loads", "work_springs", "work_friction", "kinetic_energy", "potential_energy"),
     *("energy_residual", "resting"),
@@ -30,7 +35,22 @@ def times(result: xr.Dataset) -> list[Column]:
         for variable, name, own in (("drive_coordinate", "coordinate", moves), ("drive_rate", "rate", f"{moves}/s")):
             title, _, values = column(result, variable, f"{driver}.{name}", (i,))
             found.append((title, own, values))
+    if "contact" in result.dims:
+        for k, contact in enumerate(result["contact"].values):
+            found += [column(result, name, f"{contact}.{name}", (k,)) for name in CONTACT]
+            for axis, name in enumerate("xy"):
+                found.append(column(result, "contact_offset", f"{contact}.contact_offset.{name}", (k, axis)))
+        found += [column(result, name, name, ()) for name in ("work_contact", "contact_energy")]
     return [*found, *(column(result, name, name, ()) for name in ENERGY)]
+
+
+def impacts(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:
+    """Every contact of joints in play from onset to lift-off: times, speeds, force, penetration, wear."""
+    labels = attribute(result, "impacts") if "impact" in result.dims else []
+    yield "contact", "", np.array(labels, dtype=object)
+    for name, unit in IMPACT:
+        values = result[f"impact_{name}"].values if labels else np.empty(0)
+        yield name, unit, values
 
 
 def events(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.results.attributes import attribute
 from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import Abscissa, abscissa, names
 from trunnion.views.common.figures import MUTED, PALETTE, along, curve, dress, legend, new, style_of
 from trunnion.views.common.lettering import plain
-from trunnion.views.motion.shown import Shown, energies, shown
+from trunnion.views.motion import contacts
+from trunnion.views.motion.shown import Shown, drivers_of, energies, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +31,9 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
     check_kind(kind)
     if kind == "sheet":
         return sheet(result)
+    contacts.refuse(result, kind)
+    if kind == "orbit":
+        return contacts.orbit(result)
     title, draw = KINDS[kind]
     made = new(title, result, height=4.3)
     _panel(made.subplots(), shown(result), draw)
@@ -45,7 +48,8 @@ def check_kind(kind: str) -> None:
 
 def sheet(result: xr.Dataset) -> Figure:
     """Everything over time, one panel under the other."""
-    over_time = {kind: one for kind, one in KINDS.items() if kind != "phase"}
+    left_out = ("phase", "orbit", *(() if contacts.in_play(result) else contacts.OF_CONTACTS))
+    over_time = {kind: one for kind, one in KINDS.items() if kind not in left_out}
     motion = shown(result)
     made = new("Motion in time", result, height=1.0 + PANEL * len(over_time))
     panels = made.subplots(len(over_time), 1, squeeze=False)[:, 0]
@@ -64,14 +68,8 @@ def _panel(axes: Axes, motion: Shown, draw: Callable[[Axes, xr.Dataset, Abscissa
     legend(axes)
 
 
-def _drivers(result: xr.Dataset) -> list[tuple[int, str, str]]:
-    """Number, name and unit of effort of every free driver."""
-    free, units = attribute(result, "free_drivers"), attribute(result, "driver_units")
-    return [(i, name, units[i]) for i, name in enumerate(names(result, "driver")) if name in free]
-
-
 def _speed(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
-    drivers = _drivers(result)
+    drivers = drivers_of(result)
     unit = "rad/s" if drivers[0][2] == "N m" else "m/s"
     along(axes, over, f"speed [{unit}]")
     for k, (i, name, effort) in enumerate(drivers):
@@ -81,7 +79,7 @@ def _speed(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
 
 
 def _effort(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
-    drivers = _drivers(result)
+    drivers = drivers_of(result)
     factor, label = prefixed(_largest(result["drive_effort"].values), drivers[0][2])
     along(axes, over, f"drive {'torque' if drivers[0][2] == 'N m' else 'force'} [{label}]")
     for k, (i, name, _) in enumerate(drivers):
@@ -106,7 +104,7 @@ def _energy(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
 
 
 def _phase(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
-    drivers = _drivers(result)
+    drivers = drivers_of(result)
     turns = drivers[0][2] == "N m"
     dress(axes, f"coordinate [{'rad' if turns else 'm'}]", f"speed [{'rad/s' if turns else 'm/s'}]")
     for k, (i, name, _) in enumerate(drivers):
@@ -141,5 +139,8 @@ KINDS: dict[str, tuple[str, Callable[[Axes, Any, Abscissa], None]]] = {
     "effort": ("Drive effort", _effort),
     "reactions": ("Reactions", _reactions),
     "energy": ("Energy account", _energy),
+    "contacts": ("Contact forces", contacts.forces),
+    "gaps": ("Gaps", contacts.gaps),
+    "orbit": ("Pin in its hole", contacts.forces),
     "phase": ("Speed over coordinate", _phase),
 }

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.results.attributes import attribute
-from trunnion.views.common.cycle import abscissa, names, series
+from trunnion.views.common.cycle import abscissa, series
 from trunnion.views.cycle.scene import scene
-from trunnion.views.motion.shown import Shown, energies
+from trunnion.views.motion.shown import Shown, drivers_of, energies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,11 +48,9 @@ def motion_scene(shown: Shown) -> dict[str, Any]:
 
 def _free(rows: xr.Dataset) -> list[dict[str, Any]]:
     """Coordinate and rate of every free driver."""
-    free, units = attribute(rows, "free_drivers"), attribute(rows, "driver_units")
     found = []
-    for i, name in enumerate(names(rows, "driver")):
-        if name in free:
-            unit = "rad" if units[i] == "N m" else "m"
-            coordinate, rate = rows["drive_coordinate"].values[i], rows["drive_rate"].values[i]
-            found.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
+    for i, name, effort in drivers_of(rows):
+        unit = "rad" if effort == "N m" else "m"
+        coordinate, rate = rows["drive_coordinate"].values[i], rows["drive_rate"].values[i]
+        found.append({"name": name, "unit": unit, "coordinate": series(coordinate), "rate": series(rate)})
     return found

@@ -13,7 +13,7 @@ from trunnion.results.quantities import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ENERGIES", "Happening", "Shown", "as_positions", "energies", "happenings", "shown"]
+__all__ = ["ENERGIES", "Happening", "Shown", "as_positions", "drivers_of", "energies", "happenings", "shown"]
 
 Array = NDArray[np.float64]
 WORDS = {"break-away": "starts", "rest": "rests", "lock": "locks"}
@@ -22,6 +22,8 @@ ENERGIES = (
     ("work_loads", "work of the loads"),
     ("work_springs", "work of the springs"),
     ("work_friction", "lost to friction"),
+    ("work_contact", "lost in contacts"),
+    ("contact_energy", "elastic energy of contacts"),
     ("kinetic_energy", "kinetic energy"),
     ("potential_energy", "potential energy"),
 )
@@ -68,9 +70,16 @@ def shown(result: xr.Dataset) -> Shown:
 
 def energies(rows: xr.Dataset) -> list[tuple[str, str, Array]]:
     """Name, title and course of every work and energy since the start, J, of those that are more than rounding."""
-    changes = [(name, text, rows[name].values - rows[name].values[0]) for name, text in ENERGIES]
+    changes = [(name, text, rows[name].values - rows[name].values[0]) for name, text in ENERGIES if name in rows]
     sizes = [float(np.nanmax(np.abs(change), initial=0.0)) for *_, change in changes]
     return [one for one, size in zip(changes, sizes, strict=True) if size > NOISE * max(sizes)]
+
+
+def drivers_of(result: xr.Dataset) -> list[tuple[int, str, str]]:
+    """Number, name and unit of effort of every free driver; of all where none is, as pins in play move alone."""
+    free, units = attribute(result, "free_drivers"), attribute(result, "driver_units")
+    known = [str(name) for name in result["driver"].values]
+    return [(i, name, units[i]) for i, name in enumerate(known) if name in free or not free]
 
 
 def as_positions(result: xr.Dataset) -> xr.Dataset:

@@ -1,0 +1,80 @@
+"""What is shown and written of joints in play: figures, tables, summary."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from playing import loose_slider, rattling
+
+import trunnion
+from trunnion.errors import MechanismError
+from trunnion.results.tables import columns
+from trunnion.views.motion.figure import figure
+
+
+@functools.cache
+def rattled() -> xr.Dataset:
+    return trunnion.simulate(rattling(), duration=7e-4, steps=700)
+
+
+def test_the_path_of_the_pin_lies_in_its_hole() -> None:
+    made = figure(rattled(), "orbit")
+    (axes,) = made.axes
+    lines = {len(line.get_xdata()): line for line in axes.lines}
+    wall, path = lines[361], lines[701]
+    assert np.hypot(*wall.get_data()) == pytest.approx(np.full(361, 500.0))  # µm
+    assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.3)
+    assert "45.8" in axes.get_title()
+
+
+def test_gaps_and_forces_over_time() -> None:
+    (gaps,), (forces,) = figure(rattled(), "gaps").axes, figure(rattled(), "contacts").axes
+    assert gaps.get_ylabel() == "gap [µm]"
+    assert forces.get_ylabel() == "contact force [kN]"
+    drawn = max((line for line in forces.lines if len(line.get_xdata()) > 100), key=lambda line: len(line.get_xdata()))
+    assert np.nanmax(drawn.get_ydata()) == pytest.approx(45.8, abs=0.1)
+
+
+def test_a_motion_without_play_has_no_such_figures() -> None:
+    result = trunnion.simulate(trunnion.read("examples/flywheel-press.yaml"), duration=1e-3, steps=1)
+    for kind in ("orbit", "gaps", "contacts"):
+        with pytest.raises(MechanismError) as raised:
+            figure(result, kind)
+        assert [finding.where for finding in raised.value.findings] == [f"--kind {kind}"]
+
+
+def test_a_guide_has_gaps_and_no_orbit() -> None:
+    result = trunnion.simulate(loose_slider(), duration=1e-3, steps=10)
+    assert len(figure(result, "gaps").axes) == 1
+    with pytest.raises(MechanismError):
+        figure(result, "orbit")
+
+
+def test_columns_of_contacts_and_impacts() -> None:
+    times = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled())}
+    assert times["Q.contact_gap"][0] == "m"
+    assert times["Q.contact_gap"][1][0] == pytest.approx(5e-4)
+    assert times["Q.contact_offset.x"][1][0] == pytest.approx(0.0, abs=1e-15)
+    assert {"work_contact", "contact_energy", "Q.reaction_force.x"} <= times.keys()
+    impacts = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled(), "impacts")}
+    assert list(impacts["contact"][1]) == ["Q", "Q"]
+    assert impacts["approach"][0] == "m/s"
+    assert impacts["approach"][1][0] == pytest.approx(4.38578315, rel=1e-8)
+
+
+def test_summary_of_contacts() -> None:
+    summary = {one.name: one for one in rattled().trunnion.summary}
+    assert summary["Q.impacts"].value == 2
+    assert summary["Q.contact_force_max"].value == pytest.approx(45872.2, rel=1e-5)
+    assert 0 < summary["Q.contact_time"].value < 1
+    assert summary["Q.wear"].value == pytest.approx(float(rattled()["impact_wear"].sum()))
+
+
+def test_a_table_of_no_impacts(tmp_path: Path) -> None:
+    result = trunnion.simulate(rattling(), duration=1e-4, steps=4)
+    trunnion.save(result, tmp_path / "none.impacts.csv")
+    assert (tmp_path / "none.impacts.csv").read_text().splitlines()[0].startswith("contact,begin,end")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 import trunnion
 from trunnion.cycle.locking import LockingState
@@ -13,6 +15,7 @@ from trunnion.results.attributes import summary_of
 from trunnion.views.common.joined import joined
 from trunnion.views.common.markup import with_code
 from trunnion.views.cycle import plots
+from trunnion.views.cycle.locking_plot import STATES
 from trunnion.views.cycle.report import _summary, report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -58,11 +61,10 @@ def test_margin_and_multiples_are_drawn_as_computed(press):
 @pytest.mark.parametrize("friction", [0.1, 0.5])
 def test_every_state_is_coloured_and_named_once(press, friction):
     found = trunnion.locking(press.with_values({"joint_defaults.friction": friction}), STEPS)
-    codes = set(found["locking_state"].values.tolist()) - {LockingState.UNSOLVED}
+    codes = set(found["locking_state"].values.tolist())
     upper, lower = plots.figure(found, "locking").axes
     for state in LockingState:
-        if state not in (LockingState.LOCKED, LockingState.JAMMED):  # these are said as where nothing is solved
-            assert labels(upper).count(state.short) == (int(state) in codes)
+        assert labels(upper).count(state.short) == (int(state) in codes)
     drive = found["drive"].values
     for axes in (upper, lower):
         spans = [(patch.get_x() - 1e-9, patch.get_x() + patch.get_width() + 1e-9) for patch in axes.patches]
@@ -84,9 +86,19 @@ def test_colours_change_where_the_state_does_and_the_drive_effort_its_sign():
     assert len(colours) == 4
 
 
-def test_every_state_has_a_colour_in_the_report():
+def test_states_are_told_apart_by_their_colours():
+    """Any two differ by as much as the eye sees at a glance."""
+    assert {state for state, _ in STATES} == set(LockingState)
+    colours = np.array([to_rgb(colour) for _, colour in STATES])
+    apart = np.linalg.norm(colours[:, None] - colours[None], axis=-1) + 9 * np.eye(len(STATES))
+    assert apart.min() > 0.08
+
+
+def test_every_state_has_a_colour_of_its_own_in_the_report():
     style = (EXAMPLES.parent / "src/trunnion/views/web/report.css").read_text(encoding="utf-8")
-    assert all(f".state.{state.name.lower()} " in style.replace(",", " ").replace("{", " {") for state in LockingState)
+    found = {state: re.findall(rf"\.state\.{state.name.lower()} {{([^}}]*)}}", style) for state in LockingState}
+    assert all(len(one) == 1 for one in found.values()), found
+    assert len({one[0] for one in found.values()}) == len(LockingState)
 
 
 def test_locked_ranges_are_shaded(press):

@@ -224,7 +224,7 @@ def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[F
 
 
 def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float, float]:
-    """Effort that acts at a time of rest, and that at which it would break away: the way it acts, or the nearer."""
+    """Effort that acts at a time of rest, and the break-away effort: the way it acts, or the nearer one."""
     rows, _ = solution.at(np.array([time]))
     rest, at = Rest(motion, solution.layout), solution.layout.moment(np.array([time]), rows, 1.0, time)
     given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])

@@ -13,8 +13,6 @@ The second is exact for a load carried at both ends; the first is its bound by t
 
 from __future__ import annotations
 
-import functools
-import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -38,7 +36,11 @@ def halves(reaction: Reaction) -> tuple[Vector3, Vector3]:
 
 def _length(*parts: Number) -> Number:
     """√Σ aᵢ²; of dual numbers without a derivative where all are 0."""
-    square = functools.reduce(operator.add, (part * part for part in parts))
+    square = parts[0] * parts[0]
+    for part in parts[1:]:
+        square = square + part * part
+    if type(square) is np.ndarray:  # as nearly always: asking which kind it is takes as long as a root
+        return np.sqrt(square)
     xp = namespace(square)
     if xp is np:
         return np.sqrt(square)
@@ -48,8 +50,11 @@ def _length(*parts: Number) -> Number:
 
 def _shares(size: Number, *parts: Number) -> tuple[Number, ...]:
     """aᵢ/|a|; 0 where a is."""
-    factor = 1 / namespace(size).where(primal(size) > 0, size, np.inf)
-    return tuple(part * factor for part in parts)
+    if type(size) is np.ndarray:
+        factor = 1 / np.where(size > 0, size, np.inf)
+    else:
+        factor = 1 / namespace(size).where(primal(size) > 0, size, np.inf)
+    return tuple([part * factor for part in parts])
 
 
 @dataclass(frozen=True)
@@ -128,8 +133,9 @@ class BearingLoad:
             tx, ty = (2 * share for share in _shares(_length(gx, gy), gx, gy))
         else:
             hx, hy = 0.5 * fx, 0.5 * fy
-            ax, ay = _shares(_length(hx - gx, hy - gy), hx - gx, hy - gy)
-            bx, by = _shares(_length(hx + gx, hy + gy), hx + gx, hy + gy)
+            mx, my, qx, qy = hx - gx, hy - gy, hx + gx, hy + gy
+            ax, ay = _shares(_length(mx, my), mx, my)
+            bx, by = _shares(_length(qx, qy), qx, qy)
             px, py, tx, ty = 0.5 * (ax + bx), 0.5 * (ay + by), bx - ax, by - ay
         if not more:
             return px, py, tx, ty

@@ -6,8 +6,6 @@ law is proportional to N. So the derivative of the map φ → law(N(R(φ))) has 
 
 from __future__ import annotations
 
-import functools
-import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +21,9 @@ from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
 __all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "added", "largest", "total"]
+
+
+Part = tuple[int, Number]  # an entry with its place
 
 
 class Contact(NamedTuple):
@@ -171,7 +172,7 @@ class FrictionProblem:
         if all(is_zero(force) for force in forces):
             at = [one.start for one in self.felt]
         else:
-            changes = {k: _changes(self.felt[k].columns, forces) for k in set(self._alike)}
+            changes = {k: _combined(self._crossed[k], forces) for k in set(self._alike)}
             at = [added(one.start, changes[k]) for one, k in zip(self.felt, self._alike, strict=True)]
         return State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
 
@@ -208,11 +209,32 @@ class FrictionProblem:
     def map_derivative(self, state: State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        for contact, reaction, normal, slope, felt in zip(self.contacts, *state, self.slopes, self.felt, strict=True):
+        each = zip(self.contacts, *state, self.slopes, self._filled, strict=True)
+        for contact, reaction, normal, slope, filled in each:
             gradient = contact.load.gradient(reaction, normal)
-            scaled = tuple(entry if is_zero(entry) else slope * entry for entry in gradient)
-            rows.append([_along(scaled, column) for column in felt.columns])
+            scaled = [entry if is_zero(entry) else slope * entry for entry in gradient]
+            there = None if all(type(entry) is np.ndarray for entry in scaled) else [not is_zero(g) for g in scaled]
+            rows.append([_along(scaled, column, there) for column in filled])
         return rows
+
+    @cached_property
+    def _filled(self) -> list[list[list[Part]]]:
+        """Of each contact, for each friction force: what 1 N of it changes, by its place; literal zeros left out."""
+        return [
+            [[(i, entry) for i, entry in enumerate(column) if not is_zero(entry)] for column in felt.columns]
+            for felt in self.felt
+        ]
+
+    @cached_property
+    def _crossed(self) -> list[list[list[Part]]]:
+        """The same for each place, by the number of the friction force."""
+        return [
+            [
+                [(k, entry) for k, entry in enumerate(entries) if not is_zero(entry)]
+                for entries in zip(*felt.columns, strict=True)
+            ]
+            for felt in self.felt
+        ]
 
     def bound(self, multiples: Sequence[float] | None = None) -> Number:
         """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction.
@@ -235,9 +257,16 @@ def _changes(columns: Sequence[Reaction], forces: Sequence[Number]) -> Reaction:
     )
 
 
-def _along(gradient: Reaction, column: Reaction) -> Number:
-    """Derivative of a normal load along a change of the reaction."""
-    return total([g * c for g, c in zip(gradient, column, strict=True) if not (is_zero(g) or is_zero(c))])
+def _combined(crossed: Sequence[Sequence[Part]], forces: Sequence[Number]) -> Reaction:
+    """`_changes` of columns whose literal zeros are left out."""
+    return tuple(total([entry * forces[k] for k, entry in parts]) for parts in crossed)
+
+
+def _along(gradient: Sequence[Number], column: Sequence[Part], there: Sequence[bool] | None) -> Number:
+    """Derivative of a normal load along a change of the reaction; there: where the gradient is no literal zero."""
+    if there is None:
+        return total([gradient[i] * entry for i, entry in column])
+    return total([gradient[i] * entry for i, entry in column if there[i]])
 
 
 def added(a: Reaction, b: Reaction) -> Reaction:
@@ -247,7 +276,12 @@ def added(a: Reaction, b: Reaction) -> Reaction:
 
 def total(parts: Sequence[Number]) -> Number:
     """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
-    return functools.reduce(operator.add, parts) if parts else 0.0
+    if not parts:
+        return 0.0
+    found = parts[0]
+    for part in parts[1:]:
+        found = found + part
+    return found
 
 
 def largest(values: Sequence[Number]) -> Number:

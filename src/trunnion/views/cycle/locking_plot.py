@@ -21,14 +21,17 @@ if TYPE_CHECKING:
 
 __all__ = ["has_friction", "locking"]
 
-# what is shaded: values of `locking_state` and the colour; `shade` has the locked ones and those not solved
+# what is shaded: values of `locking_state` and the colour; over that of `shade`, which says why there is no answer
 STATES = (
     (LockingState.RUNS, "#eef0f3"),
-    (LockingState.BACKDRIVABLE, "#dcefe7"),
-    (LockingState.SELF_LOCKING, "#fbe6cf"),
-    (LockingState.SELF_LOCKING_FORWARD, "#f6c993"),
-    (LockingState.DRIVEN_ON, "#d6e6f5"),
-    (LockingState.LOCKED_BACKWARD, "#f3d0d8"),
+    (LockingState.BACKDRIVABLE, "#cfe9dd"),
+    (LockingState.SELF_LOCKING, "#fbe3c4"),
+    (LockingState.SELF_LOCKING_FORWARD, "#f4bf7f"),
+    (LockingState.DRIVEN_ON, "#c9dff3"),
+    (LockingState.LOCKED_BACKWARD, "#e0cdea"),
+    (LockingState.LOCKED, "#f3c4bf"),
+    (LockingState.JAMMED, "#dea8a3"),
+    (LockingState.UNSOLVED, "#c6ccd3"),
 )
 LEAST_TOP = 2.0  # of the axis of the margin, so that 1 does not lie on its frame
 
@@ -125,7 +128,7 @@ def _states(axes: Axes, result: xr.Dataset, over: Abscissa, named: bool) -> None
         edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
         for number, (start, stop) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
             label = one.short if named and number == 0 else None
-            axes.axvspan(ends[start], ends[stop], color=colour, linewidth=0, zorder=0.4, label=label)
+            axes.axvspan(ends[start], ends[stop], color=colour, linewidth=0, zorder=0.55, label=label)
     held = np.isin(state, HELD_AND_DRIVEN)
     turns = held[:-1] & held[1:] & (state[:-1] != state[1:])
     label = "drive effort changes sign" if named else None

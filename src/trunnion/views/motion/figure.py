@@ -48,9 +48,10 @@ def check_kind(kind: str) -> None:
 
 def sheet(result: xr.Dataset) -> Figure:
     """Everything over time, one panel under the other."""
-    left_out = ("phase", "orbit", *(() if contacts.in_play(result) else contacts.OF_CONTACTS))
-    over_time = {kind: one for kind, one in KINDS.items() if kind not in left_out}
     motion = shown(result)
+    idle = () if np.any(motion.rows["drive_effort"].values) else ("effort",)  # nothing drives it
+    left_out = ("phase", "orbit", *idle, *(() if contacts.in_play(result) else contacts.OF_CONTACTS))
+    over_time = {kind: one for kind, one in KINDS.items() if kind not in left_out}
     made = new("Motion in time", result, height=1.0 + PANEL * len(over_time))
     panels = made.subplots(len(over_time), 1, squeeze=False)[:, 0]
     for axes, (_, draw) in zip(panels, over_time.values(), strict=True):

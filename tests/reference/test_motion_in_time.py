@@ -108,6 +108,11 @@ def test_switched_off_and_braked() -> None:
     assert at(result, "drive_rate", 1.0) == pytest.approx(top, rel=1e-10)
     assert at(result, "drive_rate", 1.5) == pytest.approx(later, rel=1e-10)
     assert events(result, "rest") == [pytest.approx(1.5 + later * 0.05 / 2.6, rel=1e-9)]
+    assert events(result, "motor-off") == [1.0]
+    assert events(result, "brake") == [1.5]
+    kinds, figures = zip(*((row[0], row[2:]) for row in attribute(result, "events")), strict=True)
+    assert list(kinds) == ["break-away", "motor-off", "brake", "rest"]
+    assert figures[2] == [2.0, "N m"]
 
 
 def test_a_table_over_time_breaks_a_wheel_away() -> None:

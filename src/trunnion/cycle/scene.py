@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import Frame
 from trunnion.joints.pairs import PAIRS
-from trunnion.solve.forward import start
+from trunnion.solve.forward import Forward
 from trunnion.solve.loads import Stated
 from trunnion.solve.shifts import hole, play_of
 from trunnion.solve.system import System, Values, rubbing
@@ -22,8 +21,8 @@ __all__ = ["DRAWN", "pitch_circles", "planar", "spatial"]
 DRAWN = 360  # positions at which a load that varies is looked at for the drawing
 
 
-def planar(system: System, values: Values, times: NDArray[np.float64], useful: Sequence[str]) -> dict[str, Any]:
-    """Of a mechanism in the plane. times: over the cycle, for loads that vary; useful: names of the useful loads."""
+def planar(system: System, values: Values, walk: Forward, useful: Sequence[str]) -> dict[str, Any]:
+    """Of a mechanism in the plane. walk: over the cycle, for loads that vary; useful: names of the useful loads."""
     joints = _joints(system)
     elements = system.elements(values)
     for name, (kind, links) in system.joints.items():
@@ -31,10 +30,10 @@ def planar(system: System, values: Values, times: NDArray[np.float64], useful: S
             axis = elements[links[0], name]
             joints[name]["axis"] = [float(axis.c), float(axis.s)]
     gears = {name: pitch_circles(system, values, name) for name, gear in system.mechanism.gears.items() if gear.teeth}
-    return {**_common(system, values, times, useful), "space": "planar", "joints": joints, "gears": gears}
+    return {**_common(system, values, walk, useful), "space": "planar", "joints": joints, "gears": gears}
 
 
-def spatial(system: System, values: Values, times: NDArray[np.float64], useful: Sequence[str]) -> dict[str, Any]:
+def spatial(system: System, values: Values, walk: Forward, useful: Sequence[str]) -> dict[str, Any]:
     """Of a mechanism in space: the elements of its joints (place, z, x) in the frames of both links."""
     joints, elements = _joints(system), system.elements(values)
     for name, (_, links) in system.joints.items():
@@ -46,7 +45,7 @@ def spatial(system: System, values: Values, times: NDArray[np.float64], useful: 
     for name, play in plays.items():
         second: Any = elements[system.joints[name][1][1], name]
         play["hole"] = _plain(hole(second, values, name))
-    common = {**_common(system, values, times, useful), "plays": plays}
+    common = {**_common(system, values, walk, useful), "plays": plays}
     return {**common, "space": "spatial", "joints": joints, "gears": {}, "passive": passive}
 
 
@@ -62,7 +61,7 @@ def _joints(system: System) -> dict[str, Any]:
     }
 
 
-def _common(system: System, values: Values, times: NDArray[np.float64], useful: Sequence[str]) -> dict[str, Any]:
+def _common(system: System, values: Values, walk: Forward, useful: Sequence[str]) -> dict[str, Any]:
     mechanism = system.mechanism
     points: dict[str, list[str]] = {link: [] for link in mechanism.effective_links}
     for link, point in system.points:
@@ -71,7 +70,7 @@ def _common(system: System, values: Values, times: NDArray[np.float64], useful: 
         "ground": mechanism.fixed_link,
         "links": {name: {"points": own} for name, own in points.items()},
         "drivers": list(mechanism.drivers),
-        "loads": _loads(system, values, times, useful),
+        "loads": _loads(system, values, walk, useful),
         "springs": {
             name: {"between": spring.between and list(spring.between), "joint": spring.joint}
             for name, spring in mechanism.springs.items()
@@ -123,11 +122,9 @@ def pitch_circles(system: System, values: Values, name: str) -> list[dict[str, A
     ]
 
 
-def _loads(system: System, values: Values, times: NDArray[np.float64], useful: Sequence[str]) -> dict[str, Any]:
+def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str]) -> dict[str, Any]:
     """The loads as a drawing shows them; of one that varies, its largest value over the cycle."""
-    mechanism, walk = system.mechanism, start(system, values)
-    walk.time = times
-    stated = Stated(walk)
+    mechanism, stated = system.mechanism, Stated(walk)
     found: dict[str, Any] = {}
     for name, load in mechanism.loads.items():
         path = f"loads.{name}"

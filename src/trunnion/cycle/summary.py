@@ -26,8 +26,7 @@ from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
-from trunnion.solve.forward import start
-from trunnion.solve.loads import Stated
+from trunnion.solve.loads import Stated, stated_walk
 from trunnion.solve.system import Dial, System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -215,9 +214,8 @@ def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
 
 def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:
     """What only the motion shows of a load or spring: a resistance that drives, a torsional spring that unwinds."""
-    walk, dial = start(run.system, run.values), run.system.dial(run.values, time)
-    walk.time = time
-    stated = Stated(walk)
+    dial = run.system.dial(run.values, time)
+    stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
     for path, entry in run.system.mechanism.parameter_set.entries.items():
         if entry.varies and entry.location[-1] in ("resisting_torque", "resisting_force"):
             negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), time.shape) < 0)
@@ -406,7 +404,6 @@ def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
 def scene_of(run: Run) -> dict[str, Any]:
     """What a drawing needs to know beside the positions of the points."""
     system = run.system
-    found: dict[str, Any] = fill_of(system).scene(
-        system, run.values, run.cycle.times(DRAWN), useful_loads(system.mechanism)
-    )
+    walk = stated_walk(system, run.values, run.chosen.assembly, run.cycle.times(DRAWN))
+    found: dict[str, Any] = fill_of(system).scene(system, run.values, walk, useful_loads(system.mechanism))
     return found

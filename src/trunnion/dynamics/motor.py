@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from trunnion.joints.motors import transmitted
 from trunnion.model.parts import Motor
 from trunnion.solve.system import System, Values
 
-__all__ = ["Drive", "drives"]
+__all__ = ["Drive", "drives", "switched"]
 
 Array = NDArray[np.float64]
 
@@ -84,6 +84,15 @@ class Drive:
         if self.motor is None or self.motor.of.error is None or now >= self.off_from:
             return 0.0 * speed
         return self.motor.of.error(self.ratio * speed, time, self.parameters, integral)
+
+
+def switched(drives_: Mapping[str, Drive], end: float) -> Iterator[tuple[float, str, str, float]]:
+    """Time, s, kind, driver and effort of every motor that is switched off and brake that is put on up to an end."""
+    for name, drive in drives_.items():
+        if drive.motor is not None and drive.off_from <= end:
+            yield drive.off_from, "motor-off", name, np.nan
+        if drive.brake and drive.brake_from <= end:
+            yield drive.brake_from, "brake", name, drive.brake
 
 
 def drives(system: System, values: Values) -> dict[str, Drive]:

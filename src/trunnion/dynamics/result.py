@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
-from trunnion.dynamics.integrate import Solution
+from trunnion.dynamics.integrate import Event, Solution
+from trunnion.dynamics.motor import switched
 from trunnion.dynamics.rates import WORKS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
@@ -72,6 +73,7 @@ def result_of(
     """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out;
     impacts: of these."""
     run = stated or motion.run
+    _note_switches(motion, solution)
     mechanism, system = run.system.mechanism, run.system
     residual, turned_over = _energy(books)
     turned_over = max(turned_over, _turned_over(motion, solution))
@@ -139,6 +141,14 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residua
         "resting": books.resting,
         "event_time": np.array([one.time for one in solution.events], float),
     }
+
+
+def _note_switches(motion: FreeMotion, solution: Solution) -> None:
+    """Add the motors that are switched off and the brakes that are put on to the events, in their order."""
+    for time, kind, of, effort in switched(motion.drives, solution.end):
+        unit = "" if np.isnan(effort) else "N m" if motion.system.turns(of) else "N"
+        solution.events.append(Event(time, kind, of, effort, unit))
+    solution.events.sort(key=lambda event: event.time)
 
 
 # ---- energy ---------------------------------------------------------------------------------------------------

@@ -44,6 +44,7 @@ PANELS = 32  # of a turn, or of a range, to begin with
 DOUBLINGS = 5
 EXACT = 1e-11  # of the largest of each number over the way
 SMALL = 1e-3  # of the largest number of its kind: of what is below, the share of that counts
+RATE = "velocity"  # in the name of a motion that a load speaks of
 POWERS = 6  # numbers after the columns and slips
 FIXED = 5  # columns before those of the friction forces: q̈, q̇², q̇, loads forward, loads backward
 
@@ -123,7 +124,7 @@ def _fits(motion: FreeMotion) -> bool:
         return False
     timed = {"time", "speed"} | {name for name, table in mechanism.tables.items() if table.over == "time"}
     entries = mechanism.parameter_set.entries.values()
-    if any(entry.varies and not timed.isdisjoint(entry.quantity.names) for entry in entries):
+    if any(entry.varies and any(name in timed or RATE in name for name in entry.quantity.names) for entry in entries):
         return False
     wound = any(spring.joint in mechanism.drivers for spring in mechanism.springs.values())  # it counts whole turns
     return not (wound and motion.cycle.periodic and motion.system.turns(motion.names[0]))

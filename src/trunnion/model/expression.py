@@ -22,7 +22,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, unit
 
-__all__ = ["MOTION", "RESERVED", "Expression", "literal", "parse"]
+__all__ = ["MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse"]
 
 MAX_LENGTH = 500
 MAX_DEPTH = 40
@@ -31,7 +31,8 @@ _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![0-9.])"  # w
 _WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.]))?"
 _UNIT = rf"(?:{_WORD})(?:[ /*·⋅](?:{_WORD}))*"
 LITERAL = re.compile(rf"(?P<number>{_NUMBER})(?:\s*(?P<unit>{_UNIT})|\s+(?P<per>1/{_UNIT}))?")
-_TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>[^\W\d]\w*)|(?P<operator>\*\*|[-+*/^(),]))")
+_NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*\.[^\W\d]\w*|\.[^\W\d]\w+)?"  # also S.slide and ram.Q.x
+_TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>{_NAME})|(?P<operator>\*\*|[-+*/^(),]))")
 # 1500 min-1, as catalogues write a speed: here it is a difference
 _RECIPROCAL = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}[ /*·])?(?P<power>(?P<unit>min|s)-[12])(?![\w.])")
 # Signs an engineer's keyboard or word processor makes of - * ^2; the minus of a superscript included.
@@ -71,6 +72,7 @@ FUNCTIONS: Final[Mapping[str, _Function]] = {
 }
 RESERVED = frozenset({"pi", *FUNCTIONS})  # names a dimension cannot have
 MOTION = ("drive", "speed", "time")  # nor these: in loads, coordinate and rate of the first driver, and time
+PLACED = "."  # in a name: of a joint or a point, as in the columns of a result: S.slide, ram.Q.x, O.rotation_velocity
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.dimensions import evaluation_order
-from trunnion.model.expression import MOTION
+from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind
 from trunnion.model.merge import DEFAULT_LAW
@@ -126,7 +126,8 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
             stated = part.complete() if isinstance(part, Driver | Gear) else part
             for entry in _walk(stated, f"{section}.{name}", (section, name)):
                 kind = _narrow(mechanism, section, name, entry)
-                varies = section == "loads" and not {*MOTION, *mechanism.tables}.isdisjoint(entry.quantity.names)
+                moving = {*MOTION, *mechanism.tables}
+                varies = section == "loads" and any(one in moving or PLACED in one for one in entry.quantity.names)
                 yield Entry(entry.path, entry.location, entry.quantity, kind, varies=varies)
 
 

@@ -273,7 +273,8 @@ _DRIVER_ZEROS = {
 class Load(Part):
     """A load on a link (force at a point, moment), or one that resists the motion of a joint.
 
-    Its numbers may be expressions of the motion: of `drive`, `speed`, `time` and the names of tables.
+    Its numbers may be expressions of the motion: of `drive`, `speed`, `time`, the names of tables, turns and slides of
+    joints (`S.slide`, `S.slide_velocity`) and coordinates of points (`ram.Q.x`, `ram.Q.velocity_x`).
     """
 
     link: str | None = None

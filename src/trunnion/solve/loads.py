@@ -14,9 +14,11 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
 from trunnion.algebra.table import look_up
+from trunnion.model.expression import PLACED
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Load
-from trunnion.solve.forward import Forward, Vector
+from trunnion.solve.forward import Assembly, Forward, Vector, forward, start
+from trunnion.solve.system import System, Values
 
 __all__ = [
     "LoadAction",
@@ -25,9 +27,11 @@ __all__ = [
     "Stated",
     "Switch",
     "losses",
+    "placed",
     "spring_state",
     "springs",
     "stated_loads",
+    "stated_walk",
     "useful_loads",
     "useful_powers",
     "useful_springs",
@@ -117,16 +121,34 @@ class Stated:
             return self.walk.time
         if name in ("drive", "speed"):
             return self._drive[0] if name == "drive" else self.walk.direction * self._drive[1]
-        return self.walk.values[f"dimensions.{name}"]
+        return self._placed(name) if PLACED in name else self.walk.values[f"dimensions.{name}"]
+
+    def _placed(self, name: str) -> Number:
+        """Turn or slide of a joint, coordinate of a point, or a rate of these: named as a column of a result."""
+        walk, (of, _, rest) = self.walk, name.partition(PLACED)
+        if PLACED in rest:
+            point, _, component = rest.partition(PLACED)
+            motion, axis = walk.point(of, point), walk.system.axes.index(component[-1])
+            vector = motion.velocity if component.startswith("velocity_") else motion.place
+            coordinate: Number = vector[axis]
+            return coordinate
+        which = 1 if rest.startswith("slide") else 0
+        if rest.endswith("_velocity"):
+            return walk.rates(of)[which]
+        driven = of in walk.system.mechanism.drivers and walk.system.turns(of) == (which == 0)
+        return self._driven(of)[0] if driven else walk.coordinates(of)[which]
 
     @functools.cached_property
     def _drive(self) -> tuple[Number, Number, Number]:
+        return self._driven(next(iter(self.walk.system.mechanism.drivers)))
+
+    def _driven(self, name: str) -> tuple[Number, Number, Number]:
+        """Coordinate of a driver within its turn, and its rates."""
         system, values = self.walk.system, self.walk.values
-        first = next(iter(system.mechanism.drivers))
-        found = system.drive(values, first, self.walk.time)
-        if not system.is_free(values, first) or not (span := system.span(values, first)).periodic:
+        found = system.drive(values, name, self.walk.time)
+        if not system.is_free(values, name) or not (span := system.span(values, name)).periodic:
             return found
-        begin = values.get(f"drivers.{first}.start", 0.0)  # loads come again every turn
+        begin = values.get(f"drivers.{name}.start", 0.0)  # loads come again every turn
         return begin + np.mod(found[0] - begin, span.travel), *found[1:]
 
     def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
@@ -149,6 +171,21 @@ class Stated:
         last = len(self.walk.system.mechanism.tables[name].points) - 1
         first, end, period = (nominal[f"tables.{name}.{key}"] for key in ("points.0.at", f"points.{last}.at", "period"))
         return bool(end - first < period * (1 - 1e-9))
+
+
+def placed(mechanism: Mechanism) -> bool:
+    """Whether a load speaks of joints or points, so that what it is takes the motion of the links."""
+    entries = mechanism.parameter_set.entries.values()
+    return any(entry.varies and any(PLACED in name for name in entry.quantity.names) for entry in entries)
+
+
+def stated_walk(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
+    """A walk that knows what the loads may speak of: the drivers alone, if that is all."""
+    if placed(system.mechanism):
+        return forward(system, values, assembly, time)
+    walk = start(system, values)
+    walk.time = time
+    return walk
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------

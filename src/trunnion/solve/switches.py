@@ -24,8 +24,8 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.model.parts import Spring
 from trunnion.solve import loads
-from trunnion.solve.forward import Assembly, Forward, forward, start
-from trunnion.solve.loads import Stated, Switch
+from trunnion.solve.forward import Assembly, Forward, forward
+from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = ["Mechanisms", "bends", "edges"]
@@ -104,8 +104,9 @@ def bends(of: Mechanisms) -> list[Array]:
     found: list[list[float]] = [[] for _ in of.cycles]
     for row, moment in _knots(of):
         found[row].append(moment)
+    quiet = NOISE if placed(of.system.mechanism) else 0.0
     for scan in (
-        _Scan(_stated, lambda walk: Stated(walk).switches(), _varies, STATED_SCANNED, 0.0),
+        _Scan(_stated, lambda walk: Stated(walk).switches(), _varies, STATED_SCANNED, quiet),
         _Scan(_moving, _of_motion, _switches, SCANNED, NOISE),
     ):
         for row, moment in _passages(of, scan):
@@ -143,10 +144,8 @@ def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
 
 
 def _stated(of: Mechanisms, rows: Rows, time: Array) -> Forward:
-    """A walk that knows the drivers alone."""
-    walk = start(of.system, of.picked(rows))
-    walk.time = of.lanes(time)
-    return walk
+    """A walk that knows what the loads may speak of."""
+    return stated_walk(of.system, of.picked(rows), of.assembly, of.lanes(time))
 
 
 def _moving(of: Mechanisms, rows: Rows, time: Array) -> Forward:

@@ -11,7 +11,7 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
 from trunnion.model.contact import motions
-from trunnion.model.expression import MOTION, RESERVED
+from trunnion.model.expression import MOTION, PLACED, RESERVED
 from trunnion.model.names import as_key, nearest
 from trunnion.model.parts import Joint, Spring, freedoms
 from trunnion.model.quantity import Quantity
@@ -46,9 +46,24 @@ def motion_dimensions(mechanism: Numbers, known: Dimensions) -> dict[str, Dimens
         slides = "rotation" not in freedoms(joint.type)
         found["drive"] = KINDS["length"].dimensions[0] if slides else ANGLE
         found["speed"] = KINDS["speed" if slides else "angular speed"].dimensions[0]
+    found.update(_placed_dimensions(mechanism))
     for name, table in mechanism.tables.items():
         found[name] = next((one for _, value in table.points if (one := _measure(value, known)) is not None), None)
     return found
+
+
+def _placed_dimensions(mechanism: Numbers) -> Iterator[tuple[str, Dimension]]:
+    """Turn and slide of every joint, coordinates of every point and their rates, named as the columns of a result."""
+    kinds = {"rotation": ("angle", "angular speed"), "slide": ("length", "speed")}
+    for name, joint in mechanism.effective_joints.items():
+        for freedom in motions(joint.type):
+            for rate, kind in zip(("", "_velocity"), kinds[freedom], strict=True):
+                yield f"{name}.{freedom}{rate}", KINDS[kind].dimensions[0]
+    for link, points in mechanism.points.items():
+        for point in points:
+            for axis in "xyz"[: mechanism.coordinates]:
+                yield f"{link}.{point}.{axis}", KINDS["length"].dimensions[0]
+                yield f"{link}.{point}.velocity_{axis}", KINDS["speed"].dimensions[0]
 
 
 def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
@@ -64,6 +79,8 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
     """A name in an expression that means nothing there."""
     section = path.partition(".")[0]
     what = f"'{source}' refers to '{name}', which is not one of the dimensions"
+    if PLACED in name and section != "loads":
+        return Finding(what, path, "motions of joints and points are for loads; give a number or a dimension")
     if name not in MOTION and name not in mechanism.tables:
         remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
         return Finding(what, path, remedy)

@@ -17,7 +17,7 @@ from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
-from trunnion.dynamics.start import initial_row, load_times, places
+from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from trunnion.results.result import Result
 
-__all__ = ["simulate", "simulated"]
+__all__ = ["CYCLES", "integration_of", "simulate", "simulated"]
 
 Array = NDArray[np.float64]
 
@@ -79,12 +79,7 @@ def simulated(
     _check_numbers(duration, steps, tolerance)
     motion = FreeMotion.of(run)
     known = places(motion)
-    tables, walks = tabulated(motion, known), Walks(motion)
-    rates = walks if tables is None else TabulatedRates(tables, walks)
-    integration = Integration(
-        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
-        INSIDE if tables is None else TABLED, load_times(motion, duration),
-    )  # fmt: skip
+    integration = integration_of(motion, known, duration, tolerance, progress)
     row = initial_row(motion)
     _check_start(motion, row, known.limits)
     try:
@@ -94,6 +89,19 @@ def simulated(
         integration.end("stopped", solution.end)
     time = np.linspace(0.0, duration, steps + 1)
     return result_of(motion, solution, Filling(motion, solution, time).books())
+
+
+def integration_of(
+    motion: FreeMotion, known: Places, duration: float, tolerance: float,
+    progress: Callable[[float], None] | None = None,
+) -> Integration:  # fmt: skip
+    """What integrates a motion: from tables where it has them, else by walks."""
+    tables, walks = tabulated(motion, known), Walks(motion)
+    rates = walks if tables is None else TabulatedRates(tables, walks)
+    return Integration(
+        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
+        INSIDE if tables is None else TABLED, load_times(motion, duration),
+    )  # fmt: skip
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:

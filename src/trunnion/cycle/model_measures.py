@@ -146,6 +146,9 @@ def _had(run: Run, name: str, steps: int) -> Measure:
     if measure.of.against or measure.of_attitude(run.system):
         what = "it is a deviation from the nominal mechanism"
         raise MechanismError(Finding(what, remedy="see `trunnion tolerance` for the effect of tolerances on it"))
+    if measure.in_time:
+        remedy = "see `trunnion simulate`, and `tolerance` and `sweep` for what changes it"
+        raise MechanismError(Finding("it is of a motion in time", remedy=remedy))
     if measure.of.of_forces and run.determinacy is not None:
         run.determinacy.refuse()
     plan(run, [measure], steps)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,13 @@ class Drive:
         if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
             found += list(self.parameters["points.place"])
         return [time for time in found if np.isfinite(time)]
+
+    def times_of(self, duration: float) -> list[Any]:
+        """Those before the end of a motion, for many drives at once (lane,): the end where one has none."""
+        found = [self.off_from, self.brake_from]
+        if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
+            found += list(self.parameters["points.place"])
+        return [np.where((one > 0.0) & (one < duration), one, duration) for one in map(np.asarray, found)]
 
     @property
     def timed(self) -> bool:
@@ -95,8 +102,8 @@ def switched(drives_: Mapping[str, Drive], end: float) -> Iterator[tuple[float, 
             yield drive.brake_from, "brake", name, drive.brake
 
 
-def drives(system: System, values: Values) -> dict[str, Drive]:
-    """What drives each free coordinate, by driver."""
+def drives(system: System, values: Values, number: Callable[[Any], Any] = float) -> dict[str, Drive]:
+    """What drives each free coordinate, by driver. number: what becomes of a value; points of a table are floats."""
     found: dict[str, Drive] = {}
     for name, driver in system.mechanism.drivers.items():
         if not driver.found:
@@ -105,11 +112,11 @@ def drives(system: System, values: Values) -> dict[str, Drive]:
         if motor is None:
             found[name] = Drive(None, {})
             continue
-        own = {key.removeprefix(path): value for key, value in values.items() if key.startswith(path)}
+        own = {key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)}
         parameters: dict[str, Any] = {"integral": 0.0, **own, "over": motor.over}
         for key in ("place", "effort"):
             rows = range(len(motor.points or ()))
             parameters[f"points.{key}"] = np.array([float(own[f"points.{k}.{key}"]) for k in rows])
         known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from")
-        found[name] = Drive(motor, parameters, **{key: float(own[key]) for key in known if key in own})
+        found[name] = Drive(motor, parameters, **{key: own[key] for key in known if key in own})
     return found

@@ -21,7 +21,7 @@ from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
 from trunnion.dynamics.shown import Touches, as_stated
-from trunnion.dynamics.start import initial_row, load_times, places
+from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from trunnion.results.result import Result
 
-__all__ = ["simulate", "simulated"]
+__all__ = ["CYCLES", "integration_of", "simulate", "simulated"]
 
 Array = NDArray[np.float64]
 
@@ -87,12 +87,7 @@ def simulated(
         return _with_play(run, duration, steps, tolerance, progress)
     motion = FreeMotion.of(run)
     known = places(motion)
-    tables, walks = tabulated(motion, known), Walks(motion)
-    rates = (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
-    integration = Integration(
-        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
-        INSIDE if tables is None else TABLED, load_times(motion, duration),
-    )  # fmt: skip
+    integration = integration_of(motion, known, duration, tolerance, progress)
     row = initial_row(motion)
     _check_start(motion, row, known.limits)
     try:
@@ -125,6 +120,19 @@ def _with_play(
     time = np.linspace(0.0, duration, steps + 1)
     books = Filling(motion, solution, time, run).books()
     return result_of(motion, solution, books, run, integration.finished())
+
+
+def integration_of(
+    motion: FreeMotion, known: Places, duration: float, tolerance: float,
+    progress: Callable[[float], None] | None = None,
+) -> Integration:  # fmt: skip
+    """What integrates a motion: from tables where it has them, else by walks."""
+    tables, walks = tabulated(motion, known), Walks(motion)
+    rates = (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
+    return Integration(
+        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
+        INSIDE if tables is None else TABLED, load_times(motion, duration),
+    )  # fmt: skip
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:

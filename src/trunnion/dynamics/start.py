@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
+from trunnion.solve.system import Cycle, Values
 
-__all__ = ["Places", "initial_row", "load_times", "places"]
+__all__ = ["Places", "initial_row", "load_times", "nominal_motion", "placed", "places"]
 
 Array = NDArray[np.float64]
 
@@ -75,12 +77,21 @@ def places(motion: FreeMotion) -> Places:
     """Of one free driver that alone moves the mechanism; of several, none are known beforehand."""
     if len(motion.system.mechanism.drivers) != 1:
         return Places()
-    (name,) = motion.names
     run, cycle = motion.run, motion.cycle
     times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
-    law = motion.system.mechanism.drivers[name].motion
-    own = motion.system.motion_of(run.values, name)
-    begin, speed = _number(law.function(0.0, own).value), _number(law.function(0.0, own).rate)
+    begin, speed = nominal_motion(motion, run.values)
+    return placed(times, _number(begin), _number(speed), cycle)
+
+
+def nominal_motion(motion: FreeMotion, values: Values) -> tuple[Number, Number]:
+    """Coordinate and speed at which the one free driver is taken to begin its cycle."""
+    (name,) = motion.names
+    found = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(values, name))
+    return found.value, found.rate
+
+
+def placed(times: Array, begin: float, speed: float, cycle: Cycle) -> Places:
+    """Coordinates from the times of bends in a cycle."""
     coordinates = begin + speed * np.append(times, [0.0, cycle.duration][: 0 if cycle.periodic else 2])
     if cycle.periodic:
         period = abs(speed) * cycle.duration

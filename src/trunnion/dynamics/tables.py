@@ -33,9 +33,22 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.backward import Sense, body_loads, stated_actions, under
 from trunnion.solve.forward import Forward, forward
-from trunnion.solve.system import freed, law_of, rubbing
+from trunnion.solve.system import Values, freed, law_of, rubbing
 
-__all__ = ["FIXED", "Rub", "Tables", "tabulated"]
+__all__ = [
+    "EXACT",
+    "FIXED",
+    "NODES",
+    "PANELS",
+    "POWERS",
+    "Rub",
+    "Tables",
+    "fits",
+    "numbers",
+    "rubs_of",
+    "scale_of",
+    "tabulated",
+]
 
 Array = NDArray[np.float64]
 
@@ -100,13 +113,13 @@ class Tables:
 
 def tabulated(motion: FreeMotion, known: Places) -> Tables | None:
     """The tables of a motion; None where its forces are not functions of one coordinate and its speed."""
-    if not _fits(motion) or motion.cycle.duration <= 0:
+    if not fits(motion) or motion.cycle.duration <= 0:
         return None
     way = (0.0, known.period) if known.period is not None else known.limits
     edges = np.unique(np.concatenate([way, [bend for bend in known.bends if way[0] < bend < way[1]]]))
     widest = (way[1] - way[0]) / PANELS
     with np.errstate(all="ignore"):
-        rubs = _rubs(motion)
+        rubs = rubs_of(motion)
         for _ in range(DOUBLINGS):
             parted = _parted(edges, widest)
             found, error = _fitted(motion, rubs, parted)
@@ -118,7 +131,7 @@ def tabulated(motion: FreeMotion, known: Places) -> Tables | None:
     return Tables(motion, parted, found, known.period, rubs, error)
 
 
-def _fits(motion: FreeMotion) -> bool:
+def fits(motion: FreeMotion) -> bool:
     mechanism = motion.system.mechanism
     if len(mechanism.drivers) != 1 or motion.followed or any(gear.teeth for gear in mechanism.gears.values()):
         return False
@@ -141,21 +154,21 @@ def _fitted(motion: FreeMotion, rubs: Sequence[Rub], edges: Array) -> tuple[Arra
     """Coefficients (panel, node, number) through the Chebyshev nodes of every panel, and their largest miss between."""
     angles = np.pi * (np.arange(NODES) + 0.5) / NODES
     middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
-    values = _numbers(motion, rubs, (middle[:, None] + half[:, None] * np.cos(angles)).ravel())
+    values = numbers(motion, rubs, (middle[:, None] + half[:, None] * np.cos(angles)).ravel(), motion.values)
     values = values.reshape(len(values), len(middle), NODES)
     cosines = np.cos(np.arange(NODES)[:, None] * angles[None])
     found = 2.0 / NODES * np.einsum("on,kpn->pok", cosines, values)
     found[:, 0] *= 0.5
     tried = np.array([-0.97, 0.03])
-    exact = _numbers(motion, rubs, (middle[:, None] + half[:, None] * tried).ravel())
+    exact = numbers(motion, rubs, (middle[:, None] + half[:, None] * tried).ravel(), motion.values)
     basis = np.cos(np.arange(NODES)[:, None] * np.arccos(tried)[None])
     miss = np.abs(np.einsum("ot,pok->kpt", basis, found).reshape(len(exact), -1) - exact)
-    scale = _scale(np.max(np.abs(values), axis=(1, 2)), len(rubs))
+    scale = scale_of(np.max(np.abs(values), axis=(1, 2)), len(rubs))
     worst = np.max(miss, axis=1) / np.where(scale > 0, scale, 1.0)
     return found, float(np.max(worst))
 
 
-def _scale(largest: Array, count: int) -> Array:
+def scale_of(largest: Array, count: int) -> Array:
     """What a miss of each number is measured by: its largest size, if that is no rounding beside others of its kind."""
     wide = FIXED + count
     size = 1 + (len(largest) - wide - count - POWERS) // wide
@@ -170,8 +183,8 @@ def _scale(largest: Array, count: int) -> Array:
 # ---- the numbers, from walks ----------------------------------------------------------------------------------
 
 
-def _lanes(motion: FreeMotion, q: Array, rate: float, second: float, gravity: bool) -> Forward:
-    values = dict(freed(motion.values, {motion.names[0]: (q, np.full_like(q, rate), np.full_like(q, second))}))
+def _lanes(motion: FreeMotion, values: Values, q: Array, rate: float, second: float, gravity: bool) -> Forward:
+    values = dict(freed(values, {motion.names[0]: (q, np.full_like(q, rate), np.full_like(q, second))}))
     if not gravity:
         values |= dict.fromkeys((f"gravity.{axis}" for axis in motion.system.axes), 0.0)
     return forward(motion.system, values, motion.assembly, np.zeros_like(q))
@@ -184,10 +197,10 @@ def _components(load: Any, reaction: Any) -> list[Any]:
     return list(load.felt(reaction))
 
 
-def _rubs(motion: FreeMotion) -> tuple[Rub, ...]:
+def rubs_of(motion: FreeMotion) -> tuple[Rub, ...]:
     """The contacts, with components and laws."""
     q = np.array([float(np.ravel(primal(motion.system.drive(motion.values, motion.names[0], 0.0)[0]))[0])])
-    walk, found, row = _lanes(motion, q, 1.0, 0.0, True), list[Rub](), 0
+    walk, found, row = _lanes(motion, motion.values, q, 1.0, 0.0, True), list[Rub](), 0
     zero = under(walk, {}).module_reactions
     for joint in rubbing(motion.system):
         law = law_of(motion.system, joint)
@@ -201,21 +214,24 @@ def _rubs(motion: FreeMotion) -> tuple[Rub, ...]:
     return tuple(found)
 
 
-def _numbers(motion: FreeMotion, rubs: Sequence[Rub], q: Array) -> Array:
-    """(number, coordinate): E and components by column, slips, then powers per speed and dampers' loss."""
-    at_rest, moving = _lanes(motion, q, 0.0, 0.0, True), _lanes(motion, q, 1.0, 0.0, False)
+def numbers(motion: FreeMotion, rubs: Sequence[Rub], q: Array, values: Values) -> Array:
+    """(number, …, coordinate): E and components by column, slips, then powers per speed and dampers' loss.
+
+    values: of the mechanism, or (sample, 1) where they vary; q then (sample, coordinate).
+    """
+    at_rest, moving = _lanes(motion, values, q, 0.0, 0.0, True), _lanes(motion, values, q, 1.0, 0.0, False)
     joints = dict.fromkeys(rub.joint for rub in rubs)
     contacts = [(joint, one) for joint in joints for one in motion.system.geometry.contacts(moving, joint)]
-    loads = [body_loads(_lanes(motion, q, 0.0, 1.0, False)), body_loads(moving)]
+    loads = [body_loads(_lanes(motion, values, q, 0.0, 1.0, False)), body_loads(moving)]
     static, powers = [], []
     for sense in (1.0, -1.0):
         stated, _, _ = stated_actions(at_rest, _senses(motion, moving, sense))
         static.append(_summed(at_rest, body_loads(at_rest), stated))
-        driven = _lanes(motion, q, sense * motion.unit[0] ** 0.5, 0.0, True)
+        driven = _lanes(motion, values, q, sense * motion.unit[0] ** 0.5, 0.0, True)
         powers.append(stated_actions(driven, {})[1] / (motion.unit[0] ** 0.5))
     fast, _, spring_power = stated_actions(moving, _senses(motion, moving, 1.0))
     slow, _, _ = stated_actions(at_rest, _senses(motion, moving, 1.0))
-    _, _, both = stated_actions(_lanes(motion, q, -1.0, 0.0, False), _senses(motion, moving, 1.0))
+    _, _, both = stated_actions(_lanes(motion, values, q, -1.0, 0.0, False), _senses(motion, moving, 1.0))
     loads += [_summed(at_rest, fast, slow, -1.0), *static]
     for joint, one in contacts:
         first, second = motion.system.joints[joint][1]

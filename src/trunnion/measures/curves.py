@@ -192,6 +192,11 @@ def locking_margin(measure: MotionRequest, back: Backward) -> tuple[Number, ...]
     return (margin,)
 
 
+def of_no_cycle(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
+    """None: a figure of a motion in time is no course over a cycle, see `dynamics.measured`."""
+    return (np.nan,)
+
+
 CURVES: dict[str, Course] = {
     "point": value,
     "path_error": place,
@@ -218,4 +223,5 @@ CURVES: dict[str, Course] = {
     "friction_energy": friction_energy,
     "efficiency": efficiency,
     "locking_margin": locking_margin,
+    **dict.fromkeys(("starting_time", "steady_speed", "fluctuation", "peak_effort"), of_no_cycle),
 }

@@ -42,7 +42,8 @@ class Measure:
     lower, upper: allowed signed deviations of the figure from that of the nominal mechanism; at_least, at_most: bounds
     of the figure itself.
     at, over: coordinate of the first driver, or time if `timed`; statistic: `as` of the model, "" for what the kind
-    itself makes of its course (`rule`); within: the band of a dwell.
+    itself makes of its course (`rule`); within: the band of a dwell; duration: of a
+    motion in time, s.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Measure:
     statistic: str = ""
     along: tuple[float, ...] = ()
     within: tuple[float, float] | None = None
+    duration: float | None = None
 
     @property
     def of(self) -> MeasureKind:
@@ -75,7 +77,12 @@ class Measure:
     @property
     def everywhere(self) -> bool:
         """Whether it is of every position: of none place or window, and no statistic."""
-        return self.at is None and self.over is None and not self.statistic
+        return self.at is None and self.over is None and not self.statistic and not self.in_time
+
+    @property
+    def in_time(self) -> bool:
+        """Whether it is of a motion in time: its figure has no course over a cycle."""
+        return self.of.in_time
 
     @property
     def of_motion(self) -> bool:
@@ -271,6 +278,7 @@ def _measure(name: str, stated: Stated, values: Values, mechanism: Mechanism) ->
         statistic=stated.statistic or "",
         along=numbers(*(f"along.{axis}" for axis in AXES)),
         within=(within[0], within[1]) if within else None,
+        duration=number("duration"),
     )  # fmt: skip
 
 

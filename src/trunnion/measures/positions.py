@@ -188,6 +188,8 @@ def _ends(run: Run, measure: Measure) -> tuple[float, ...]:
     if measure.of_place and not run.system.span(run.values, name).one_way:
         what = f"the figure is a coordinate of '{name}', which is not unique: it moves back and forth"
         raise MechanismError(Finding(what, where, "let it move in one direction, or measure something else"))
+    if measure.in_time:
+        return (0.0,)
     if measure.at is not None:
         return (_time(run, measure, measure.at, f"{where}.at"),)
     if measure.over is None:

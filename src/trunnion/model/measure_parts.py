@@ -71,6 +71,12 @@ class Measure(_Subject):
         default=None,
         description="the range of it, two coordinates of the first driver or two times; the whole motion if not given",
     )
+    duration: AnyQuantity | None = Field(
+        default=None,
+        description=(
+            "of a measure of a motion in time: how long it is followed from its start; ten cycles if not given"
+        ),
+    )
     limit: LimitText | None = Field(
         default=None,
         description=(

@@ -20,7 +20,8 @@ class MeasureKind:
 
     text: of its key in the file; long_name: for tables; quantity: what the course is, or both that it may be, where
     the joint, driver, load or spring turns and where it slides. of: what the key names (see `checks.measures`), or the
-    words that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is solved.
+    words that it takes. needs: `places` of the links, their `motion` too, or `forces`; only then friction is solved;
+    `simulation`: it is of the motion in time of a free driver and has no course over a cycle.
     rule: what makes the figure of the course if no statistic is stated, an entry of `measures.figures.RULES`;
     reduced: it is one number of a whole range already. against: whether the course is taken less that of the nominal
     mechanism, position by position. vector: whether `axis` or `along` picks one component: it `must` or `may`; in
@@ -31,7 +32,7 @@ class MeasureKind:
     long_name: str
     quantity: Kind | tuple[Kind, Kind]
     of: str | tuple[str, ...]
-    needs: Literal["places", "motion", "forces"] = "places"
+    needs: Literal["places", "motion", "forces", "simulation"] = "places"
     rule: str = "deviation"
     against: bool = False
     reduced: bool = False
@@ -47,6 +48,11 @@ class MeasureKind:
     def of_forces(self) -> bool:
         """Whether it needs more than the motion."""
         return self.needs == "forces"
+
+    @property
+    def in_time(self) -> bool:
+        """Whether it is of a motion in time."""
+        return self.needs == "simulation"
 
     @property
     def at_rest(self) -> bool:
@@ -173,5 +179,21 @@ MEASURES: dict[str, MeasureKind] = {
     "locking_margin": MeasureKind(
         "of the `mechanism`: the multiple of its friction at which it locks", "locking margin", NUMBER,
         ("mechanism",), "forces", rule="minimum",
+    ),
+    "starting_time": MeasureKind(
+        "free driver whose starting time is measured: when the mean speed of a turn is 95 % of the steady one",
+        "starting time of a driver", KINDS["time"], "free driver", "simulation", rule="value", reduced=True,
+    ),
+    "steady_speed": MeasureKind(
+        "free driver whose steady speed is measured, the mean of its last turn", "steady speed of a driver", SPIN,
+        "free driver", "simulation", rule="value", reduced=True,
+    ),
+    "fluctuation": MeasureKind(
+        "free driver whose coefficient of fluctuation is measured, (largest − smallest speed)/mean of its last turn",
+        "coefficient of fluctuation of a driver", NUMBER, "free driver", "simulation", rule="value", reduced=True,
+    ),
+    "peak_effort": MeasureKind(
+        "free driver whose largest effort in its motion in time is measured, its magnitude",
+        "largest effort of a driver in time", EFFORT, "free driver", "simulation", rule="value", reduced=True,
     ),
 }  # fmt: skip

@@ -298,6 +298,8 @@ def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:
     measure = mechanism.measures[name]
     if entry.location[2] == "along":
         return entry.kind
+    if entry.location[2] == "duration":
+        return KINDS["time"]
     if entry.location[2] == "within":
         return course_kind(mechanism, measure)
     if entry.location[2] not in ("at", "over") and not is_place(measure):

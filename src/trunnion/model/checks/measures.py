@@ -34,6 +34,7 @@ def subjects(mechanism: Numbers, of: str | tuple[str, ...]) -> list[str]:
         "joint": [name for name, joint in mechanism.effective_joints.items() if motions(joint.type)],
         "any joint": list(mechanism.effective_joints),
         "driver": list(mechanism.drivers),
+        "free driver": [name for name, driver in mechanism.drivers.items() if driver.found],
         "load on a joint": loads,
         "spring": list(mechanism.springs),
         "driver or load": list(dict.fromkeys([*mechanism.drivers, *mechanism.loads])),
@@ -114,6 +115,11 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
     """Whether the position, the range and the figure that are asked for go together."""
     figure, subject = measure.statistic, measure.kind
     yield from _band(measure, where)
+    in_time = bool(measure.kind) and MEASURES[measure.kind].in_time
+    if measure.duration is not None and not in_time:
+        yield Finding("a duration is of a motion in time", f"{where}.duration", "remove it")
+    if in_time and measure.over is not None:
+        yield Finding(f"the {subject} is of the whole motion", f"{where}.over", "remove it, or state a duration")
     if measure.at is not None and measure.over is not None:
         yield Finding("states both a position and a range", where, "keep at: … or over: …")
     if (measure.at is not None or measure.over is not None) and not mechanism.drivers:
@@ -150,6 +156,8 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
         if lower > upper:
             what = f"the lower limit {lower:g} is above the upper one {upper:g} (SI)"
             yield Finding(what, f"{where}.limit", "write ± before a number that is not negative")
+        if value("duration") <= 0:
+            yield Finding(f"a duration of {value('duration'):g} s", f"{where}.duration", "give a time above 0")
         least, most = value("at_least"), value("at_most")
         if least > most:
             yield Finding(f"at least {least:g} and at most {most:g} (SI)", f"{where}.at_least", "exchange them")

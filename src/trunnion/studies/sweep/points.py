@@ -25,6 +25,7 @@ from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.cycle.summary import model_notes
 from trunnion.cycle.written import CONDITIONS
+from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import figures_of
 from trunnion.model.checks.values import check_values
@@ -128,7 +129,11 @@ class Points:
         """Figures of measures at a point."""
         with named(self.swept, index):
             run = self._prepared(index) if any(index) else self.run
-            return figures_of(run, measures_of(run, names), self.steps, self.method)
+            found = measures_of(run, names)
+            timed = courses_in_time(run, found, run.values, (1,))
+            of_cycle = [one for one in found if not one.in_time]
+            figures = figures_of(run, of_cycle, self.steps, self.method) if of_cycle else {}
+            return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
 
     def _reduced(self, arrays: Mapping[str, Array], means: Means, ideal: Means | None) -> Reduced:
         wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}

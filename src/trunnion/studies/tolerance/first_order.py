@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.cycle.positions import check_steps
+from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference
@@ -53,7 +54,7 @@ class ToleranceStudy:
 
     @cached_property
     def kernel(self) -> NumpyKernel:
-        return NumpyKernel(self.run, self.measures, self.friction)
+        return MotionKernel(self.run, self.measures, self.friction)
 
     @cached_property
     def effects(self) -> Effects:

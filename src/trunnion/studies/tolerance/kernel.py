@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import Courses, NumpyKernel, where_known
 from trunnion.measures.figures import Reference, known, reference
@@ -90,7 +91,7 @@ def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], co
     """The engine by its name; of auto the compiled one where it is installed, pays, and can take the mechanism."""
     if engine != "auto":
         return engine
-    if not pays(configurations, WORTH_COMPILING):
+    if not pays(configurations, WORTH_COMPILING) or any(measure.in_time for measure in numpy.measures):
         return "numpy"
     try:
         OtherKernel(numpy, "compiled").check(values)
@@ -106,9 +107,13 @@ def batch_of(engine: str, positions: int) -> int:
 
 def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod) -> Kernel:
     """The kernel of an engine by its name. Raises MechanismError if there is none, or its package is missing."""
-    numpy = NumpyKernel(run, measures, friction)
+    numpy = MotionKernel(run, measures, friction)
     if engine == "numpy":
         return numpy
+    timed = next((measure.name for measure in measures if measure.in_time), None)
+    if timed is not None:
+        what = f"the measure '{timed}' is of a motion in time"
+        raise MechanismError(Finding(what, "engine", "use numpy, which has motions in time, or auto"))
     if engine in AT_ONCE:
         return OtherKernel(numpy, engine)
     raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(AT_ONCE)}"))

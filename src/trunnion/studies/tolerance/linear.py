@@ -9,7 +9,7 @@ the direction of the largest scatter, of a peak-to-peak deviation between the tw
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +115,7 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
         lead = slope[:, _top(curve_total[1])]
     else:
         place, (whole, steep) = -1, effects.slopes(figure(course, known), ())
-        place = 0 if measure.rule == "value" else -1
+        place = 0 if measure.rule == "value" and not measure.in_time else -1
         steep = np.where(np.isfinite(whole), steep, np.nan)  # of what does not exist
     steep = effects.without_noise(steep)
     spread = effects.spread(steep)
@@ -199,7 +199,7 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
     Of a figure over all positions: the least and the largest deviation of the course from nominal anywhere.
     """
     plan, known = found.plan, of.reference
-    alone = NumpyKernel(kernel.run, [of.measure], kernel.friction)
+    alone = replace(kernel, measures=[of.measure])
 
     def ends(sign: float) -> Corner:
         def objective(values: Mapping[str, Number], effects: Effects) -> tuple[Array, Array]:

@@ -15,8 +15,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Status
-from trunnion.measures.evaluation import Courses, NumpyKernel
+from trunnion.measures.evaluation import Courses
 from trunnion.measures.figures import Reference, judged
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan, plan
@@ -39,6 +40,7 @@ METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
 BATCHES = 8  # of the kernel in a block, so that summing up costs little beside the analysis
 MOST = 2048  # samples in a block, so that few of them show how figures converge
+MOTIONS = 480  # the same of motions in time, each of which takes as long as a cycle of many positions
 REPLICATES = 8  # independent scramblings, whose spread is the error
 CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
 BAND = {"fineness": 4, "octaves": 8}  # of the histograms at every position
@@ -134,6 +136,8 @@ class Sampling:
     @property
     def drawing(self) -> int:
         """Samples whose random numbers are drawn together: the same by any engine."""
+        if any(measure.in_time for measure in self.measures):
+            return MOTIONS
         return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
 
     @cached_property
@@ -204,7 +208,7 @@ class Sampling:
         run = prepare(Mechanism(**self.model))
         places = plan(run, self.measures, self.steps)
         inputs = inputs_of(run)
-        known = references(NumpyKernel(run, self.measures, self.friction), places, inputs)
+        known = references(MotionKernel(run, self.measures, self.friction), places, inputs)
         return Sampler(self, inputs, places, kernel_of(self.engine, run, self.measures, self.friction), known)
 
 

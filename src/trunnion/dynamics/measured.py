@@ -1,0 +1,118 @@
+"""Measures of a motion in time: starting time, steady speed, coefficient of fluctuation, largest effort.
+
+They have no course over a cycle. Of dual numbers the derivatives are central differences of the motions themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.namespace import Number
+from trunnion.dynamics.batch import figures_in_time
+from trunnion.measures.evaluation import Courses, NumpyKernel, shape_of
+from trunnion.measures.measures import Measure
+from trunnion.solve.run import Run
+
+__all__ = ["MotionKernel", "courses_in_time"]
+
+Array = NDArray[np.float64]
+
+STEP = 1e-3  # of a number, by which differences are taken
+STEP_OF_NONE = 1e-5  # of the mechanism's size, or of a radian: the step of a number that is 0
+FEW, KEPT = 256, 64  # samples of which figures are kept, and how many of them
+
+
+class MotionKernel(NumpyKernel):
+    """The analysis, with the figures of motions in time."""
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
+        """As `NumpyKernel.courses`; a measure of a motion in time is one number a sample."""
+        found, status = super().courses(values, time)
+        return found | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
+
+
+def courses_in_time(
+    run: Run, measures: Iterable[Measure], values: Mapping[str, Number], shape: tuple[int, ...]
+) -> dict[str, tuple[Number, ...]]:
+    """Those measures that are of a motion in time, by name: one number a sample, to broadcast to the shape."""
+    found: dict[str, tuple[Number, ...]] = {}
+    known: dict[tuple[str, float | None], dict[str, Number]] = {}
+    for measure in measures:
+        if not measure.in_time:
+            continue
+        motion = measure.subject, measure.duration
+        if motion not in known:
+            known[motion] = _figures(run, *motion, values, shape)
+        found[measure.name] = (known[motion][measure.kind],)
+    return found
+
+
+def _figures(
+    run: Run, driver: str, duration: float | None, values: Mapping[str, Number], shape: tuple[int, ...]
+) -> dict[str, Number]:
+    count = shape[0] if len(shape) == 2 else 1
+    dual = {path: value for path, value in values.items() if isinstance(value, Dual)}
+    own = {path: _column(primal(value), count) for path, value in values.items()}
+    column = (count, 1) if len(shape) == 2 else (1,)
+    if not dual:
+        figures = _known(run, driver, own, count, duration)
+        return {name: figure.reshape(column) for name, figure in figures.items()}
+    slopes = {path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1)) for path, value in dual.items()}
+    step = _steps(run, own, slopes)
+    moved = np.flatnonzero(np.any(np.array(list(slopes.values())) != 0.0, axis=(0, 2)))
+    tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in own.items()}
+    figures = _known(run, driver, tried, count + 2 * len(moved), duration)
+    found: dict[str, Number] = {}
+    for name, figure in figures.items():
+        change = np.zeros(count)
+        above, below = figure[count:].reshape(2, -1)
+        change[moved] = (above - below) / (2.0 * step[moved, 0])
+        found[name] = Dual(figure[:count].reshape(column), change.reshape(column))
+    return found
+
+
+def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, duration: float | None) -> dict[str, Array]:
+    """`figures_in_time`; those of few samples are kept, as a search asks for the same ones measure by measure."""
+    if count > FEW:
+        return figures_in_time(run, driver, values, count, duration)
+    kept: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
+    numbers = tuple((path, np.asarray(value, float).tobytes()) for path, value in values.items())
+    what = driver, duration, count, numbers
+    if what not in kept:
+        if len(kept) >= KEPT:
+            kept.clear()
+        kept[what] = figures_in_time(run, driver, values, count, duration)
+    return kept[what]
+
+
+def _column(value: Number, count: int) -> Number:
+    """A number of every sample, (sample, 1), or of all."""
+    if not np.ndim(value):
+        return value
+    return np.broadcast_to(np.asarray(value, float), (count, 1)) if np.size(value) > 1 else float(np.ravel(value)[0])
+
+
+def _steps(run: Run, own: Mapping[str, Number], slopes: Mapping[str, Array]) -> Array:
+    """By how much each row is moved along its derivatives, (row, 1)."""
+    with np.errstate(all="ignore"):
+        sizes = np.array([np.abs(own[path] / np.where(slope == 0.0, np.nan, slope)) for path, slope in slopes.items()])
+        sizes[sizes == 0.0] = np.nan
+    size = float(np.ravel(run.system.size(run.values))[0])
+    found = np.full(sizes.shape[1:], STEP_OF_NONE * size)
+    known = np.any(np.isfinite(sizes), axis=0)
+    found[known] = STEP * np.nanmedian(np.where(np.isfinite(sizes), sizes, np.nan)[:, known], axis=0)
+    return found
+
+
+def _tried(value: Number, slope: Array | None, step: Array, moved: NDArray[np.intp]) -> Number:
+    """A number of every row, and of those moved up and down."""
+    if slope is None and not np.ndim(value):
+        return value
+    whole = np.broadcast_to(value, step.shape)
+    change = np.zeros_like(whole[moved]) if slope is None else (slope * step)[moved]
+    return np.concatenate([whole, whole[moved] + change, whole[moved] - change])

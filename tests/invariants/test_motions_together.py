@@ -1,0 +1,250 @@
+"""Motions of many mechanisms at once are those of each by itself, however many there are and whatever they do."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from timed import LINEAR, slider_crank, wheel
+from trunnion.dynamics import batch
+from trunnion.dynamics.batch import figures_in_time, together
+from trunnion.dynamics.course import FIGURES, Courses
+from trunnion.dynamics.lanes import picked_drive
+from trunnion.dynamics.sampled import picked, sampled_tables, tabulates
+from trunnion.dynamics.start import places
+from trunnion.dynamics.starts import DONE, ENDED, LEFT, Starts
+from trunnion.dynamics.state import FreeMotion
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import Run, prepare
+
+AGREED = 1e-6  # relative, with the tolerance that figures are asked with
+
+
+def spread(mechanism: Mechanism, count: int, seed: int = 1, **numbers: float) -> dict[str, Any]:
+    """Numbers that scatter by a share of themselves, (sample, 1)."""
+    draw, nominal = np.random.default_rng(seed), mechanism.parameters()
+    paths = {name.replace("__", "."): share for name, share in numbers.items()}
+    moved = {path: nominal[path] * (1 + share * draw.uniform(-1, 1, (count, 1))) for path, share in paths.items()}
+    return dict(mechanism.parameters(moved))
+
+
+def courses_of(run: Run, values: dict[str, Any], count: int, duration: float, tolerance: float) -> tuple[Courses, Any]:
+    """The courses of one batch and its lanes' statuses."""
+    motion = FreeMotion.of(run)
+    nominal = tabulates(motion, places(motion))
+    assert nominal is not None
+    with np.errstate(all="ignore"):
+        (tables,) = sampled_tables(nominal, values, count)
+        drive, begin = batch._drive(motion, values), batch._begin(motion, values, count)
+        assert drive is not None
+        drive = picked_drive(drive, tables.samples)
+        sticks = bool(motion.sticking)
+        starts = Starts(tables, drive, begin, duration, tolerance, float(motion.unit[0]), 1.0, sticks)
+        return starts.run(), starts.status
+
+
+def alone(run: Run, values: dict[str, Any], i: int, duration: float) -> dict[str, float]:
+    with np.errstate(all="ignore"):
+        return batch._alone(run, run.system.plan.modules[0].driven[0], picked(values, i), duration, 1e-10)
+
+
+# ---- closed forms ---------------------------------------------------------------------------------------------
+
+
+def test_flywheels_with_inertias_of_their_own() -> None:
+    """J ω̇ = 4 (1 − ω/150) − 0.6: ω = 127.5 (1 − e^(−t/τ)), τ = J 150/4, of every sample."""
+    mechanism = wheel(LINEAR)
+    run, count = prepare(mechanism), 9
+    inertia = 0.05 * np.linspace(0.5, 2.0, count)[:, None]
+    values = dict(mechanism.parameters({"links.wheel.inertia": inertia}))
+    course, status = courses_of(run, values, count, 1.0, 1e-11)
+    assert np.all(status == DONE)
+    tau = inertia[:, 0] * 150 / 4
+    np.testing.assert_allclose(course.numbers[2, :, -1, -1], 127.5 * (1 - np.exp(-1 / tau)), rtol=1e-10)
+    gone = 127.5 * (1 - tau * (1 - np.exp(-1 / tau)))
+    np.testing.assert_allclose(course.gone, gone, rtol=1e-10)
+    figures = figures_in_time(run, "A", values, count, 12.0)
+    np.testing.assert_allclose(figures["peak_effort"], 4.0, rtol=1e-7)  # as it starts
+    turn, whole = 2 * np.pi, 127.5 * (12.0 - tau * (1 - np.exp(-12.0 / tau)))
+    np.testing.assert_allclose(figures["steady_speed"], turn / (12.0 - _time(whole - turn, tau)), rtol=1e-7)
+    time = figures["starting_time"]
+    angle = 127.5 * (time - tau * (1 - np.exp(-time / tau)))
+    mean = turn / (time - _time(angle - turn, tau))
+    np.testing.assert_allclose(mean, 0.95 * figures["steady_speed"], rtol=1e-7)
+
+
+def _time(angle: Any, tau: Any) -> Any:
+    """When the flywheel has turned so far, s."""
+    time = np.ones_like(angle)
+    for _ in range(50):
+        off = 127.5 * (time - tau * (1 - np.exp(-time / tau))) - angle
+        time = time - off / (127.5 * (1 - np.exp(-time / tau)))
+    return time
+
+
+def test_the_flywheel_of_the_theory() -> None:
+    """The values of `test_motion_in_time`, in one lane beside others."""
+    mechanism = wheel(LINEAR)
+    values = dict(mechanism.parameters({"links.wheel.inertia": np.array([[0.04], [0.05], [0.06]])}))
+    course, _ = courses_of(prepare(mechanism), values, 3, 1.0, 1e-12)
+    assert course.numbers[2, 1, -1, -1] == pytest.approx(52.70260701247094, rel=1e-11)
+
+
+@pytest.mark.slow
+def test_run_down_of_every_sample() -> None:
+    """From 127.5 rad/s with 0.6 N m of drag: at rest after 127.5 J/0.6, and no figure of a steady motion."""
+    mechanism = wheel(initial={"speed": 127.5})
+    run, inertia = prepare(mechanism), np.array([[0.03], [0.05], [0.08]])
+    values = dict(mechanism.parameters({"links.wheel.inertia": inertia}))
+    course, status = courses_of(run, values, 3, 30.0, 1e-10)
+    assert np.all(status == DONE)
+    stops = 127.5 * inertia[:, 0] / 0.6
+    np.testing.assert_allclose(course.gone, 0.5 * 127.5 * stops, rtol=1e-9)
+    for lane, stop in enumerate(stops):
+        still = course.numbers[2, lane] == 0.0
+        assert np.min(course.numbers[0, lane][still]) == pytest.approx(stop, rel=1e-9)
+    figures = figures_in_time(run, "A", values, 3, 30.0)
+    assert all(np.all(np.isnan(figures[name])) for name in ("starting_time", "steady_speed", "fluctuation"))
+
+
+# ---- against each by itself -----------------------------------------------------------------------------------
+
+MOTORS: dict[str, dict[str, Any]] = {
+    "linear": {"kind": "linear", "stall_effort": 8, "no_load_speed": 157, "inertia": 1e-3},
+    "geared": {
+        "kind": "induction", "breakdown_effort": 5, "breakdown_slip": 0.3, "synchronous_speed": 300, "ratio": 2,
+        "efficiency": 0.9, "inertia": 5e-4,
+    },
+    "controlled": {"kind": "speed-control", "target": 90, "proportional": 0.3, "integral": 0.5, "limit": 8},
+    "table": {"kind": "table", "points": [[0, 9], [80, 7], [160, 0]]},
+    "switched off": {"kind": "constant", "effort": 6, "off_from": 0.5, "brake": 2, "brake_from": 0.6},
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MOTORS)
+def test_together_as_each_by_itself(name: str) -> None:
+    """Every kind of motor on a slider-crank with friction and a load that resists."""
+    mechanism = slider_crank(0.05, drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS[name]}})
+    run = prepare(mechanism)
+    assert together(run)
+    varied = {"links__crank__points__P__x": 0.01, "links__piston__mass": 0.05, "links__crank__inertia": 0.05}
+    values = spread(mechanism, 2, **varied, joints__P__friction__coefficient=0.1)
+    found = figures_in_time(run, "O", values, 2, 0.7)
+    for i in range(2):
+        for key, expected in alone(run, values, i, 0.7).items():
+            np.testing.assert_allclose(found[key][i], expected, rtol=AGREED, err_msg=f"{key} of {i}")
+    assert np.all(np.isfinite(found["peak_effort"]))
+    if name == "geared":
+        assert np.all(np.isfinite(found["steady_speed"]))
+
+
+@pytest.mark.slow
+def test_how_many_are_together_changes_nothing() -> None:
+    mechanism = slider_crank(0.1)
+    run = prepare(mechanism)
+    varied = {"links__crank__points__P__x": 0.01, "links__rod__points__Q__x": 0.01}
+    values = spread(mechanism, 30, **varied)
+    whole = figures_in_time(run, "O", values, 30, 0.3)
+    part = figures_in_time(run, "O", picked(values, np.arange(22, 27)), 5, 0.3)
+    for name in FIGURES:
+        np.testing.assert_array_equal(part[name], whole[name][22:27], err_msg=name)
+
+
+# ---- those that do not start ----------------------------------------------------------------------------------
+
+
+def test_samples_that_do_not_start_have_no_starting_time() -> None:
+    """A constant torque below the drag does not start; its effort is what acts on it all the same."""
+    mechanism = wheel({"kind": "constant", "effort": 1.0})
+    run = prepare(mechanism)
+    torque = np.array([[0.5], [0.59], [0.61], [5.0]])
+    values = dict(mechanism.parameters({"drivers.A.motor.effort": torque}))
+    course, status = courses_of(run, values, 4, 2.0, 1e-9)
+    assert np.all(status == DONE)
+    np.testing.assert_array_equal(course.gone > 0, [False, False, True, True])
+    np.testing.assert_allclose(course.gone, np.maximum(0.0, torque[:, 0] - 0.6) / 0.05 * 2.0, rtol=1e-9)
+    figures = figures_in_time(run, "A", values, 4, 2.0)
+    np.testing.assert_allclose(figures["peak_effort"], torque[:, 0], rtol=1e-9)
+    assert np.all(np.isnan(figures["starting_time"][:2]))
+
+
+def test_a_press_that_is_too_weak_stalls_where_it_does_by_itself() -> None:
+    """Under a load with a torque that gets it over, or not."""
+    load = {"work": {"joint": "S", "resisting_force": "900 N * between(drive, 0.6, 1.2)"}}
+    motor = {"kind": "constant", "effort": 6.0}
+    mechanism = slider_crank(0.1, loads=load, drivers={"O": {"speed": 100, "start": 0.2, "motor": motor}})
+    run = prepare(mechanism)
+    values = dict(mechanism.parameters({"drivers.O.motor.effort": np.array([[6.0], [60.0]])}))
+    course, status = courses_of(run, values, 2, 0.1, 1e-10)
+    assert np.all(status == DONE)
+    gone = [trunnion_gone(mechanism, effort) for effort in (6.0, 60.0)]
+    np.testing.assert_allclose(course.gone, gone, rtol=1e-8)
+    assert course.numbers[2, 0, -1, -1] == 0.0
+
+
+def trunnion_gone(mechanism: Mechanism, effort: float) -> float:
+    import trunnion
+
+    found = trunnion.simulate(mechanism.with_values({"O.motor.effort": effort}), 0.1, 10, 1e-11)
+    turned = found["drive_coordinate"].values[0]
+    return float(turned[-1] - turned[0])
+
+
+@pytest.mark.slow
+def test_what_is_not_certain_is_left_to_each_by_itself() -> None:
+    """Much friction: no bound shows that there is one solution, and walks decide, as they do by themselves."""
+    mechanism = slider_crank(0.8)
+    run = prepare(mechanism)
+    values = spread(mechanism, 2, links__piston__mass=0.05)
+    _, status = courses_of(run, values, 2, 0.05, 1e-9)
+    assert np.all(status == LEFT)
+    found = figures_in_time(run, "O", values, 2, 0.05)
+    for i in range(2):
+        np.testing.assert_allclose(found["peak_effort"][i], alone(run, values, i, 0.05)["peak_effort"], rtol=AGREED)
+
+
+def test_bristles_are_not_tabulated() -> None:
+    bristles = {"law": "dahl", "coefficient": 0.1, "stiffness": 1e5}
+    assert not together(prepare(slider_crank(bristles)))
+
+
+def test_the_end_of_a_range_ends_a_motion() -> None:
+    mechanism = slider_crank(0.05, drivers={"O": {"speed": 10, "range": [0.3, 1.2], "motor": MOTORS["linear"]}})
+    run = prepare(mechanism)
+    values = spread(mechanism, 3, links__piston__mass=0.1)
+    course, status = courses_of(run, values, 3, 2.0, 1e-9)
+    assert np.all(status == ENDED)
+    np.testing.assert_allclose(course.numbers[1, :, -1, -1], 1.2, rtol=1e-12)
+    assert all(np.all(np.isnan(one)) for one in figures_in_time(run, "O", values, 3, 2.0).values())
+    outside = {**values, "drivers.O.initial.coordinate": 2.0}
+    assert all(np.all(np.isnan(one)) for one in figures_in_time(run, "O", outside, 3, 2.0).values())
+
+
+# ---- courses --------------------------------------------------------------------------------------------------
+
+
+def test_a_course_finds_times_and_extremes() -> None:
+    """q = 20 t − cos 20 t/20: of two steps, the mean speed is 20 and the speed 20 + sin 20 t."""
+    from trunnion.dynamics.course import NODES
+
+    ends = np.linspace(0.0, 2.0, 81)
+    steps = []
+    for low, high in itertools.pairwise(ends):
+        time = low + (high - low) * NODES
+        numbers = np.array([time, 20 * time - np.cos(20 * time) / 20, 20 + np.sin(20 * time), 3 + np.cos(20 * time)])
+        steps.append((np.zeros(1, np.intp), numbers[:, None]))
+    figures = Courses.of(1, steps).figures()
+    assert figures["steady_speed"][0] == pytest.approx(20.0, rel=3e-3)
+    assert figures["fluctuation"][0] == pytest.approx(2.0 / figures["steady_speed"][0], rel=1e-7)
+    assert figures["peak_effort"][0] == pytest.approx(4.0, rel=1e-7)
+    assert np.isnan(figures["starting_time"][0])  # it is at speed as it begins
+
+
+def test_every_figure_is_a_measure() -> None:
+    from trunnion.model.measure_table import MEASURES
+
+    assert set(FIGURES) == {name for name, one in MEASURES.items() if one.in_time}

@@ -141,7 +141,7 @@ class SteppedMotion(ContactMotion):
             onsets[k] = Closed(None, normal / step, tangent / step)
             one = self._open.get(k)
             if one is None:
-                one = self._open[k] = OpenContact(time, max(-float(before[k]), 0.0))
+                one = self._open[k] = OpenContact(time, max(-float(before[k]), 0.0), np.nan)
                 self._say(time, "impact", k, one.approach)
             slip = 0.5 * (abs(before[self.count + k]) + abs(struck.after[len(places) + i]))
             one.impulse += float(normal)

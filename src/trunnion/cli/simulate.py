@@ -37,6 +37,14 @@ def simulate(
     ] = None,
     steps: Annotated[int, typer.Option("--steps", help="Equal intervals of time in the result.")] = 1000,
     tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
+    impact_step: Annotated[
+        str | None,
+        typer.Option(
+            "--impact-step",
+            help="Step through the impacts of rigid bodies, as 1us, instead of following each.",
+            show_default=False,
+        ),
+    ] = None,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -59,7 +67,7 @@ def simulate(
     from trunnion.dynamics.simulate import simulated
 
     check_files(out or [], report, of="motion", kind=kind if out else None)
-    duration = seconds(time, "--time", "2s")
+    duration, step = seconds(time, "--time", "2s"), seconds(impact_step, "--impact-step", "1us")
     mechanism = stated(file, set_, table, friction)
     with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
 
@@ -67,5 +75,5 @@ def simulate(
             if progress:
                 progress(int(reached * MILLISECOND))
 
-        result = simulated(mechanism, duration, steps, tolerance, told)
+        result = simulated(mechanism, duration, steps, tolerance, told, step)
     Shown(result, file, ["drivers"], out or [], report, units_row, drawn={"kind": kind}, units=units).finish()

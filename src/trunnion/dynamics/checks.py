@@ -76,10 +76,21 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         remedy = "state a mass or an inertia of a link that it moves, or the inertia of its motor"
         yield Finding("no mass moves with it, so it has no acceleration", f"drivers.{free[0]}", remedy)
     playing = in_play(mechanism)
+    yield from _unlike(mechanism, playing)
     if len(free) < 2 and not playing:
         return
     why = f"with {', '.join(playing)} in play" if playing else f"with {len(free)} free drivers"
     yield from _sticking(mechanism, free, playing, why)
+
+
+def _unlike(mechanism: Mechanism, playing: list[str]) -> Iterator[Finding]:
+    """Contacts of rigid bodies beside others."""
+    rigid = {name: mechanism.effective_joints[name].contact for name in playing}
+    stiff = [name for name, contact in rigid.items() if contact is not None and contact.of.rigid]
+    if stiff and len(stiff) < len(playing):
+        other = next(name for name in playing if name not in stiff)
+        what = f"{stiff[0]} is in play between rigid bodies, and {other} is not"
+        yield Finding(what, f"joints.{other}.contact.law", "use law: rigid for all joints in play, or for none")
 
 
 def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: str) -> Iterator[Finding]:
@@ -100,9 +111,11 @@ def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: st
     plain = [name for name in smooth if FRICTION_LAWS[name].relaxation is None]
     for name, joint in mechanism.effective_joints.items():
         law = joint.friction.law if joint.friction else None
-        if law and name in playing and law not in plain:
-            what = f"the law {law} is not one of a contact that comes and goes"
-            yield Finding(what, f"joints.{name}.friction", f"use {' or '.join(plain)}")
+        may = ["coulomb"] if joint.contact and joint.contact.of.rigid else plain
+        if law and name in playing:
+            if law not in may:
+                what = f"the law {law} is not one of a contact that comes and goes"
+                yield Finding(what, f"joints.{name}.friction", f"use {' or '.join(may)}")
         elif law and FRICTION_LAWS[law].interval_at_rest:
             what = f"the law {law} lets a joint stick, and {one_by_one}"
             yield Finding(what, f"joints.{name}.friction", f"use a law that is smooth at rest: {', '.join(smooth)}")

@@ -12,14 +12,15 @@ from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import OdeSolver
 from scipy.optimize import brentq
 
 from trunnion.dynamics.integrate import Event, Integration, Stretch
 from trunnion.dynamics.rates import Seeing, Seen
 from trunnion.dynamics.state import Moment
-from trunnion.dynamics.touching import FIRST, SLOWEST
+from trunnion.dynamics.touching import FIRST, SLOWEST, Onset
 
-__all__ = ["ContactMotion", "Impact"]
+__all__ = ["ContactMotion", "Impact", "OpenContact"]
 
 Array = NDArray[np.float64]
 Rate = Callable[[float, Array], Array]
@@ -33,7 +34,7 @@ MOST_CONTACTS = 100_000
 
 class Impact(NamedTuple):
     """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
-    separation, m/s, largest normal force, N, and penetration, m, and the wear index ∫ |F| |slip| dt, J."""
+    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s."""
 
     label: str
     begin: float
@@ -43,10 +44,11 @@ class Impact(NamedTuple):
     force: float
     depth: float
     wear: float
+    impulse: float
 
 
 @dataclass
-class _Open:
+class OpenContact:
     """A contact that lasts: its onset, and what it has come to so far. last: forces at the last looks."""
 
     begin: float
@@ -54,6 +56,8 @@ class _Open:
     force: float = 0.0
     depth: float = 0.0
     wear: float = 0.0
+    impulse: float = 0.0
+    separation: float = 0.0
 
 
 class Crossing(NamedTuple):
@@ -76,8 +80,8 @@ class ContactMotion(Integration):
         super().__post_init__()
         each = self.motion.contacts.each
         self.seeing = cast("Seeing", self.dynamics)
-        self.onsets: tuple[float | None, ...] = (None,) * len(each)
-        self._open: dict[int, _Open] = {}
+        self.onsets: tuple[Onset, ...] = (None,) * len(each)
+        self._open: dict[int, OpenContact] = {}
         self._clearance = self.motion.contacts.least_clearance
 
     def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
@@ -104,6 +108,7 @@ class ContactMotion(Integration):
             self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
             self._follow(end, found, sense, now)
+            self._held(solver, found)
             if crossing is not None:
                 ahead = self._changed(crossing, found)
                 return end, found, min(ahead, float(solver.step_size or np.inf))
@@ -121,6 +126,9 @@ class ContactMotion(Integration):
             return found
 
         return rate
+
+    def _held(self, solver: OdeSolver, row: Array) -> None:
+        """What else a step may need at its end."""
 
     # ---- gaps -------------------------------------------------------------------------------------------------
 
@@ -162,15 +170,17 @@ class ContactMotion(Integration):
         k, time = crossing
         label = self.motion.contacts.labels[k]
         rate = float(self._look(lambda times: row[:, None], np.array([time])).rate[k, 0])
-        onsets: list[float | None] = list(self.onsets)
+        onsets: list[Onset] = list(self.onsets)
         if onsets[k] is None:
             onsets[k] = max(-rate, SLOWEST)
-            self._open[k] = _Open(time, max(-rate, 0.0))
+            self._open[k] = OpenContact(time, max(-rate, 0.0))
             self.solution.events.append(Event(time, "impact", label, -rate, "m/s"))
         else:
             onsets[k] = None
             one = self._open.pop(k)
-            self.impacts.append(Impact(label, one.begin, time, one.approach, rate, one.force, one.depth, one.wear))
+            self.impacts.append(
+                Impact(label, one.begin, time, one.approach, rate, one.force, one.depth, one.wear, one.impulse)
+            )
             self.solution.events.append(Event(time, "lift-off", label, rate, "m/s"))
         self.onsets = tuple(onsets)
         return FIRST * self._clearance / max(abs(rate), SLOWEST)
@@ -184,6 +194,7 @@ class ContactMotion(Integration):
         times = np.append(begin, times)
         seen = self._look(dense, times)
         for k, one in self._open.items():
+            one.impulse += float(np.trapezoid(seen.normal[k], times))
             one.wear += float(np.trapezoid(np.abs(seen.normal[k] * seen.slip[k]), times))
             one.force = max(one.force, self._largest(dense, times, seen.normal[k], k, 1))
             one.depth = max(one.depth, self._largest(dense, times, -seen.gap[k], k, -1))
@@ -201,7 +212,7 @@ class ContactMotion(Integration):
         """All contacts, those that last at the end with an end that is not known."""
         last = [
             Impact(self.motion.contacts.labels[k], one.begin, np.nan, one.approach, np.nan, one.force, one.depth,
-                   one.wear)
+                   one.wear, one.impulse)
             for k, one in self._open.items()
         ]  # fmt: skip
         return sorted([*self.impacts, *last], key=lambda one: one.begin)

@@ -25,6 +25,7 @@ from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Dynamics, Layout
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
@@ -64,7 +65,7 @@ class Stretch(NamedTuple):
     resting: bool
     now: float
     snapshot: Snapshot | None = None
-    onsets: tuple[float | None, ...] = ()
+    onsets: tuple[Onset, ...] = ()
 
 
 class Passing(NamedTuple):
@@ -84,13 +85,18 @@ class Ended(NamedTuple):
 
 @dataclass
 class Solution:
-    """What an integration found: stretches one after the other, events, and why it ended early, if it did."""
+    """What an integration found: stretches one after the other, events, and why it ended early, if it did.
+
+    notes: figures of findings by their code; stepped: whether some of it is stepped, to the first order.
+    """
 
     layout: Layout
     stretches: list[Stretch] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     ended: Ended | None = None
     asked: int = 0
+    notes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    stepped: bool = False
 
     @property
     def end(self) -> float:
@@ -102,6 +108,8 @@ class Solution:
         found = np.full((self.layout.size, len(time)), np.nan)
         which = np.full(len(time), -1, np.intp)
         ends = np.array([one.end for one in self.stretches])
+        # the end is reached but for rounding
+        time = np.where((time > self.end) & (time <= self.end * (1 + 2 * CLOSE)), self.end, time)
         number = np.searchsorted(ends, time)
         for k in np.unique(number[number < len(ends)]):
             lanes = number == k

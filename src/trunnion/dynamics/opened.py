@@ -28,7 +28,7 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run
 from trunnion.structure.decompose import decompose
 
-__all__ = ["Opened", "in_play", "opened"]
+__all__ = ["Opened", "in_play", "is_rigid", "opened"]
 
 Array = NDArray[np.float64]
 
@@ -54,6 +54,11 @@ class Opened:
 def in_play(mechanism: Mechanism) -> list[str]:
     """Joints that state a contact."""
     return [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
+
+
+def is_rigid(mechanism: Mechanism) -> bool:
+    """Whether the joints in play are between bodies that do not give."""
+    return any(joint.contact.of.rigid for joint in mechanism.effective_joints.values() if joint.contact is not None)
 
 
 def opened(run: Run) -> Opened:

@@ -113,7 +113,7 @@ class Walks:
         sound = bool(np.all(found.converged & ~found.turned))
         locked = any(bool(np.any(np.less(one.share, 1.0))) for one in found.back.settled)
         memory = bristle_rates(motion, at, found.back)[:, 0]
-        works = works_of(found.back, at, motion.contacts)
+        works = works_of(found.back, at._replace(onsets=found.onsets), motion.contacts)
         return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
 
     def look(self, at: Moment) -> Seen:

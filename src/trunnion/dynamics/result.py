@@ -77,7 +77,7 @@ def result_of(
     mechanism, system = run.system.mechanism, run.system
     residual, turned_over = _energy(books)
     turned_over = max(turned_over, _turned_over(motion, solution))
-    findings = [*_findings(motion, solution, run), *_unbalanced(residual, turned_over)]
+    findings = [*_findings(motion, solution, run), *_unbalanced(residual, turned_over, solution.stepped)]
     attributes = encoded(
         {
             **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
@@ -185,10 +185,11 @@ ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
-def _unbalanced(residual: Array, turned_over: float) -> Iterator[Finding]:
+def _unbalanced(residual: Array, turned_over: float, stepped: bool) -> Iterator[Finding]:
     worst = float(np.nanmax(np.abs(residual), initial=0.0))
     if turned_over > 0 and worst > WORST * turned_over:
-        yield finding_for("simulate.energy", share=worst / turned_over)
+        code = "simulate.energy_stepped" if stepped else "simulate.energy"
+        yield finding_for(code, share=worst / turned_over)
 
 
 # ---- findings -------------------------------------------------------------------------------------------------
@@ -202,6 +203,7 @@ def _findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterator[Find
         yield finding_for("simulate.centred", joints=centred)
     if contact_findings := list(_of_contacts(motion, run, solution)):
         yield from contact_findings
+    yield from (finding_for(code, "joints", **figures) for code, figures in solution.notes.items())
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
     for event in solution.events:
@@ -228,7 +230,7 @@ def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[F
     for one in {one.joint: one for one in motion.contacts.each}.values():
         law = run.system.mechanism.effective_joints[one.joint].contact
         returned = restitution_of(one.factor)
-        if law is not None and abs(returned - one.restitution) > DIFFERS:
+        if law is not None and not law.of.rigid and abs(returned - one.restitution) > DIFFERS:
             yield finding_for("simulate.restitution", f"joints.{one.joint}.contact", joint=one.joint, law=law.law,
                               stated=one.restitution, returned=returned)  # fmt: skip
 

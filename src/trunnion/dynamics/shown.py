@@ -40,6 +40,7 @@ IMPACT: dict[str, Variable] = {
     "impact_separation": Variable(("impact",), "m/s", "speed of separation where it ends"),
     "impact_force": Variable(("impact",), "N", "largest normal force"),
     "impact_depth": Variable(("impact",), "m", "largest penetration"),
+    "impact_impulse": Variable(("impact",), "N s", "impulse of the normal force"),
     "impact_wear": Variable(("impact",), "J", "wear index, integral of normal force times slip"),
 }
 
@@ -160,7 +161,7 @@ def _fill_slide(run: Run, joint: str, found: dict[str, Array], labels: Mapping[s
 
 def impact_arrays(impacts: Sequence[Impact]) -> dict[str, Array]:
     """The variables of `IMPACT`."""
-    keys = ("begin", "end", "approach", "separation", "force", "depth", "wear")
+    keys = ("begin", "end", "approach", "separation", "force", "depth", "impulse", "wear")
     return {f"impact_{key}": np.array([getattr(one, key) for one in impacts], float) for key in keys}
 
 
@@ -172,15 +173,25 @@ def impact_figures(labels: Sequence[str], impacts: Sequence[Impact], end: float)
         found.append(Figure(f"{label}.impacts", f"contacts of {label}", float(len(own)), "1"))
         if not own:
             continue
-        hardest = max(own, key=lambda one: one.force)
         long = sum((one.end if np.isfinite(one.end) else end) - one.begin for one in own)
-        when, share = f"in the contact from {hardest.begin:.4g} s", long / end if end else np.nan
+        share = long / end if end else np.nan
         depth, speed = max(one.depth for one in own), max(one.approach for one in own)
+        struck, pushed = [one for one in own if np.isnan(one.force)], [one for one in own if np.isfinite(one.force)]
+        if struck:  # an impact of rigid bodies has no largest force
+            hardest = max(struck, key=lambda one: one.impulse)
+            when = f"at {hardest.begin:.4g} s"
+            found.append(Figure(f"{label}.impulse_max", f"impulse in {label}", hardest.impulse, "N s", "largest", when))
+        if pushed:
+            most = max(pushed, key=lambda one: one.force)
+            when = f"in the contact from {most.begin:.4g} s"
+            found.append(
+                Figure(f"{label}.contact_force_max", f"contact force in {label}", most.force, "N", "largest", when)
+            )
+        if depth > 0:
+            found.append(Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"))
         found += [
-            Figure(f"{label}.contact_force_max", f"contact force in {label}", hardest.force, "N", "largest", when),
-            Figure(f"{label}.contact_depth_max", f"penetration in {label}", depth, "m", "largest"),
             Figure(f"{label}.approach_max", f"speed of approach in {label}", speed, "m/s", "largest"),
             Figure(f"{label}.contact_time", f"time in contact of {label}", share, "1", "of all"),
             Figure(f"{label}.wear", f"wear index of {label}", sum(one.wear for one in own), "J"),
-        ]  # fmt: skip
+        ]
     return found

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
 from trunnion.dynamics.checks import refuse, refuse_massless
+from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
+from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
-from trunnion.dynamics.opened import in_play, opened
-from trunnion.dynamics.rates import Walks
+from trunnion.dynamics.opened import in_play, is_rigid, opened
+from trunnion.dynamics.rates import Seeing, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
 from trunnion.dynamics.shown import Touches, as_stated
@@ -25,7 +27,7 @@ from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
-from trunnion.dynamics.touching import contacts_of
+from trunnion.dynamics.touching import Onset, contacts_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results import variables as results
@@ -55,17 +57,19 @@ def simulate(
     steps: int = 1000,
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
+    impact_step: float | None = None,
 ) -> xr.Dataset:
     """Motion in time of a mechanism whose drivers are free: coordinates, forces, energy and events.
 
     duration: s, ten cycles of the stated motion if not given; steps: equal intervals at whose ends the result stands;
-    tolerance: relative, of every step of the integration; progress: called with the time that is reached, s.
+    tolerance: relative, of every step of the integration; progress: called with the time that is reached, s;
+    impact_step: s, of Moreau's time stepping of joints in play between rigid bodies, from event to event if not given.
     Returns a Dataset with the names and units of `analyse` over `time`, with works, energies and events beside them.
     Method: the free coordinates accelerate so that the effort the modules demand is what the motors give
     (`dynamics.state`); integrated from event to event (`dynamics.integrate`).
     Raises MechanismError if no driver is free, or if the motion cannot be found for what the joints are.
     """
-    return simulated(mechanism, duration, steps, tolerance, progress).dataset
+    return simulated(mechanism, duration, steps, tolerance, progress, impact_step).dataset
 
 
 @np.errstate(all="ignore")
@@ -75,6 +79,7 @@ def simulated(
     steps: int = 1000,
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
+    impact_step: float | None = None,
 ) -> Result:
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
@@ -83,8 +88,9 @@ def simulated(
         run.determinacy.refuse()
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance)
+    _check_step(impact_step, duration, mechanism)
     if in_play(mechanism):
-        return _with_play(run, duration, steps, tolerance, progress)
+        return _with_play(run, duration, steps, tolerance, progress, impact_step)
     motion = FreeMotion.of(run)
     known = places(motion)
     integration = integration_of(motion, known, duration, tolerance, progress)
@@ -100,18 +106,26 @@ def simulated(
 
 
 def _with_play(
-    run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None
-) -> Result:
+    run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None,
+    impact_step: float | None,
+) -> Result:  # fmt: skip
     """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
-    motion = FreeMotion.of(prepare(bare.mechanism), contacts)
+    rigid = is_rigid(run.system.mechanism)
+    motion = (ClosedMotion if rigid else FreeMotion).of(prepare(bare.mechanism), contacts)
     row = initial_row(motion)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
-    rates = compiled_rates(motion) or Walks(motion)
-    integration = ContactMotion(motion, rates, duration, max(fine, FINEST), progress=progress,
-                                times=load_times(motion, duration))  # fmt: skip
+    rates: Seeing = compiled_rates(motion) or Walks(motion)
+    tolerances, times = max(fine, FINEST), load_times(motion, duration)
+    integration: ContactMotion
+    if isinstance(motion, ClosedMotion):
+        rates = ClosedRates(motion, rates)
+        integration = ImpactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
+        integration.impact_step = impact_step
+    else:
+        integration = ContactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
     try:
         solution = integration.run(row)
     except KeyboardInterrupt:  # what is done is kept
@@ -140,6 +154,20 @@ def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) ->
     if not limits[0] <= row[0] <= limits[1]:
         what = f"begins at {row[0]:g} (SI), outside its range from {limits[0]:g} to {limits[1]:g}"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin within the range"))
+
+
+def _check_step(step: float | None, duration: float, mechanism: Mechanism) -> None:
+    """MechanismError for a step that makes no sense, or that nothing takes."""
+    if step is None:
+        return
+    if not is_rigid(mechanism):
+        what = "no joint is in play between rigid bodies, so that there is nothing to step through"
+        raise MechanismError(
+            Finding(what, "impact_step", "remove it, or state contact: {law: rigid, restitution: 0.5}")
+        )
+    if not duration / MOST_STEPS <= step <= duration:
+        remedy = f"give a time from {duration / MOST_STEPS:g} s to {duration:g} s"
+        raise MechanismError(Finding(f"a step of {step:g} s", "impact_step", remedy))
 
 
 def _check_numbers(duration: float, steps: int, tolerance: float) -> None:
@@ -177,13 +205,12 @@ class Filling:
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
-            at = at._replace(onsets=stretch.onsets)
-            second, back = self._solved(at, stretch)
+            second, back, onsets = self._solved(at._replace(onsets=stretch.onsets), stretch)
             seconds[:, lanes] = second
             window = slice(int(lanes[0]), int(lanes[-1]) + 1)
             fill_chunk(arrays, back, at.time, window)
             energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
-            touches.fill(lanes, motion.contacts.pushes(back.walk, stretch.onsets), stretch.onsets)
+            touches.fill(lanes, motion.contacts.pushes(back.walk, onsets), onsets)
         whole = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
             if array.flags.writeable and array.dtype == np.float64:
@@ -215,12 +242,12 @@ class Filling:
                 break
         return found
 
-    def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward]:
+    def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
         """Accelerations and the walk; at rest with the share of the friction that holds it."""
         self.motion.begin(stretch.snapshot)
         if not stretch.resting:
             found = self.motion.accelerate(at)
-            return found.second, found.back
+            return found.second, found.back, found.onsets
         share = Rest(self.motion, self.solution.layout).shares(at)
         zero = np.zeros_like(at.q)
-        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share))
+        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share)), ()

@@ -20,7 +20,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
-from trunnion.dynamics.touching import Contacts
+from trunnion.dynamics.touching import Contacts, Onset
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
@@ -53,7 +53,7 @@ class Moment(NamedTuple):
     bristles: Array
     sense: float = 0.0
     now: float = 0.0
-    onsets: tuple[Number | None, ...] = ()
+    onsets: tuple[Onset, ...] = ()
 
 
 class Accelerated(NamedTuple):
@@ -61,12 +61,14 @@ class Accelerated(NamedTuple):
 
     back: lanes as asked for. turned: lanes in which more acceleration would take less effort: the mechanism locks
     itself under its inertia, so that there is no acceleration or there are several. converged: lanes that are solved.
+    onsets: of contacts, with the forces of those that stay closed.
     """
 
     second: Array
     back: Backward
     turned: NDArray[np.bool_]
     converged: NDArray[np.bool_]
+    onsets: tuple[Onset, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ class FreeMotion:
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
 
-    def _acting(self, onsets: Sequence[Number | None]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
+    def _acting(self, onsets: Sequence[Onset]) -> Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None:
         """What the contacts that touch do to the links."""
         if all(onset is None for onset in onsets):
             return None
@@ -235,10 +237,10 @@ class FreeMotion:
             back = self.solve(at, second, senses, sliding=True)  # most are there after one step, as this walk tells
             step = -_solved(slopes, self.demanded(back, at.q.shape) - self.given(at, second))
             if np.all(np.abs(step) <= SETTLED * largest) and not np.any(turned):
-                return Accelerated(second, back, turned, np.ones(lanes, bool))
+                return Accelerated(second, back, turned, np.ones(lanes, bool), at.onsets)
         converged = np.all(np.isfinite(second) & (self.affine | (np.abs(step) <= 1e-8 * largest)), axis=0)
         second = np.where(turned, np.nan, second)
-        return Accelerated(second, self.solve(at, second, senses, sliding=True), turned, converged)
+        return Accelerated(second, self.solve(at, second, senses, sliding=True), turned, converged, at.onsets)
 
     def inertia(self, at: Moment) -> Array:
         """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""

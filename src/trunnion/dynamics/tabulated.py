@@ -246,7 +246,7 @@ def spectral_radius(matrix: Array) -> float:
 
 
 def _times(row: list[float], numbers: list[float]) -> float:
-    return sum(map(operator.mul, row, numbers))
+    return float(sum(map(operator.mul, row, numbers)))
 
 
 def _per(rub: Rub, slip: float, deflection: float) -> float:

@@ -25,7 +25,7 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.shifts import play_of
 
-__all__ = ["Contact", "ContactState", "Contacts", "PinContact", "Push", "contacts_of"]
+__all__ = ["Closed", "Contact", "ContactState", "Contacts", "Onset", "PinContact", "Push", "contacts_of"]
 
 Array = NDArray[np.float64]
 Vector = tuple[Number, Number]
@@ -47,6 +47,19 @@ class ContactState(NamedTuple):
     tangent: Vector
     place: Vector
     offset: Vector
+
+
+class Closed(NamedTuple):
+    """A contact of rigid bodies that stays closed: it slips forward (+1), backward (−1) or sticks (0), under a normal
+    force and one along the tangent on the pin or slider, N, that are found with the accelerations; None: the forces
+    are given."""
+
+    sense: int | None
+    normal: Array | float = 0.0
+    friction: Array | float = 0.0
+
+
+Onset = Number | Closed | None  # speed of approach where a contact began, m/s; None: it does not touch
 
 
 class Push(NamedTuple):
@@ -82,8 +95,25 @@ class Contact(ABC):
     def state(self, walk: Forward) -> ContactState:
         """Where the surfaces are."""
 
-    def push(self, state: ContactState, onset: Number | None) -> Push:
+    @abstractmethod
+    def accelerations(self, walk: Forward) -> tuple[Array, Array]:
+        """Second derivative of the gap, and derivative of the slip, m/s²."""
+
+    @property
+    def surface(self) -> str:
+        """The wall it touches."""
+        return self.label
+
+    @property
+    def coefficient(self) -> float:
+        """f of Coulomb's friction."""
+        return self.parameters["pair_factor"] * self.parameters["coefficient"] if self.law else 0.0
+
+    def push(self, state: ContactState, onset: Onset) -> Push:
         """Forces of a contact that began with a speed of approach, m/s; None: it is not touching."""
+        if isinstance(onset, Closed):
+            force, friction = onset.normal + 0.0 * state.gap, onset.friction + 0.0 * state.gap
+            return Push(force, friction, 0.0 * state.gap, -force * state.rate - friction * state.slip)
         if onset is None:
             nothing = 0.0 * state.gap
             return Push(nothing, nothing, nothing, nothing)
@@ -136,6 +166,20 @@ class PinContact(Contact):
         offset = frame.c * cx + frame.s * cy, frame.c * cy - frame.s * cx
         return ContactState(self.clearance - size, -(nx * ux + ny * uy), slip, (nx, ny), (tx, ty), (px, py), offset)
 
+    def accelerations(self, walk: Forward) -> tuple[Array, Array]:
+        """Of ρ − |c|, and of the slip c·t + ω_pin (R − |c|) − ω_hole R."""
+        a, b = _point(walk, self.body, self.pin), _point(walk, self.other, self.hole)
+        cx, cy, ux, uy = (one - other for one, other in zip(a, b, strict=True))
+        far, first = _acceleration(walk, self.body, self.pin), _acceleration(walk, self.other, self.hole)
+        ax, ay = far[0] - first[0], far[1] - first[1]
+        size = np.hypot(cx, cy)
+        nx, ny = cx / size, cy / size
+        away, along = ux * nx + uy * ny, uy * nx - ux * ny
+        spin = primal(walk.motions[self.body].twist.w)
+        pin, hole = (primal(walk.motions[link].acceleration.w) for link in (self.body, self.other))
+        slip = ay * nx - ax * ny - along * away / size + pin * (self.wall - size) - spin * away - hole * self.wall
+        return -(ax * nx + ay * ny) - along * along / size, slip
+
 
 @dataclass(frozen=True)
 class EdgeContact(Contact):
@@ -149,6 +193,11 @@ class EdgeContact(Contact):
     line: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
     side: float = 1.0
     distance: float = 0.0
+
+    @property
+    def surface(self) -> str:
+        """Of two corners it is one."""
+        return f"{self.joint}{self.side:+.0f}"
 
     def state(self, walk: Forward) -> ContactState:
         """The gap is the distance of the wall less that of the corner, on its side of the middle."""
@@ -166,6 +215,26 @@ class EdgeContact(Contact):
             self.distance - away, -(vx * nx + vy * ny), vx * tx + vy * ty, (nx + one, ny + one), (tx + one, ty + one),
             (a[0], a[1]), ((a[0] - origin[0]) * tx + (a[1] - origin[1]) * ty, self.side * away),
         )  # fmt: skip
+
+    def accelerations(self, walk: Forward) -> tuple[Array, Array]:
+        """Across and along the guide, of the corner against the guide's link."""
+        x, y, c, s = self.line
+        frame, motion = walk.motions[self.other].frame, walk.motions[self.other]
+        tx, ty = (primal(part) for part in walk.algebra.rotated(frame, (c, s)))
+        a, o = _point(walk, self.body, self.corner), _point(walk, self.other, (x, y))
+        far, first = _acceleration(walk, self.body, self.corner), _acceleration(walk, self.other, (x, y))
+        spin, faster = primal(motion.twist.w), primal(motion.acceleration.w)
+        rx, ry, ux, uy = (p - q for p, q in zip(a, o, strict=True))
+        ux, uy = ux + spin * ry, uy - spin * rx  # against the guide
+        ax = far[0] - first[0] + faster * ry + 2 * spin * uy + spin * spin * rx
+        ay = far[1] - first[1] - faster * rx - 2 * spin * ux + spin * spin * ry
+        return -self.side * (ay * tx - ax * ty), ax * tx + ay * ty
+
+
+def _acceleration(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Array, Array]:
+    """Acceleration of a point of a link, m/s²."""
+    x, y = (np.asarray(primal(part), float) for part in walk.at(link, local).acceleration[:2])
+    return x, y
 
 
 def _point(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Number, Number, Number, Number]:
@@ -197,12 +266,12 @@ class Contacts:
         """Where all surfaces are."""
         return [one.state(walk) for one in self.each]
 
-    def pushes(self, walk: Forward, onsets: Sequence[Number | None]) -> list[tuple[ContactState, Push]]:
+    def pushes(self, walk: Forward, onsets: Sequence[Onset]) -> list[tuple[ContactState, Push]]:
         """The forces of all contacts."""
         states = self.states(walk)
         return [(state, one.push(state, onset)) for one, state, onset in zip(self.each, states, onsets, strict=True)]
 
-    def actions(self, walk: Forward, onsets: Sequence[Number | None]) -> Iterator[tuple[str, LoadAction]]:
+    def actions(self, walk: Forward, onsets: Sequence[Onset]) -> Iterator[tuple[str, LoadAction]]:
         """What those that touch do to the links, by label."""
         for one, onset in zip(self.each, onsets, strict=True):
             if onset is not None:
@@ -230,9 +299,12 @@ def _of_joint(run: Run, name: str) -> Iterator[Contact]:
     friction = {key: _number(values[f"joints.{name}.friction.{key}"]) for key in law.parameters} if law else {}
     guided = PAIRS[stated.type].guided
     radius = 0.0 if guided else _number(values.get(f"joints.{name}.pin.radius", 0.0))
-    stiffness = known["stiffness"] if "stiffness" in known else _hertz(values, name, radius, radius + clearance)
+    if contact.of.rigid:
+        stiffness = 0.0
+    else:
+        stiffness = known["stiffness"] if "stiffness" in known else _hertz(values, name, radius, radius + clearance)
     common: dict[str, Any] = {
-        "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": known["exponent"],
+        "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": known.get("exponent", 1.0),
         "factor": contact.of.factor(restitution), "restitution": restitution, "law": law, "parameters": friction,
     }  # fmt: skip
     places: list[Any] = [tuple(_number(part) for part in holes[link, name]) for link in (first, second)]

@@ -34,13 +34,14 @@ class ContactLaw:
     """A contact law.
 
     factor: `(restitution) -> χ`; elastic: it takes no restitution and loses nothing; source and validity: where it
-    comes from and for what.
+    comes from and for what; rigid: the bodies do not give: impacts by Newton's law instead of a force.
     """
 
     factor: Callable[[float], float]
     source: str
     validity: str
     elastic: bool = False
+    rigid: bool = False
 
 
 def normal_force(
@@ -148,5 +149,11 @@ CONTACT_LAWS: dict[str, ContactLaw] = {
         lambda c: 1.5 * (1 - c) / c,
         "S. Hu, X. Guo, Multibody Syst. Dyn. 35 (2015) 131-151, doi:10.1007/s11044-015-9453-z",
         "the whole range",
+    ),
+    "rigid": ContactLaw(
+        loss_factor,
+        "I. Newton; Ch. Glocker, F. Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley, 1996",
+        "impacts much shorter than the motion between them: any restitution, 0 included",
+        rigid=True,
     ),
 }

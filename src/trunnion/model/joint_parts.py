@@ -146,7 +146,7 @@ class Contact(Part):
 
     law: of `joints.contact`; restitution: speed after over speed before an impact, from 0 to 1; stiffness: K of
     F = K dⁿ, or the modulus of elasticity and Poisson's ratio of pin and hole instead (those of the hole are those of
-    the pin if not stated); exponent: n.
+    the pin if not stated); exponent: n. With law: rigid the restitution alone.
     """
 
     law: Annotated[str, _check_contact, _schema_contact] = "restitution"
@@ -164,7 +164,9 @@ class Contact(Part):
         return CONTACT_LAWS[self.law]
 
     def complete(self) -> Contact:
-        """With the exponent 3/2, and with Poisson's ratio 0.3 and the pin's material where they were not stated."""
+        """With the exponent 3/2 where bodies give, and Poisson's ratio 0.3 and the pin's material where not stated."""
+        if self.of.rigid:
+            return self
         found: dict[str, Any] = {"exponent": self.exponent or Quantity(1.5, KINDS["number"])}
         if self.modulus is not None:
             found["poisson_ratio"] = self.poisson_ratio or Quantity(0.3, KINDS["number"])

@@ -44,6 +44,9 @@ def contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) -
 
 def _needs(joint: Joint, contact: Contact, where: str) -> Iterator[Finding]:
     """What a contact lacks or states in vain."""
+    if contact.of.rigid:
+        yield from _rigid(contact, where)
+        return
     if contact.of.elastic and contact.restitution is not None:
         yield Finding(f"'restitution' has no effect on {contact.law}", f"{where}.restitution", "remove it")
     if not contact.of.elastic and contact.restitution is None:
@@ -65,6 +68,15 @@ def _needs(joint: Joint, contact: Contact, where: str) -> Iterator[Finding]:
                 yield Finding(f"'{key}' has no effect without 'modulus'", f"{where}.{key}", "remove it")
 
 
+def _rigid(contact: Contact, where: str) -> Iterator[Finding]:
+    """What a contact of rigid bodies lacks or states in vain."""
+    if contact.restitution is None:
+        yield Finding("'restitution' is missing", where, "add restitution: 0.8")
+    for key in ("stiffness", "exponent", *MATERIAL):
+        if key in contact.model_fields_set and getattr(contact, key) is not None:
+            yield Finding(f"'{key}' has no effect on {contact.law}", f"{where}.{key}", "remove it")
+
+
 def contact_values(joint: Joint, values: Mapping[str, float], where: str) -> Iterator[Finding]:
     """Whether the numbers of a contact can be those of one. values: by path; where: path of the joint."""
     contact = joint.contact
@@ -76,8 +88,9 @@ def contact_values(joint: Joint, values: Mapping[str, float], where: str) -> Ite
         what = f"is in play with a clearance of {clearance:g} m"
         yield Finding(what, path, "give a clearance above 0, or remove the contact")
     restitution = values.get(f"{path}.restitution", np.nan)
-    if restitution <= 0 or restitution > 1:
-        what = f"is {restitution:g}, which is not above 0 and at most 1"
+    least = "from 0" if contact.of.rigid else "above 0"
+    if restitution < 0 or restitution > 1 or (restitution == 0 and not contact.of.rigid):
+        what = f"is {restitution:g}, which is not {least} and at most 1"
         yield Finding(what, f"{path}.restitution", "give the speed after over the speed before an impact, such as 0.8")
     for key, low, high, say in (
         ("stiffness", 0.0, np.inf, "above 0"),

@@ -59,6 +59,28 @@ DYNAMICS: dict[str, Sentence] = {
         "{joint}: with a stated restitution of {stated:.3g} the contact law {law} returns {returned:.3g}",
         "state law: restitution to get back what is stated",
     ),
+    "simulate.restitution_lowered": Sentence(
+        NOTE,
+        "in {times:#impact}, the first at {time:~s}, friction and the stated restitution would gain energy: the "
+        "restitution is lowered there, to {share:.3g} of itself at the most",
+    ),
+    "simulate.stepped": Sentence(
+        WARNING,
+        "there are impacts without end at {time:~s}: from there on the motion is stepped by Moreau's scheme, in steps "
+        "of {step:~s}; it is exact to the first order of the step",
+        "compare with half the step: --impact-step",
+    ),
+    "simulate.energy_stepped": Sentence(
+        NOTE,
+        "stepped by Moreau's scheme, works and energies differ by {share:.2g} of the energy turned over",
+        "ask for a smaller --impact-step",
+    ),
+    "simulate.no_contact_force": Sentence(
+        ERROR,
+        "there are no forces or impulses of the contacts that touch at {time:~s} (coordinate {coordinate:.6g}, rate "
+        "{rate:.6g}) under which nothing sinks in (Painlevé's paradox): the motion is kept until then",
+        "lower the friction of the joints in play, or state a stiffness instead of law: rigid",
+    ),
     "simulate.energy": Sentence(
         WARNING,
         "works and energies differ by {share:.2g} of the energy turned over",

@@ -1,0 +1,137 @@
+"""Impacts of rigid bodies at several places at once: Newton's restitution with Coulomb's friction.
+
+Impulses Λ at the places change the rates of gaps and slips, γ⁺ = γ⁻ + G Λ with G = W M⁻¹ Wᵀ. At every place either
+nothing is exchanged and γₙ⁺ ≥ −e γₙ⁻, or γₙ⁺ = −e γₙ⁻ with an impulse Λₙ ≥ 0 and one along the tangent, |Λₜ| ≤ f Λₙ,
+that is −f Λₙ times the sign of the slip γₜ⁺: a linear complementarity problem (Ch. Glocker, F. Pfeiffer, Multibody
+Dynamics with Unilateral Contacts, Wiley, 1996; without tangential restitution). There are few places, so that its cases
+are gone through one by one.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["OPEN", "STICK", "Struck", "strike"]
+
+Array = NDArray[np.float64]
+
+OPEN, STICK, FORWARD, BACKWARD = None, 0, 1, -1
+Case = int | None
+
+CLOSE = 1e-12  # of the largest speed or impulse: differences that are rounding
+HALVINGS = 60
+
+
+class Struck(NamedTuple):
+    """Impulses, N s, rates after the impact, m/s, (normals then tangents,), what every place did - None: nothing, else
+    the sense of its slip, 0 where it sticks -, the loss, J, and the restitution that was kept of the one stated."""
+
+    impulse: Array
+    after: Array
+    cases: tuple[Case, ...]
+    loss: float
+    kept: float = 1.0
+
+
+def strike(
+    delassus: Array, before: Array, restitution: Array, friction: Array, old: Array | None = None
+) -> Struck | None:
+    """The impact at some places; None if no case fits.
+
+    delassus: G, 1/kg, (2 places, 2 places); before: γ⁻, m/s, (2 places,), normals first; restitution, friction: of each
+    place; old: rates to which the restitution refers, where forces have changed them since.
+    Newton's law may gain energy where friction turns the slip round (T. R. Kane, D. A. Levinson, Dynamics: Theory and
+    Applications, McGraw-Hill, 1985); the restitutions are then lowered together until nothing is gained, for without
+    any the law always loses.
+    """
+    found = _struck(delassus, before, restitution, friction, old)
+    if found is None or found.loss >= -CLOSE * _energy(found, before):
+        return found
+    low, high, best = 0.0, 1.0, None
+    for _ in range(HALVINGS):
+        share = 0.5 * (low + high) if best is not None else 0.0
+        tried = _struck(delassus, before, share * restitution, friction, old)
+        if tried is not None and tried.loss >= 0.0:
+            low, best = share, tried._replace(kept=share)
+        elif best is None:
+            return tried
+        else:
+            high = share
+    return best
+
+
+def _energy(found: Struck, before: Array) -> float:
+    return float(np.abs(found.impulse) @ (np.abs(before) + np.abs(found.after)))
+
+
+def _struck(delassus: Array, before: Array, restitution: Array, friction: Array, old: Array | None) -> Struck | None:
+    """The first case that fits."""
+    places = len(restitution)
+    first = before if old is None else old
+    back = -restitution * np.minimum(first[:places], 0.0)
+    speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
+    for cases in _cases(friction, before):
+        found = _solved(delassus, before, back, friction, cases)
+        if found is not None and _fits(*found, back, friction, cases, speed):
+            impulse, after = found
+            loss = -0.5 * float(impulse @ (first + after))
+            return Struck(impulse, after, cases, loss)
+    return None
+
+
+def _cases(friction: Array, before: Array) -> Iterator[tuple[Case, ...]]:
+    """All that may happen at the places; without friction a place slips as before."""
+    places = len(friction)
+    senses = np.where(before[places:] < 0.0, BACKWARD, FORWARD)
+    own = [(OPEN, int(s), STICK, -int(s)) if f > 0.0 else (OPEN, int(s)) for f, s in zip(friction, senses, strict=True)]
+    return itertools.product(*own)
+
+
+def _solved(
+    delassus: Array, before: Array, back: Array, friction: Array, cases: tuple[Case, ...]
+) -> tuple[Array, Array] | None:
+    """Impulses and rates after of one case: as many equations as places that exchange something."""
+    places = len(cases)
+    unknown, wanted, spread = list[int](), list[float](), np.zeros((2 * places, 2 * places))
+    for k, case in enumerate(cases):
+        if case is not OPEN:
+            spread[k, k], spread[places + k, k] = 1.0, -friction[k] * case
+            unknown.append(k)
+            wanted.append(back[k] - before[k])
+        if case == STICK:
+            spread[places + k, places + k] = 1.0
+            unknown.append(places + k)
+            wanted.append(-before[places + k])
+    if not unknown:
+        return np.zeros(2 * places), before
+    rows, own = np.array(unknown), spread[:, unknown]
+    matrix = delassus[rows] @ own
+    numbers = np.linalg.lstsq(matrix, np.array(wanted), rcond=1e-13)[0]  # two places may share one impulse
+    impulse: Array = own @ numbers
+    return impulse, before + delassus @ impulse
+
+
+def _fits(
+    impulse: Array, after: Array, back: Array, friction: Array, cases: tuple[Case, ...], speed: float
+) -> bool:  # fmt: skip
+    """Whether a case keeps its inequalities and, where its equations were singular, its equations."""
+    places = len(cases)
+    normal, tangent, size = impulse[:places], impulse[places:], CLOSE * max(float(np.max(np.abs(impulse))), 1e-300)
+    for k, case in enumerate(cases):
+        gap, slip = after[k] - back[k], after[places + k]
+        if gap < -speed:
+            return False
+        if case is OPEN:
+            continue
+        if abs(gap) > speed or normal[k] < -size or (case == STICK and abs(slip) > speed):
+            return False
+        if friction[k] > 0.0 and case * slip < -speed:
+            return False
+        if case == STICK and abs(tangent[k]) > friction[k] * normal[k] + size:
+            return False
+    return True

@@ -1,0 +1,304 @@
+"""Motion in time with joints in play between rigid bodies: from impact to impact, and closed in between.
+
+A step ends where a gap closes, and Newton's law gives the rates after it (`impact_law`). Where the rebounds become
+lower than what the gap is known to, the impacts accumulate: the contact closes, and stays so under a force that keeps
+its gap at 0 (`closed`), until that force becomes 0. A closed contact slips or sticks; a change of that ends a step,
+too. Where there are impacts without end the time is stepped from then on (`impact_steps`).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DOP853, OdeSolver
+
+from trunnion.algebra.dual import primal
+from trunnion.dynamics.closed import rates_of
+from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact
+from trunnion.dynamics.impact_law import OPEN, Struck
+from trunnion.dynamics.impact_steps import SteppedMotion
+from trunnion.dynamics.state import Accelerated
+from trunnion.dynamics.touching import Closed, ContactState, Onset, Push
+
+__all__ = ["ImpactMotion"]
+
+Array = NDArray[np.float64]
+Onsets = tuple[Onset, ...]
+
+LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
+MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
+CROWD, CROWDED = 100, 1e-9  # events within so much of the duration: they have no end
+STEPPED = 1e-4  # of a cycle: the step from there on
+FLIGHT = 0.1  # of the time to the next impact: the first step after one
+SMALL = 1e-9  # of the largest force or acceleration: what is 0 but for rounding
+STILL = 1e-12  # of the speeds of an impact: a slip that is 0
+
+
+@dataclass
+class ImpactMotion(SteppedMotion):
+    """An integration that follows the impacts of rigid bodies from event to event."""
+
+    recent: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
+        self.pull = size * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
+        self.meet = MEET * self.motion.contacts.least_clearance
+        self.low = np.array([max(LOW * one.clearance, ROUNDED * size) for one in self.motion.contacts.each])
+
+    def _move(
+        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
+    ) -> tuple[float, Array, float | None]:
+        """Move until something changes at a contact, or the next break; step through where that has no end."""
+        if len(self.recent) == CROWD and self.recent[-1] - self.recent[0] < CROWDED * self.duration:
+            self.impact_step = STEPPED * (self.motion.cycle.duration or self.duration)
+            self.solution.notes["simulate.stepped"] = {"time": time, "step": self.impact_step}
+            self.recent.clear()
+        if self.impact_step is not None:
+            return SteppedMotion._move(self, time, row, until, sense, now, step)
+        return super(SteppedMotion, self)._move(time, row, until, sense, now, step)
+
+    # ---- what ends a step -------------------------------------------------------------------------------------
+
+    def _pushes(self, dense: Dense, times: Array) -> list[tuple[ContactState, Push]]:
+        """The forces of the contacts at times of a step."""
+        at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
+        with np.errstate(all="ignore"):
+            found = self.motion.accelerate(at)
+            return self.motion.contacts.pushes(found.back.walk, found.onsets)
+
+    def _gaps(self, dense: Dense, times: Array) -> Array:
+        """What stays above 0 within a step, (2 contacts, time): gap or normal force, and slip or what friction has left
+        before it slips."""
+        found = np.ones((2 * self.count, len(times)))
+        if not any(self.onsets):
+            found[: self.count] = self._look(dense, times).gap
+            return found
+        for k, (onset, (state, push)) in enumerate(zip(self.onsets, self._pushes(dense, times), strict=True)):
+            found[k] = push.normal if onset else state.gap
+            if isinstance(onset, Closed) and self.friction[k] > 0.0:
+                left = self.friction[k] * push.normal - np.abs(push.friction)
+                found[self.count + k] = onset.sense * state.slip if onset.sense else left
+        return found
+
+    def _measured(self, dense: Dense, times: Array, begin: float) -> None:
+        """Forces, impulse and wear of the contacts that are closed."""
+        if not self._open:
+            return
+        times = np.append(begin, times)
+        pushes = self._pushes(dense, times)
+        for k, one in self._open.items():
+            state, push = pushes[k]
+            one.force = np.fmax(one.force, float(np.max(push.normal)))
+            one.impulse += float(np.trapezoid(push.normal, times))
+            one.wear += float(np.trapezoid(np.abs(push.normal * state.slip), times))
+
+    def _changed(self, crossing: Crossing, row: Array) -> float:
+        """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
+        k, time = crossing.contact % self.count, crossing.time
+        self.recent = [*self.recent, time][-CROWD:]
+        onset = self.onsets[k]
+        if not isinstance(onset, Closed):
+            return self._impact(k, time, row)
+        if crossing.contact < self.count:
+            self._end(k, time, 0.0)
+            self._set({k: None})
+            return np.inf
+        together = [other for other in self._closed() if self._surface(other) == self._surface(k)]
+        if onset.sense:  # the slip ends
+            self._set(dict.fromkeys(together, Closed(0)))
+            self._project(time, row)
+            self._settle(time, row)
+        else:
+            friction = self._pushes(lambda times: row[:, None], np.array([time]))[k][1].friction
+            self._set(dict.fromkeys(together, Closed(-int(np.sign(friction[0])))))
+        return np.inf
+
+    def _closed(self) -> list[int]:
+        return [k for k, onset in enumerate(self.onsets) if onset is not None]
+
+    def _surface(self, k: int) -> str:
+        return self.motion.contacts.each[k].surface
+
+    def _set(self, onsets: Mapping[int, Closed | None]) -> None:
+        self.onsets = tuple(onsets.get(k, onset) for k, onset in enumerate(self.onsets))
+
+    # ---- impacts ----------------------------------------------------------------------------------------------
+
+    def _impact(self, k: int, time: float, row: Array) -> float:
+        """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
+        step after it may be, s."""
+        at = self.moment(time, row, 0.0, 0.0)
+        linear, states = self.rigid.linear(at), self._states_at(at)
+        rates = rates_of(states)[:, 0]
+        gaps = np.array([float(np.ravel(one.gap)[0]) for one in states])
+        meet = (gaps <= self.meet) & (rates[: self.count] < 0.0)
+        places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
+        found, pauses = self._law(linear, places, rates, self.restitution), dict[int, float]()
+        if found is not None:
+            flights = self._flights(time, row, places, rates, *found)
+            pauses = {i: pause for i, (pause, low) in flights.items() if low}
+            if pauses:
+                restitution = np.where([i in pauses for i in range(self.count)], 0.0, self.restitution)
+                found = self._law(linear, places, rates, restitution)
+        if found is None:
+            self._stop("no_contact_force", time, row)
+            return np.inf
+        struck, change = found
+        if struck.kept < 1.0:
+            self._lowered(time, struck.kept)
+        self._strike_off(row, change, self._driven(at, change, struck, places, linear.driven), struck.loss)
+        self._after(time, row, places, rates, struck, pauses)
+        return FLIGHT * min((pause for pause, low in flights.values() if not low), default=np.inf)
+
+    def _lowered(self, time: float, kept: float) -> None:
+        """Take down that an impact kept less than its restitution."""
+        note = self.solution.notes.setdefault("simulate.restitution_lowered", {"times": 0, "time": time, "share": 1.0})
+        note["times"] += 1
+        note["share"] = min(note["share"], kept)
+
+    def _flights(
+        self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, change: Array
+    ) -> dict[int, tuple[float, bool]]:
+        """Of every place that rebounds and comes back: the time until it does, s; where it rebounds so low that the
+        impacts accumulate, that until they have."""
+        n, after, found = self.layout.coordinates, row.copy(), dict[int, tuple[float, bool]]()
+        after[n : 2 * n] += change
+        rebounds = [i for i, k in enumerate(places) if struck.cases[i] is not OPEN and before[k] < 0.0]
+        free = [k for i, k in enumerate(places) if i in rebounds or struck.cases[i] is OPEN]
+        onsets = tuple(None if k in free else onset for k, onset in enumerate(self.onsets))
+        walk = self.motion.accelerate(self.moment(time, after, 0.0, 0.0)._replace(onsets=onsets)).back.walk
+        for i in rebounds:
+            k, speed = places[i], float(struck.after[i])
+            pull = -float(np.ravel(self.motion.contacts.each[k].accelerations(walk)[0])[0])
+            if pull > 0.0 and speed > 0.0:
+                low, e = 0.5 * speed * speed / pull < self.low[k], self.restitution[k]
+                found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
+        return found
+
+    def _after(
+        self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, pauses: Mapping[int, float]
+    ) -> None:
+        """Take down what an impact came to, and let the contacts close that do not rebound."""
+        closed: dict[int, Closed | None] = {}
+        for i, k in enumerate(places):
+            case, normal = struck.cases[i], float(struck.impulse[i])
+            slips = abs(before[self.count + k]), abs(struck.after[len(places) + i])
+            approach, wear = max(-float(before[k]), 0.0), 0.5 * normal * float(sum(slips))
+            if case is not OPEN and (k in pauses or self.onsets[k] is not None or self.restitution[k] == 0.0):
+                still = self.friction[k] > 0.0 and slips[1] <= STILL * max(slips[0], approach)
+                closed[k] = Closed(0 if still else case or 1)
+            if self.onsets[k] is not None:
+                self._open[k].impulse += normal
+                self._open[k].wear += wear
+                if case is OPEN:
+                    self._end(k, time, float(struck.after[i]))
+            elif case is not OPEN:
+                label, rate = self.motion.contacts.labels[k], float(struck.after[i])
+                self.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
+                self._say(time, "impact", k, approach)
+        self._set({k: closed.get(k) for k in places})
+        if closed:
+            self._project(time, row)
+            self._settle(time, row, pauses)
+
+    # ---- closed -----------------------------------------------------------------------------------------------
+
+    def _settle(self, time: float, row: Array, pauses: Mapping[int, float] | None = None) -> None:
+        """Which of the contacts that could be closed are, and whether those without slip stick: the first case that
+        forces and accelerations allow."""
+        at, may = self.moment(time, row, 0.0, 0.0), dict(enumerate(self.onsets))
+        for onsets in self._cases():
+            found = self.motion.accelerate(at._replace(onsets=onsets))
+            if not self._holds(onsets, found):
+                continue
+            self.onsets = onsets
+            for k, onset in enumerate(onsets):
+                if onset is not None and k not in self._open:
+                    self._open[k] = OpenContact(time + (pauses or {}).get(k, 0.0), 0.0)
+                    self._say(self._open[k].begin, "closes", k, np.nan)
+                elif onset is None and may[k] is not None and k in self._open:
+                    self._end(k, time, 0.0)
+            return
+        self._stop("no_contact_force", time, row)
+
+    def _cases(self) -> Iterator[Onsets]:
+        """What the closed contacts may do: go on slipping, stick, begin to slip either way, or open."""
+        own: list[tuple[Onset, ...]] = []
+        for k, onset in enumerate(self.onsets):
+            if not isinstance(onset, Closed):
+                own.append((None,))
+            elif onset.sense or self.friction[k] == 0.0:
+                own.append((Closed(onset.sense or 1), None))
+            else:
+                own.append((Closed(0), Closed(1), Closed(-1), None))
+        for case in itertools.product(*own):  # what lies on one wall sticks or slips as one
+            senses = [(self._surface(k), one.sense) for k, one in enumerate(case) if isinstance(one, Closed)]
+            if len(set(senses)) == len({surface for surface, _ in senses}):
+                yield case
+
+    def _holds(self, onsets: Onsets, found: Accelerated) -> bool:
+        """Whether the forces of a case push, and nothing sinks in or slips against its friction."""
+        if np.any(found.turned) or not np.all(np.isfinite(found.second)):
+            return False
+        walk, force = found.back.walk, SMALL * self.rigid.force
+        small = SMALL * max(float(np.max(np.abs(found.second / self.motion.unit[:, None]))), 1.0) * self.pull
+        for k, (onset, one) in enumerate(zip(self.onsets, self.motion.contacts.each, strict=True)):
+            if onset is None:
+                continue
+            gap, slip = (float(np.ravel(part)[0]) for part in one.accelerations(walk))
+            now = found.onsets[k]
+            if not isinstance(now, Closed):
+                if gap < -small:
+                    return False
+                continue
+            normal, friction = (float(np.ravel(part)[0]) for part in (now.normal, now.friction))
+            begins = isinstance(onset, Closed) and onset.sense == 0
+            if normal < -force or (begins and now.sense and now.sense * slip < -small):
+                return False
+            if now.sense == 0 and abs(friction) > self.friction[k] * normal + force:
+                return False
+        return True
+
+    def _project(self, time: float, row: Array) -> None:
+        """Take the gaps of closed contacts, and their rates, to 0: the nearest state in the sense of the masses."""
+        n, closed = self.layout.coordinates, self._closed()
+        at = self.moment(time, row, 0.0, 0.0)
+        for _ in range(2):
+            linear, gaps = (
+                self.rigid.linear(at),
+                np.array([float(np.ravel(self._states_at(at)[k].gap)[0]) for k in closed]),
+            )
+            row[:n] -= _nearest(linear.mass, linear.ways[closed], gaps)
+            at = self.moment(time, row, 0.0, 0.0)
+        linear = self.rigid.linear(at)
+        sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
+        ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
+        row[n : 2 * n] -= _nearest(linear.mass, ways, rates[[*closed, *sticks]])
+
+    def _held(self, solver: OdeSolver, row: Array) -> None:
+        """Nothing drifts: the next step begins from closed gaps."""
+        if not any(self.onsets):
+            return
+        time = float(solver.t)
+        if isinstance(solver, DOP853) and np.array_equal(row, solver.y):
+            self._project(time, row)
+            solver.y = row.copy()
+            solver.f = solver.fun(time, solver.y)
+
+    def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
+        """Why a state has no acceleration; empty if it has one."""
+        found = super()._cause(time, row, sense, now)
+        return "no_contact_force" if found == "no_acceleration" and any(self.onsets) else found
+
+
+def _nearest(mass: Array, ways: Array, missed: Array) -> Array:
+    """The least change of coordinates, in the sense of the masses, that changes W x by so much."""
+    spread = np.linalg.solve(mass, ways.T)
+    found: Array = spread @ np.linalg.lstsq(ways @ spread, missed, rcond=1e-13)[0]
+    return found

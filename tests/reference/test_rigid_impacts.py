@@ -1,0 +1,295 @@
+"""Impacts of rigid bodies in play against published times, limits and laws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion.dynamics.impact_motion as impact_motion
+from trunnion import simulate
+from trunnion.dynamics.closed import ClosedMotion, rates_of
+from trunnion.dynamics.opened import opened
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.start import initial_row
+from trunnion.dynamics.touching import contacts_of
+from trunnion.errors import MechanismError
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import attribute, summary_of
+from trunnion.solve.run import prepare
+
+FIRST, SECOND = 2.692502752e-3, 5.612363190e-3  # s, of Flores, Leine, Glocker's slider
+CLEARANCE = 1e-3  # m; what a step tells of its inside is exact to the integrator's tolerance
+RIGID = {"law": "rigid", "restitution": 0.4}
+
+
+def guide(friction: float = 0.01, contact: dict[str, Any] | None = None, **initial: float) -> Mechanism:
+    """The slider-crank with a slider in play of P. Flores, R. Leine, Ch. Glocker, Multibody Syst. Dyn. 23 (2010)
+    165-190, doi:10.1007/s11044-009-9178-y."""
+    return Mechanism(
+        gravity=[0, -9.81],
+        links={
+            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+            "crank": {
+                "points": {"O": [0, 0], "A": [0.153, 0]},
+                "mass": 0.038,
+                "inertia": 7.4e-5,
+                "centre": [0.0765, 0],
+            },
+            "rod": {"points": {"A": [0, 0], "B": [0.306, 0]}, "mass": 0.038, "inertia": 5.9e-4, "centre": [0.153, 0]},
+            "slider": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 0.076, "inertia": 2.7e-6},
+        },
+        ground="frame",
+        joints={
+            "O": {"type": "revolute", "links": ["frame", "crank"]},
+            "A": {"type": "revolute", "links": ["crank", "rod"]},
+            "B": {"type": "revolute", "links": ["rod", "slider"]},
+            "S": {
+                "type": "prismatic",
+                "links": ["frame", "slider"],
+                "guide": {"length": 0.1, "height": 0.05, "clearance": CLEARANCE},
+                "friction": friction,
+                "contact": contact or RIGID,
+            },
+        },
+        drivers={"O": {"speed": 150, "free": True, "initial": {"coordinate": 0, "speed": 150, **initial}}},
+        assembly={"S": [0.459, 0]},
+    )
+
+
+def pin(contact: dict[str, Any], friction: float = 0.0) -> Mechanism:
+    """A slider-crank whose crank is driven evenly, with a worn pin at its slider."""
+    return Mechanism(
+        links={
+            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+            "crank": {"points": {"O": [0, 0], "P": [0.05, 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": [0.12, 0]}, "mass": 0.21, "inertia": 2.5e-4, "centre": [0.06, 0]},
+            "slider": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}, "mass": 0.14},
+        },
+        ground="frame",
+        joints={
+            "O": {"type": "revolute", "links": ["frame", "crank"]},
+            "P": {"type": "revolute", "links": ["crank", "rod"]},
+            "Q": {
+                "type": "revolute",
+                "links": ["rod", "slider"],
+                "pin": {"radius": 9.5e-3, "hole_radius": 10e-3},
+                "contact": contact,
+                **({"friction": friction} if friction else {}),
+            },
+            "S": {"type": "prismatic", "links": ["frame", "slider"]},
+        },
+        drivers={"O": {"speed": 523.5987755983}},
+        assembly={"Q": [0.17, 0]},
+    )
+
+
+def events(result: Any, kind: str, of: str) -> list[float]:
+    rows = attribute(result, "events")
+    return [float(t) for row, t in zip(rows, result["event_time"].values, strict=True) if row[:2] == [kind, of]]
+
+
+def balanced(result: Any) -> bool:
+    """Whether the energy account is right to 1e-8 of the energy turned over."""
+    moved = max(float(np.nanmax(np.abs(result[name].values))) for name in ("work_drive", "work_contact"))
+    return bool(np.nanmax(np.abs(result["energy_residual"].values)) < 1e-8 * moved)
+
+
+def codes(result: Any) -> list[str]:
+    return [one.code for one in result.trunnion.findings]
+
+
+# ---- the slider in its guide ------------------------------------------------------------------------------------
+
+
+def test_a_slider_in_its_guide_strikes_closes_and_lifts_off() -> None:
+    result = simulate(guide(), 16e-3, 32)
+    for corner in ("S.1", "S.2"):  # the upper wall
+        struck = events(result, "impact", corner)
+        assert struck[:2] == [pytest.approx(FIRST, rel=1e-8, abs=0), pytest.approx(SECOND, rel=1e-8, abs=0)]
+        assert events(result, "closes", corner) == [pytest.approx(9.145619e-3, abs=1e-7)]
+        assert events(result, "lift-off", corner) == [pytest.approx(15.028652e-3, abs=1e-7)]
+        assert events(result, "closes", corner)[0] > struck[-1]
+    assert not events(result, "impact", "S.3")
+    closed = (result["time"].values > 9.2e-3) & (result["time"].values < 15e-3)
+    assert np.all(np.abs(result["contact_gap"].values[:2, closed]) < 1e-9 * CLEARANCE)
+    assert np.all(result["contact_touching"].values[:2, closed] == 1)
+    normal, friction = (result[f"contact_{name}_force"].values[0, closed] for name in ("normal", "friction"))
+    assert np.all(normal > 0)
+    assert friction == pytest.approx(-0.01 * normal * np.sign(result["contact_slip"].values[0, closed]), rel=1e-12)
+    reaction = result["reaction_force"].sel(joint="S", axis="y").values[closed]
+    assert reaction == pytest.approx(-result["contact_normal_force"].values[:2, closed].sum(axis=0), rel=1e-12)
+    assert balanced(result)
+    assert not codes(result)
+    (impulse,) = [one.value for one in summary_of(result) if one.name == "S.1.impulse_max"]
+    assert impulse == pytest.approx(result["impact_impulse"].values[0])
+
+
+def test_the_speeds_after_the_first_impact() -> None:
+    """ω⁺ of crank and rod, and their angles; the restitution is that of the gap."""
+    after = FIRST + 1e-11
+    result = simulate(guide(), 2 * after, 2)
+    crank, rod = (result["link"].values.tolist().index(link) for link in ("crank", "rod"))
+    angle, speed = (result[f"link_angle{suffix}"].values[:, 1] for suffix in ("", "_velocity"))
+    assert angle[[crank, rod]] == pytest.approx([0.355304455, -0.171509541], abs=3e-9)
+    assert speed[[crank, rod]] == pytest.approx([108.724580, -52.842290], rel=2e-8)
+    back, to = result["impact_separation"].values[:2], result["impact_approach"].values[:2]
+    assert back == pytest.approx(0.4 * to, rel=1e-12)
+    assert np.all(result["impact_impulse"].values > 0)
+
+
+@pytest.mark.slow
+def test_stepping_converges_to_the_events_to_the_first_order() -> None:
+    duration = 4e-3  # one impact
+    followed = simulate(guide(), duration, 1)
+    exact = float(followed["drive_rate"].values[0, -1])
+    steps = np.array([50, 100, 200, 400])
+    found = [simulate(guide(), duration, 1, impact_step=duration / n) for n in steps]
+    errors = np.abs([float(one["drive_rate"].values[0, -1]) - exact for one in found])
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.05)
+    assert codes(found[-1]) == ["simulate.energy_stepped"]
+    assert len(events(found[-1], "impact", "S.1")) == 1
+    impulse = float(found[-1]["impact_impulse"].values[0])
+    assert impulse == pytest.approx(float(followed["impact_impulse"].values[0]), rel=0.02)
+
+
+def test_impacts_without_end_are_stepped_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(impact_motion, "CROWD", 2)
+    monkeypatch.setattr(impact_motion, "CROWDED", 1.0)
+    result = simulate(guide(), 7e-3, 7)
+    (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.stepped"]
+    assert finding.figures["time"] == pytest.approx(SECOND, rel=1e-8)
+    assert np.all(np.isfinite(result["drive_rate"].values))
+
+
+# ---- closed, stuck and jammed -----------------------------------------------------------------------------------
+
+
+def test_without_restitution_the_first_impact_closes() -> None:
+    result = simulate(guide(contact={"law": "rigid", "restitution": 0}), 4e-3, 8)
+    assert events(result, "closes", "S.1") == events(result, "impact", "S.1")
+    assert np.all(np.abs(result["contact_gap"].values[0, -2:]) < 1e-9 * CLEARANCE)
+    assert balanced(result)
+
+
+@pytest.mark.slow
+def test_a_slider_comes_to_rest_on_its_wall() -> None:
+    """At a friction of 1.5 gravity does not move the crank on: it rests for good, held within the cone."""
+    result = simulate(guide(1.5, {"law": "rigid", "restitution": 0.5}, coordinate=1.0, speed=20), 0.6, 20)
+    assert np.all(np.abs(result["drive_rate"].values[0, -5:]) < 1e-12)
+    touching = result["contact_touching"].values[:, -1]
+    assert touching.tolist() == [0, 0, 1, 1]  # on the lower wall
+    normal, friction = (result[f"contact_{name}_force"].values[2:, -1] for name in ("normal", "friction"))
+    assert np.all(np.abs(friction) < 1.5 * normal)
+    assert balanced(result)
+
+
+@pytest.mark.slow
+def test_a_guide_that_jams_says_so_and_keeps_what_was_found() -> None:
+    result = simulate(guide(3.0, {"law": "rigid", "restitution": 0.5}, coordinate=1.0, speed=20), 0.2, 20)
+    (jam,) = [one for one in result.trunnion.findings if one.code == "simulate.no_contact_force"]
+    (lowered,) = [one for one in result.trunnion.findings if one.code == "simulate.restitution_lowered"]
+    assert 0 < lowered.figures["share"] < 1
+    rate, time = result["drive_rate"].values[0], result["time"].values
+    assert np.all(np.isfinite(rate) == (time <= jam.figures["time"]))
+    assert balanced(result)
+
+
+# ---- the pin in its hole ----------------------------------------------------------------------------------------
+
+
+def test_a_pin_closes_in_its_hole_and_the_account_is_right() -> None:
+    """The crank is driven evenly: what it gives in an impact is part of the account."""
+    result = simulate(pin({"law": "rigid", "restitution": 0.5}, 0.2), 1.5e-3, 15)
+    struck = events(result, "impact", "Q")
+    assert struck[0] == pytest.approx(2.2728603e-4, rel=1e-7)
+    (closes,) = events(result, "closes", "Q")
+    assert struck[-1] < closes < struck[-1] + 1e-8
+    closed = result["time"].values > closes
+    radius = np.hypot(*result["contact_offset"].values[0])
+    assert radius[closed] == pytest.approx(0.5e-3, rel=1e-12)
+    assert balanced(result)
+
+
+@pytest.mark.slow
+def test_stiff_contacts_tend_to_rigid_impacts() -> None:
+    """What misses falls with the time of a contact, as K^(−2/5): by 6.3 for a stiffness a hundred times as large."""
+    rigid = simulate(pin({"law": "rigid", "restitution": 0.9}), 7e-4, 4)
+    missed = []
+    for stiffness in (1e11, 1e13):
+        soft = simulate(pin({"law": "restitution", "restitution": 0.9, "stiffness": stiffness}), 7e-4, 4)
+        missed.append([
+            abs(float(soft[name].values[at] - rigid[name].values[at]))
+            for name, at in (("impact_separation", 0), ("impact_begin", 1), ("impact_impulse", 0))
+        ])  # fmt: skip
+        assert float(soft["impact_begin"].values[0]) == pytest.approx(float(rigid["impact_begin"].values[0]), rel=1e-9)
+    for wide, narrow in zip(*missed, strict=True):
+        assert 4.5 < wide / narrow < 8.5
+    assert missed[1][0] < 0.013 * 4.3858
+
+
+# ---- accelerations at contacts ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mechanism", [guide(), pin(RIGID)])
+def test_gaps_and_slips_accelerate_as_their_rates_change(mechanism: Mechanism) -> None:
+    """Against central differences of the rates along a motion."""
+    run, random = prepare(mechanism), np.random.default_rng(7)
+    playing = [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
+    motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, playing))
+    layout, row = Layout.of(motion), initial_row(motion)
+    q, rate, second = (random.normal(size=(len(motion.names), 1)) * size for size in (0.2, 30.0, 500.0))
+    q[:, 0] = 0.02 * q[:, 0] + row[: len(q)] + 0.3
+    time, step = 1e-3, 1e-6
+
+    def at(shift: float) -> Any:
+        places = q + shift * rate + 0.5 * shift**2 * second
+        rows = np.vstack([places, rate + shift * second, np.zeros((layout.size - 2 * len(q), 1))])
+        return motion.walk(layout.moment(np.array([time + shift]), rows), second)
+
+    before, after = (rates_of(motion.contacts.states(at(side * step)))[:, 0] for side in (-1, 1))
+    here = at(0.0)
+    found = [one.accelerations(here) for one in motion.contacts.each]
+    exact = np.array([gap[0] for gap, _ in found] + [slip[0] for _, slip in found])
+    assert exact == pytest.approx((after - before) / (2 * step), rel=1e-6)
+
+
+# ---- what is stated ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("contact", "where"),
+    [
+        ({"law": "rigid"}, ""),
+        ({"law": "rigid", "restitution": 0.5, "stiffness": 1e9}, ".stiffness"),
+        ({"law": "rigid", "restitution": 0.5, "modulus": "210 GPa"}, ".modulus"),
+        ({"law": "rigid", "restitution": -0.1}, ".restitution"),
+        ({"law": "rigid", "restitution": 1.1}, ".restitution"),
+        ({"law": "restitution", "restitution": 0, "stiffness": 1e9}, ".restitution"),
+    ],
+)
+def test_contacts_that_cannot_be(contact: dict[str, Any], where: str) -> None:
+    with pytest.raises(MechanismError) as raised:
+        pin(contact)
+    assert [one.where for one in raised.value.findings] == [f"joints.Q.contact{where}"]
+
+
+def test_motions_that_cannot_be() -> None:
+    with pytest.raises(MechanismError) as raised:
+        simulate(pin({"law": "hertz", "stiffness": 1e9}), 1e-4, 1, impact_step=1e-6)
+    assert raised.value.findings[0].where == "impact_step"
+    with pytest.raises(MechanismError) as raised:
+        simulate(pin(RIGID), 1e-4, 1, impact_step=-1.0)
+    assert raised.value.findings[0].where == "impact_step"
+    data = {key: part for key, part in guide().data().items() if part and key not in ("trunnion", "space")}
+    joints = {name: dict(one) for name, one in data["joints"].items()}
+    joints["B"] |= {"pin": {"clearance": 1e-4}, "contact": {"law": "hertz", "stiffness": 1e9}}
+    with pytest.raises(MechanismError) as raised:
+        simulate(Mechanism(**{**data, "joints": joints}), 1e-4, 1)
+    assert [one.where for one in raised.value.findings] == ["joints.B.contact.law"]
+    joints = {name: dict(one) for name, one in data["joints"].items()}
+    joints["S"]["friction"] = {"law": "viscous", "coefficient": 0.1, "viscous": 0.1}
+    with pytest.raises(MechanismError) as raised:
+        simulate(Mechanism(**{**data, "joints": joints}), 1e-4, 1)
+    assert [one.where for one in raised.value.findings] == ["joints.S.friction"]

@@ -29,7 +29,7 @@ __all__ = ["TOLERANCE", "figures_in_time", "together"]
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-8  # of the steps, relative: figures to 1e-7
+TOLERANCE = 1e-9  # of the steps, relative: figures to 1e-6 and better
 
 
 @np.errstate(all="ignore")

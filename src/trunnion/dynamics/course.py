@@ -33,7 +33,8 @@ FEWEST = 3  # whole turns of which one speaks of a steady one
 DEGREE = 7  # of the dense output of DOP853
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)  # of a step, from its begin 0 to its end 1
 FINE = 32  # parts of a step in which its largest number is looked for
-_COEFFICIENTS: Array = np.asarray(np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE)), float)  # of the polynomial, by the nodes
+# coefficients of the polynomial, by the nodes
+_COEFFICIENTS: Array = np.asarray(np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE)), np.float64)
 _DERIVED: Array = 2 * chebyshev.chebvander(2 * NODES - 1, DEGREE - 1) @ chebyshev.chebder(_COEFFICIENTS)
 _FINER: Array = chebyshev.chebvander(np.linspace(-1.0, 1.0, FINE + 1), DEGREE) @ _COEFFICIENTS
 ROUNDS, EXACT = 60, 1e-15  # to the place of a number in a step

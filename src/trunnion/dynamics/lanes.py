@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.sampled import SampledTables
 from trunnion.dynamics.tables import FIXED
+from trunnion.dynamics.tabulated import spectral_radius
 
 __all__ = ["LaneState", "Lanes", "picked_drive"]
 
@@ -185,8 +186,7 @@ class Lanes:
         count = per.shape[1]
         if not count:
             return per, np.ones(len(per), bool)
-        pairs = np.abs(influence).reshape(len(per), count, -1)
-        sound = (np.abs(per) * pairs.sum(axis=2)).max(axis=1) < CONTRACTION
+        sound = self._certain(per, influence)
         found, left = begin.copy(), np.flatnonzero(sound)
         if len(left) < len(per):
             per, first, influence = per[left], first[left], influence[left]
@@ -204,6 +204,16 @@ class Lanes:
                 left, per, first, influence = left[far], per[far], first[far], influence[far]
         sound[left] = False
         return found, sound & np.all(np.isfinite(found), axis=1)
+
+    def _certain(self, per: Array, influence: Array) -> Flags:
+        """Whether the map of the friction forces has one fixed point, by the bounds of `tabulated`."""
+        x, y = np.abs(influence[:, 0::2]), np.abs(influence[:, 1::2])
+        found = np.asarray((np.abs(per) * (x + y).sum(axis=2)).max(axis=1) < CONTRACTION)
+        for lane in np.flatnonzero(~found):
+            pins = self.pins[:, None]
+            each = np.where(pins, np.hypot(x[lane], y[lane]), np.maximum(x[lane], y[lane]))
+            found[lane] = spectral_radius(np.abs(per[lane])[:, None] * each) < CONTRACTION
+        return found
 
     def _normals(self, reaction: Array) -> tuple[Array, Array, Array]:
         """Normal load of every contact, N, and its two components."""

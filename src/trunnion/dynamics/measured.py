@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.batch import TOLERANCE, figures_in_time
+from trunnion.dynamics.batch import figures_in_time
 from trunnion.measures.evaluation import Courses, NumpyKernel, shape_of
 from trunnion.measures.measures import Measure
 from trunnion.solve.run import Run
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 STEP = 1e-3  # of a number, by which differences are taken
 STEP_OF_NONE = 1e-5  # of the mechanism's size, or of a radian: the step of a number that is 0
 FEW, KEPT = 256, 64  # samples of which figures are kept, and how many of them
-EXACT = 1e-9  # tolerance of motions that are to be differentiated
 
 
 class MotionKernel(NumpyKernel):
@@ -61,13 +60,13 @@ def _figures(
     own = {path: _column(primal(value), count) for path, value in values.items()}
     column = (count, 1) if len(shape) == 2 else (1,)
     if not dual:
-        figures = _known(run, driver, own, count, duration, TOLERANCE)
+        figures = _known(run, driver, own, count, duration)
         return {name: figure.reshape(column) for name, figure in figures.items()}
     slopes = {path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1)) for path, value in dual.items()}
     step = _steps(run, own, slopes)
     moved = np.flatnonzero(np.any(np.array(list(slopes.values())) != 0.0, axis=(0, 2)))
     tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in own.items()}
-    figures = _known(run, driver, tried, count + 2 * len(moved), duration, EXACT)
+    figures = _known(run, driver, tried, count + 2 * len(moved), duration)
     found: dict[str, Number] = {}
     for name, figure in figures.items():
         change = np.zeros(count)
@@ -77,19 +76,17 @@ def _figures(
     return found
 
 
-def _known(
-    run: Run, driver: str, values: Mapping[str, Number], count: int, duration: float | None, tolerance: float
-) -> dict[str, Array]:
+def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, duration: float | None) -> dict[str, Array]:
     """`figures_in_time`; those of few samples are kept, as a search asks for the same ones measure by measure."""
     if count > FEW:
-        return figures_in_time(run, driver, values, count, duration, tolerance)
+        return figures_in_time(run, driver, values, count, duration)
     kept: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
     numbers = tuple((path, np.asarray(value, float).tobytes()) for path, value in values.items())
-    what = driver, duration, tolerance, count, numbers
+    what = driver, duration, count, numbers
     if what not in kept:
         if len(kept) >= KEPT:
             kept.clear()
-        kept[what] = figures_in_time(run, driver, values, count, duration, tolerance)
+        kept[what] = figures_in_time(run, driver, values, count, duration)
     return kept[what]
 
 

@@ -222,10 +222,11 @@ class Starts:
         pace = np.maximum(self.pace[lanes], np.abs(new[SPEED]))
         self.pace[lanes] = np.where(np.isfinite(pace), pace, self.pace[lanes])
         own = self.pace[lanes]
-        absolute = self.tolerance * np.array(
-            [1.0 / own, np.full_like(own, 0.01 * self.size), 0.01 * own, own * 0 + 1.0]
-        )
-        scale = absolute + np.maximum(np.abs(old), np.abs(new)) * self.tolerance
+        # of time and coordinate what is typical: how long it has run and how far is no measure of a turn
+        scale = self.tolerance * np.array([
+            1.0 / own, np.full_like(own, self.size), 0.01 * own + np.maximum(np.abs(old[2]), np.abs(new[2])),
+            1.0 + np.maximum(np.abs(old[3]), np.abs(new[3])),
+        ])  # fmt: skip
         fifth = np.sum((_summed(DOP853.E5, slopes) / scale) ** 2, axis=0)
         third = np.sum((_summed(DOP853.E3, slopes) / scale) ** 2, axis=0)
         found = np.abs(size) * fifth / np.sqrt((fifth + 0.01 * third) * 3.0)

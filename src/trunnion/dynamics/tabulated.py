@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import operator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -16,7 +18,7 @@ from trunnion.dynamics.tables import FIXED, Rub, Tables
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.system import law_of
 
-__all__ = ["TabulatedRates"]
+__all__ = ["TabulatedRates", "spectral_radius"]
 
 Array = NDArray[np.float64]
 
@@ -76,6 +78,10 @@ class TabulatedRates:
     @cached_property
     def _pins(self) -> NDArray[np.bool_]:
         return np.array([getattr(rub.load, "across", 0) is None for rub in self.tables.rubs])
+
+    @cached_property
+    def _round(self) -> list[bool]:
+        return [bool(one) for one in self._pins]
 
     @cached_property
     def _only_pins(self) -> bool:
@@ -174,21 +180,28 @@ class TabulatedRates:
 
     def _chord(self, per: Array, first: Array, influence: Array) -> Array | None:
         """By Newton's method with the derivative of an earlier moment, renewed where it is slow; in the plane."""
-        found = self._last
+        found, inverse = self._last.tolist(), self._inverse.tolist()
+        pairs = list(zip(influence[0::2].tolist(), influence[1::2].tolist(), strict=True))
+        starts, factors = first.reshape(-1, 2).tolist(), per.tolist()
         for round_ in range(ROUNDS):
-            reaction = first + influence @ found
-            normals = self._normals(reaction)
-            miss = per * normals - found
-            size = float(np.abs(miss).max())
-            if size <= SETTLED * float(np.abs(found).max()):
-                self._last = found
-                return found
-            if not np.isfinite(size):
+            # plain numbers: of the few contacts of a linkage that is faster than arrays
+            miss = []
+            for one, (x, y), rows, pin, old in zip(factors, starts, pairs, self._round, found, strict=True):
+                x, y = x + _times(rows[0], found), y + _times(rows[1], found)
+                normal = math.sqrt(x * x + y * y) if pin else max(abs(x), abs(y))
+                miss.append(one * normal - old)
+            size = max(map(abs, miss))
+            if size <= SETTLED * max(map(abs, found)):
+                self._last = np.array(found)
+                return self._last
+            if not math.isfinite(size):
                 return None
-            if len(self._inverse) != len(per) or round_ % STALE == STALE - 1:
-                slopes = self._slopes(per, reaction, normals, influence)
+            if len(inverse) != len(factors) or round_ % STALE == STALE - 1:
+                reaction = first + influence @ np.array(found)
+                slopes = self._slopes(per, reaction, self._normals(reaction), influence)
                 self._inverse = np.asarray(np.linalg.inv(np.eye(len(per)) - slopes), float)
-            found = found + self._inverse @ miss
+                inverse = self._inverse.tolist()
+            found = [old + _times(row, miss) for old, row in zip(found, inverse, strict=True)]
         return None
 
     def _slopes(self, per: Array, reaction: Array, normals: Array, influence: Array) -> Array:
@@ -209,13 +222,30 @@ class TabulatedRates:
         return np.array([float(rub.load.normal(tuple(reaction[rub.rows]))) for rub in self.tables.rubs])
 
     def _bound(self, per: Array, influence: Array) -> float:
-        """At least the largest derivative of the map of the friction forces, in the largest norm."""
+        """At least the largest derivative of the map of the friction forces, in the norm in which it is least.
+
+        Where |F_i(φ) − F_i(ψ)| ≤ Σ_j L_ij |φ_j − ψ_j| there is one fixed point if the spectral radius of L is below 1
+        (J. M. Ortega, W. C. Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables, 1970, 13.1).
+        """
         count = len(per)
-        if self._planar:  # |x| + |y| is above both hypot and max
-            return float((np.abs(per) * np.abs(influence).reshape(count, -1).sum(axis=1)).max())
+        if self._planar:
+            x, y = np.abs(influence[0::2]), np.abs(influence[1::2])
+            if (rough := float((np.abs(per) * (x + y).sum(axis=1)).max())) < CONTRACTION:
+                return rough  # |x| + |y| is above both hypot and max
+            each = np.abs(per)[:, None] * np.where(self._pins[:, None], np.hypot(x, y), np.maximum(x, y))
+            return spectral_radius(each)
         rubs = self.tables.rubs
         sums = [sum(float(rub.load.bound(tuple(influence[rub.rows, k]))) for k in range(count)) for rub in rubs]
         return float((np.abs(per) * np.array(sums)).max())
+
+
+def spectral_radius(matrix: Array) -> float:
+    """Largest |eigenvalue| of a matrix of bounds; infinite where one has no value."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max()) if np.all(np.isfinite(matrix)) else np.inf
+
+
+def _times(row: list[float], numbers: list[float]) -> float:
+    return sum(map(operator.mul, row, numbers))
 
 
 def _per(rub: Rub, slip: float, deflection: float) -> float:

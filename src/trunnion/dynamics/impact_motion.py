@@ -176,7 +176,7 @@ class ImpactMotion(SteppedMotion):
         for i in rebounds:
             k, speed = places[i], float(struck.after[i])
             pull = -float(np.ravel(self.motion.contacts.each[k].accelerations(walk)[0])[0])
-            if pull > 0.0 and speed > 0.0:
+            if pull > 0.0 and speed > 0.0 and self.restitution[k] > 0.0:
                 low, e = 0.5 * speed * speed / pull < self.low[k], self.restitution[k]
                 found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
         return found

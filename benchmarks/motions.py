@@ -2,8 +2,8 @@
 
 One start-up of 1 s, and many toleranced ones, of the press of the examples: with the friction of all joints, a gear
 with loss and an induction motor. Beside them a kernel written by hand for the frictionless press with the same
-masses, motor and load: its one equation in closed form, integrated by SciPy's DOP853 to the same tolerance. CPU time, best of
-several rounds in turn, and the wall time of two processes. Read the ratios; nothing here is a test.
+masses, motor and load: its one equation in closed form, integrated by DOP853 of SciPy to the same tolerance. CPU time,
+the best of several rounds in turn, and the wall time of two processes. Read the ratios; nothing here is a test.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def test_columns_of_contacts_and_impacts() -> None:
     assert times["Q.contact_gap"][0] == "m"
     assert times["Q.contact_gap"][1][0] == pytest.approx(5e-4)
     assert times["Q.contact_offset.x"][1][0] == pytest.approx(0.0, abs=1e-15)
-    assert {"work_contact", "contact_energy", "Q.reaction.x"} <= times.keys()
+    assert {"work_contact", "contact_energy", "Q.reaction_x"} <= times.keys()
     impacts = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled(), "impacts")}
     assert list(impacts["contact"][1]) == ["Q", "Q"]
     assert impacts["approach"][0] == "m/s"

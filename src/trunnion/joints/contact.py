@@ -25,8 +25,8 @@ __all__ = [
     "CONTACT_LAWS", "ContactLaw", "elastic_force", "hertz_stiffness", "loss_factor", "normal_force", "restitution_of",
 ]  # fmt: skip
 
-MOST = 1e9  # loss factor beyond which nothing comes back
 HALVINGS = 200
+SMALL, TERMS = 0.05, 20  # χ of which the series is summed, and its terms
 
 
 @dataclass(frozen=True)
@@ -75,35 +75,38 @@ def hertz_stiffness(
     return float(4 / (3 * compliance) * np.sqrt(pin_radius * hole_radius / (hole_radius - pin_radius)))
 
 
+def _missing(factor: float, restitution: float) -> float:
+    """What the equation of an impact lacks, χ (1 + e) − ln((1 + χ)/(1 − χ e)), over χ²; from above to below 0 as χ or e
+    grows. Of a small χ by its series, whose first terms cancel in the logarithms."""
+    if factor < SMALL:
+        return sum(((-1) ** k - restitution**k) * factor ** (k - 2) / k for k in range(2, TERMS))
+    with np.errstate(divide="ignore"):  # at the end of the range
+        logarithms = np.log1p(factor) - np.log1p(-factor * restitution)
+    return float((factor * (1 + restitution) - logarithms) / factor**2)
+
+
+def _halved(low: float, high: float, missing: Callable[[float], float]) -> float:
+    """Where a function passes 0 from above."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if missing(middle) > 0 else (low, middle)
+        if high - low <= 4e-16 * high:
+            break
+    return 0.5 * (low + high)
+
+
 def restitution_of(factor: float) -> float:
     """The restitution e that a loss factor χ gives, from 1 (χ = 0) down."""
     if factor == 0.0:
         return 1.0
-
-    @np.errstate(divide="ignore")  # at the end of the range
-    def missing(e: float) -> float:
-        return float(np.log1p(factor) - np.log1p(-factor * e) - factor * (1 + e))
-
-    low, high = 0.0, min(1.0, (1.0 - 1e-16) / factor)
-    for _ in range(HALVINGS):  # it grows from below 0 without bound
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if missing(middle) < 0 else (low, middle)
-    return 0.5 * (low + high)
+    return _halved(0.0, min(1.0, (1.0 - 1e-16) / factor), lambda restitution: _missing(factor, restitution))
 
 
 def loss_factor(restitution: float) -> float:
-    """The loss factor χ from which the restitution e comes back: the equation above, solved for χ."""
+    """The loss factor χ from which the restitution e comes back: the equation above, solved for χ < 1/e."""
     if restitution >= 1.0:
         return 0.0
-    low, high = 0.0, 1.0
-    while restitution_of(high) > restitution and high < MOST:
-        high *= 2.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if restitution_of(middle) > restitution else (low, middle)
-        if high - low <= 4e-16 * high:
-            break
-    return 0.5 * (low + high)
+    return _halved(0.0, 1.0 / restitution, lambda factor: _missing(factor, restitution))
 
 
 CONTACT_LAWS: dict[str, ContactLaw] = {

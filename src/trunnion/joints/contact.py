@@ -79,7 +79,7 @@ def _missing(factor: float, restitution: float) -> float:
     """What the equation of an impact lacks, χ (1 + e) − ln((1 + χ)/(1 − χ e)), over χ²; from above to below 0 as χ or e
     grows. Of a small χ by its series, whose first terms cancel in the logarithms."""
     if factor < SMALL:
-        return sum(((-1) ** k - restitution**k) * factor ** (k - 2) / k for k in range(2, TERMS))
+        return float(sum(((-1) ** k - restitution**k) * factor ** (k - 2) / k for k in range(2, TERMS)))
     with np.errstate(divide="ignore"):  # at the end of the range
         logarithms = np.log1p(factor) - np.log1p(-factor * restitution)
     return float((factor * (1 + restitution) - logarithms) / factor**2)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import trunnion.dynamics.impact_motion as impact_motion
 from trunnion import simulate
+from trunnion.cli.app import app
 from trunnion.dynamics.closed import ClosedMotion, rates_of
 from trunnion.dynamics.opened import opened
 from trunnion.dynamics.rates import Layout
@@ -293,3 +296,33 @@ def test_motions_that_cannot_be() -> None:
     with pytest.raises(MechanismError) as raised:
         simulate(Mechanism(**{**data, "joints": joints}), 1e-4, 1)
     assert [one.where for one in raised.value.findings] == ["joints.S.friction"]
+
+
+@pytest.mark.slow
+def test_several_joints_in_play_at_once() -> None:
+    """A rod that no joint holds, between two worn pins, and a slider with play: some strike while others are closed."""
+    data = {key: part for key, part in pin({"law": "rigid", "restitution": 0.6}, 0.15).data().items()
+            if key in ("links", "ground", "joints", "drivers", "assembly")}  # fmt: skip
+    joints = {name: dict(one) for name, one in data["joints"].items()}
+    joints["P"] |= {key: joints["Q"][key] for key in ("pin", "contact", "friction")}
+    joints["S"] |= {"guide": {"length": 0.05, "height": 0.03, "clearance": 2e-4}, "contact": RIGID}
+    links = {name: dict(one) for name, one in data["links"].items()}
+    links["slider"]["inertia"] = 3e-5
+    result = simulate(Mechanism(**{**data, "links": links, "joints": joints}), 7.5e-4, 6)
+    struck = {of for kind, of, *_ in attribute(result, "events") if kind == "impact"}
+    assert {"P", "Q"} < struck
+    assert np.all(result["contact_gap"].values > -1e-9 * CLEARANCE)
+    assert balanced(result)
+    assert not codes(result)
+
+
+def test_a_step_is_stated_on_the_command_line(tmp_path: Path) -> None:
+    model, table = tmp_path / "guide.yaml", tmp_path / "guide.csv"
+    guide().write(model)
+    found = CliRunner().invoke(app, ["simulate", str(model), "--time", "1ms", "--steps", "2", "--impact-step", "100us",
+                                     "--out", str(table)])  # fmt: skip
+    assert found.exit_code == 0, found.output
+    assert table.read_text().count("\n") >= 4
+    found = CliRunner().invoke(app, ["simulate", str(model), "--time", "1ms", "--impact-step", "2s"])
+    assert isinstance(found.exception, MechanismError)
+    assert found.exception.findings[0].where == "impact_step"

@@ -387,4 +387,35 @@ _DYNAMICS = (
     ),
 )
 
-FAULTS = (*_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_DYNAMICS, *_MEASURES)
+_CONTACT = (
+    Fault(
+        "slip-without-the-spin-of-the-pin",
+        "dynamics/touching.py",
+        "a[2] * tx + a[3] * ty + spins[0] *",
+        "a[2] * tx + a[3] * ty + 0.0 * spins[0] *",
+        ("tests/reference/test_contacts.py", "-k", "friction"),
+    ),
+    Fault(
+        "contact-without-its-loss",
+        "joints/contact.py",
+        ".maximum(1.0 + factor * rate / onset, 0.0)",
+        ".maximum(1.0 + 0.0 * factor * rate / onset, 0.0)",
+        ("tests/reference/test_contacts.py", "-k", "first_contact"),
+    ),
+    Fault(
+        "contact-pushes-the-pin-alone",
+        "dynamics/touching.py",
+        "((self.body, 1.0), (self.other, -1.0))",
+        "((self.body, 1.0),)",
+        ("tests/reference/test_contacts.py", "-k", "reaction"),
+    ),
+    Fault(
+        "mass-matrix-of-the-other-sign",
+        "dynamics/compiled_rates.py",
+        "share = matrix[i][k] / matrix[k][k]",
+        "share = -matrix[i][k] / matrix[k][k]",
+        ("tests/reference/test_contacts.py", "-k", "machine_code"),
+    ),
+)
+
+FAULTS = (*_CONTACT, *_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_DYNAMICS, *_MEASURES)

@@ -39,7 +39,7 @@ VALUES = {  # two of each key, which differ
     "pin.bearing": ("50 mm", "70 mm"), "pin.clearance": ("0.1 mm", "0.2 mm"),
     "pin.fit": ("32 mm H8/d9", "32 mm H8/e9"), "pin.offset": ("5 mm", "15 mm"),
     "pin.cylindricity": ("20 um", "90 um"), "pin.end_float": ("0.1 mm", "0.4 mm"),
-    "guide.length": ("0.3 m", "0.4 m"), "guide.width": ("0.1 m", "0.2 m"), "guide.clearance": ("0.1 mm", "0.2 mm"),
+    "guide.length": ("0.3 m", "0.4 m"), "guide.width": ("0.1 m", "0.2 m"), "guide.height": ("40 mm", "50 mm"), "guide.clearance": ("0.1 mm", "0.2 mm"),
     "misalignment.tilt": ("0.1 deg", "0.2 deg"), "misalignment.towards": ("10 deg", "80 deg"),
     "misalignment.offset": ("0.1 mm", "0.2 mm"), "misalignment.offset_towards": ("10 deg", "80 deg"),
     "friction.coefficient": (0.02, 0.03), "friction.model": ("two-contact", "pezzuti"),

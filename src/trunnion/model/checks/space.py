@@ -66,6 +66,9 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
         yield Finding(
             "a ball has no axis to offset its bearing along", f"{where}.pin.offset", "move the joint's points"
         )
+    if joint.guide and joint.guide.height is not None and joint.contact is None:
+        what = "the height of a guide is not used where it is not in play"
+        yield Finding(what, f"{where}.guide.height", "remove it, or state a contact", Severity.NOTE)
     if joint.friction is None:
         return
     if not turns and not slides:

@@ -24,7 +24,7 @@ from trunnion import analyse, simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.views.cycle.report import report as cycle_report
 from trunnion.views.motion.figure import KINDS, figure
-from trunnion.views.motion.report import report
+from trunnion.views.motion.report import _account, report
 from trunnion.views.motion.scene import MOST_ROWS, motion_scene
 from trunnion.views.motion.shown import shown
 
@@ -115,6 +115,14 @@ def test_what_came_in_is_what_is_left() -> None:
     assert told["Lost to friction"] == pytest.approx(-float(result["work_friction"][-1]), rel=1e-3)
     change = float(result["kinetic_energy"][-1] - result["kinetic_energy"][0])
     assert told["Change of the kinetic energy"] == pytest.approx(change, rel=1e-3)
+
+
+def test_what_contacts_take_goes_out_and_what_they_hold_is_left() -> None:
+    rows = shown(ends_early()).rows
+    ramp = xr.DataArray(np.linspace(0.0, 1.0, rows.sizes["position"]), dims="position")
+    told = _account(rows.assign(work_contact=2 * ramp, contact_energy=ramp))
+    assert dict(told["works"])["Lost in contacts"] == "−2.000\u00a0J"
+    assert dict(told["held"])["Change of the elastic energy of contacts"] == "1.000\u00a0J"
 
 
 def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
@@ -225,6 +233,16 @@ if NODE:
         assert told["axes"] == ["time"]
         end, rows = shown(result).end, motion_scene(shown(result))["count"]
         assert told["clicked"] == [pytest.approx(one.time / end * (rows - 1), abs=1) for one in shown(result).events]
+
+    def test_many_events_do_not_hide_the_curves(tmp_path: Path) -> None:
+        """As impacts in play are: a mark on the axis each, and no line."""
+        scene = motion_scene(shown(ends_early()))
+        scene["motion"]["events"] = [{"at": 0.25 * k, "word": "impact"} for k in range(100)]
+        path = tmp_path / "scene.json"
+        path.write_text(json.dumps(scene), encoding="utf-8")
+        told = json.loads(run("page.test.mjs", path))["motion"]
+        assert told["marks"] == 100 * len(told["titles"])
+        assert told["lines"] == 0
 
     @pytest.mark.slow
     def test_it_is_played_in_real_time_and_stops_at_its_end(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from scipy import optimize
 from scipy.spatial.transform import Rotation
 
 import trunnion
+from brief import brief
 from measured import courses, figures, references
 from mechanisms import DURANGO, build, four_bar, slider_crank
 from mechanisms_space import rssr
@@ -307,7 +308,7 @@ def test_forces_are_those_of_the_analysis() -> None:
     ]
     found = figures(run, measures, steps)
     assert found["rms"] == pytest.approx(float(result["drive_effort_rms"][0]), rel=1e-6)
-    assert found["mean"] == pytest.approx(run.cycle.mean(trunnion.analyse(mechanism, 36_000)["drive_effort"].values[0]),
+    assert found["mean"] == pytest.approx(run.cycle.mean(brief(mechanism, 36_000)["drive_effort"].values[0]),
                                           rel=1e-5)  # fmt: skip
     for name, curve in {"most": effort, "size": size, "across": np.abs(reaction[1])}.items():
         assert 0 <= found[name] - np.max(curve) < 2e-3 * np.ptp(curve)
@@ -336,7 +337,7 @@ def test_locking_margin() -> None:
 def test_forces_in_space() -> None:
     """Efforts and reactions of an RSSR with friction are those of the analysis."""
     run = prepare(Mechanism(**rssr(friction=0.1).data))
-    result = trunnion.analyse(run.system.mechanism, 7200)
+    result = brief(run.system.mechanism, 7200)
     joint = next(iter(run.system.joints))
     measures = [
         Measure("z", "reaction", joint, "z", statistic="mean"),
@@ -433,7 +434,7 @@ def test_speeds_and_what_loads_take(model: str, joints: list[str]) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
     loads = [name for name, load in mechanism.loads.items() if load.joint]
     run = prepare(mechanism)
-    found = trunnion.analyse(mechanism, 24)
+    found = brief(mechanism, 24)
     measures = named(mechanism, [*(f"rate:{one}" for one in joints), *(f"load:{one}" for one in loads)], run.values)
     back = run.solve(run.cycle.times(24))
     curves = {one.name: np.broadcast_to(one.curve(back)[0], 24) for one in measures}
@@ -455,7 +456,7 @@ def test_force_and_elongation_of_springs() -> None:
         "coil": {"joint": "P", "stiffness": "2 N m/rad", "free_angle": "10 deg"},
     }
     run = prepare(build(data))
-    found = trunnion.analyse(run.system.mechanism, 24)
+    found = brief(run.system.mechanism, 24)
     names = [f"{kind}:{one}" for one in data["springs"] for kind in ("spring_force", "spring_elongation")]
     measures = named(run.system.mechanism, names, run.values)
     assert [one.unit(run.system) for one in measures] == ["N", "m", "N m", "rad"]

@@ -207,7 +207,7 @@ def newton_euler(friction: float, end: float) -> np.ndarray:
 
     Coordinates: crank angle only as state; accelerations from the constraint equations differentiated twice.
     """
-    r, length, lever = 0.035, 0.12, 0.01
+    r, length, lever, last = 0.035, 0.12, 0.01, np.zeros(4)
     m1, c1, j1, m2, c2, j2, m3 = 1.0, 0.01, 0.02, 0.5, 0.04, 1e-3, 0.6
     rotor, gravity, guide = 1e-3, 9.81, 0.05
 
@@ -221,7 +221,7 @@ def newton_euler(friction: float, end: float) -> np.ndarray:
         slide_rate = -r * s * w - length * np.sin(b) * wb
         # unknowns: α, β̈, ẍ, Ox, Oy, Px, Py, Qx, Qy, N, M; forces act on the second link of each joint
         speeds = np.array([w, wb - w, 0 - wb])
-        rub = np.zeros(4)  # friction torques of O, P, Q and friction force of S, on the second link
+        rub = last  # friction torques of O, P, Q and friction force of S, on the second link, from what they last were
         for _round in range(200):
             a, rhs = np.zeros((11, 11)), np.zeros(11)
             # crank: m1 a = O − P + m1 g; about its own centre
@@ -262,7 +262,7 @@ def newton_euler(friction: float, end: float) -> np.ndarray:
             new = np.append(-friction * lever * loads * np.sign(speeds), -friction * press * np.sign(slide_rate))
             if np.max(np.abs(new - rub)) <= 1e-13 * max(1.0, np.max(np.abs(new))):
                 break
-            rub = new
+            rub[:] = new
         return [w, float(x[0])]
 
     found = solve_ivp(rate, (0, end), [0.0, 1e-9], rtol=1e-9, atol=1e-11, method="DOP853", max_step=1e-3)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
+from brief import brief
 from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism, Status, locking
 from trunnion.algebra.plane import Wrench
@@ -92,7 +93,7 @@ def test_critical_multiples_are_where_it_locks(name: str) -> None:
         ):  # what was solved together is what the analysis of a model by itself says
             for factor in range(2):
                 whole["joints"][joint]["friction"] = float(stated[0, factor])
-                alone = trunnion.analyse(Mechanism(**whole), steps)["status"].values
+                alone = brief(Mechanism(**whole), steps)["status"].values
                 assert alone[at[0]] == status[0, factor]
     assert checked >= 6
 

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from brief import brief
 from mechanisms import build, slider_crank
-from trunnion import Status, analyse, read
+from trunnion import Status, read
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 
@@ -29,7 +30,7 @@ CASES = {
 def test_the_bounds_are_the_extremes_over_the_whole_interval(case):
     name, values, joint, inside = CASES[case]
     mechanism = read(EXAMPLES / f"{name}.yaml").with_values(values)
-    result, run = analyse(mechanism, 72), prepare(mechanism)
+    result, run = brief(mechanism, 72), prepare(mechanism)
     lower, own, upper = (result[f"drive_effort{end}"].values for end in ("_lower", "", "_upper"))
     driver = int(np.argmax(np.nanmax(upper - lower, axis=1))) if joint != "F" else 1
     shares = np.linspace(-1.0, 1.0, FINE)
@@ -61,7 +62,7 @@ def test_a_resisting_load_at_rest_is_part_of_the_interval():
     (slide,) = (name for name, joint in data["joints"].items() if joint["type"] == "prismatic")
     (driver,) = data["drivers"]
     data["loads"] = {"work": {"joint": slide, "resisting_force": 500.0, "useful": True}}
-    result = analyse(build(data, friction=0.1), 72_000)
+    result = brief(build(data, friction=0.1), 72_000)
     at_rest = np.flatnonzero(np.diff(np.sign(result["joint_slide_velocity"].sel(joint=slide).values)) != 0)
     flagged = np.flatnonzero(result["status"].values == Status.ZERO_SLIP)
     lower, upper = (result[f"drive_effort_{end}"].sel(driver=driver).values for end in ("lower", "upper"))

@@ -124,7 +124,8 @@ function played() {
   for (let time = 0.5 * seconds; time <= 1.2 * seconds && crank.playing(); time += seconds / 64) frame(time);
   return {
     titles: charts.find(classes("title")).map((element) => element.textContent),
-    marks: charts.find((element) => element.attributes.class === "event").length,
+    marks: charts.find(classes("event")).length,
+    lines: charts.find((element) => element.attributes.class === "event").length,
     axes: [...new Set(charts.find(classes("axis")).map((element) => element.textContent.replace(/ \[.*/, "")))],
     clicked,
     speed: chosen[0].textContent,

@@ -24,7 +24,7 @@ from trunnion import analyse, simulate
 from trunnion.model.mechanism import Mechanism
 from trunnion.views.cycle.report import report as cycle_report
 from trunnion.views.motion.figure import KINDS, figure
-from trunnion.views.motion.report import report
+from trunnion.views.motion.report import _account, report
 from trunnion.views.motion.scene import MOST_ROWS, motion_scene
 from trunnion.views.motion.shown import shown
 
@@ -71,6 +71,7 @@ def motion(request: pytest.FixtureRequest) -> tuple[str, xr.Dataset]:
     return request.param, CASES[request.param]()
 
 
+@pytest.mark.spread(0, "stays", "ends early")
 def test_the_page_is_well_formed_and_speaks_of_time(motion: tuple[str, xr.Dataset]) -> None:
     name, result = motion
     page = Page(report(result))
@@ -87,6 +88,7 @@ def test_the_page_is_well_formed_and_speaks_of_time(motion: tuple[str, xr.Datase
     assert [float(time) for time in times] == pytest.approx([one.time for one in events], rel=1e-8, abs=1e-12)
 
 
+@pytest.mark.spread(0, "ends early")
 def test_speeds_and_energies_are_those_of_the_result(motion: tuple[str, xr.Dataset]) -> None:
     _, result = motion
     scene = motion_scene(shown(result))
@@ -100,6 +102,7 @@ def test_speeds_and_energies_are_those_of_the_result(motion: tuple[str, xr.Datas
     assert len(json.dumps(scene, allow_nan=False)) < 1_500_000
 
 
+@pytest.mark.slow
 def test_what_came_in_is_what_is_left() -> None:
     """The figures of the account add up, those of the table as those of the result."""
     page = Page(report(start()))
@@ -114,6 +117,14 @@ def test_what_came_in_is_what_is_left() -> None:
     assert told["Change of the kinetic energy"] == pytest.approx(change, rel=1e-3)
 
 
+def test_what_contacts_take_goes_out_and_what_they_hold_is_left() -> None:
+    rows = shown(ends_early()).rows
+    ramp = xr.DataArray(np.linspace(0.0, 1.0, rows.sizes["position"]), dims="position")
+    told = _account(rows.assign(work_contact=2 * ramp, contact_energy=ramp))
+    assert dict(told["works"])["Lost in contacts"] == "−2.000\u00a0J"
+    assert dict(told["held"])["Change of the elastic energy of contacts"] == "1.000\u00a0J"
+
+
 def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     result = ends_early()
     motion = shown(result)
@@ -126,6 +137,7 @@ def test_a_motion_that_ends_early_is_shown_to_its_end() -> None:
     assert "then the motion ends" in words
 
 
+@pytest.mark.slow
 def test_rounding_is_not_drawn() -> None:
     result = swing()
     assert float(abs(result["drive_effort"]).max()) > 0
@@ -135,6 +147,7 @@ def test_rounding_is_not_drawn() -> None:
     assert "drive torque" not in " ".join(Page(report(result)).words)
 
 
+@pytest.mark.slow
 def test_at_rest_is_said() -> None:
     scene = motion_scene(shown(run_down()))
     assert scene["states"][str(scene["status"][-1])] == "at rest: friction holds it"
@@ -177,6 +190,7 @@ def test_the_report_of_a_cycle_says_nothing_of_it() -> None:
     assert "Motion in time" not in words
 
 
+@pytest.mark.spread(0, "ends early-sheet", "ends early-phase", "stays-energy")
 @pytest.mark.parametrize("kind", ["sheet", *KINDS])
 def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: str) -> None:
     name, result = motion
@@ -200,6 +214,7 @@ if NODE:
         path.write_text(json.dumps(motion_scene(shown(result))), encoding="utf-8")
         return json.loads(run("page.test.mjs", path))
 
+    @pytest.mark.spread(0, "ends early")
     def test_the_page_draws_it(motion: tuple[str, xr.Dataset], tmp_path: Path) -> None:
         name, result = motion
         seen = page(result, tmp_path)
@@ -219,6 +234,17 @@ if NODE:
         end, rows = shown(result).end, motion_scene(shown(result))["count"]
         assert told["clicked"] == [pytest.approx(one.time / end * (rows - 1), abs=1) for one in shown(result).events]
 
+    def test_many_events_do_not_hide_the_curves(tmp_path: Path) -> None:
+        """As impacts in play are: a mark on the axis each, and no line."""
+        scene = motion_scene(shown(ends_early()))
+        scene["motion"]["events"] = [{"at": 0.25 * k, "word": "impact"} for k in range(100)]
+        path = tmp_path / "scene.json"
+        path.write_text(json.dumps(scene), encoding="utf-8")
+        told = json.loads(run("page.test.mjs", path))["motion"]
+        assert told["marks"] == 100 * len(told["titles"])
+        assert told["lines"] == 0
+
+    @pytest.mark.slow
     def test_it_is_played_in_real_time_and_stops_at_its_end(tmp_path: Path) -> None:
         told = page(run_down(), tmp_path)["motion"]
         assert told["speed"] == "real time"

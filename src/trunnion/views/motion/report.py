@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 __all__ = ["MOST_EVENTS", "report"]
 
 MOST_EVENTS = 200  # rows of the table
-HELD = ("kinetic_energy", "potential_energy")  # what is left in the links of what came in and went out
+LOST = ("work_friction", "work_contact")
+HELD = (
+    "kinetic_energy",
+    "potential_energy",
+    "contact_energy",
+)  # what is left in the links of what came in and went out
 RESIDUAL = "works less changes of the energies, relative to the largest of them"
 
 
@@ -52,7 +57,7 @@ def _account(rows: xr.Dataset) -> dict[str, list[tuple[str, str]]]:
         for name, text, course in known:
             if (name in HELD) is held:
                 title = f"change of the {text}" if held else text
-                value = float(course[-1]) * (-1 if name == "work_friction" else 1)
+                value = float(course[-1]) * (-1 if name in LOST else 1)
                 found.append((title[:1].upper() + title[1:], quantity(value, "J")))
         return found
 

@@ -4,6 +4,7 @@ import { OUTSIDE, domain, extent, gaps, lost, nearest, peak, usualPeak } from ".
 import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
+const MOST_LINES = 24; // events of a motion that are drawn over the whole height
 const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
@@ -125,13 +126,19 @@ function draw(chart, width) {
   moveCursor(chart);
 }
 
-/** The events of a motion in time: a dashed line each, with a word where there is room for it. */
+/**
+ * The events of a motion in time: a dashed line each, with a word where there is room for it; of many, which would hide
+ * the curves, a mark on the axis.
+ */
 function events(scene, frame) {
   let free = MARGIN.left;
-  return (scene.motion?.events ?? []).flatMap(({ at, word }) => {
+  const list = scene.motion?.events ?? [];
+  const many = list.length > MOST_LINES;
+  return list.flatMap(({ at, word }) => {
     const x = frame.x(at);
-    const line = svg("line", { class: "event", x1: x, x2: x, y1: MARGIN.top, y2: frame.bottom });
+    const line = svg("line", { class: many ? "event many" : "event", x1: x, x2: x, y1: many ? frame.bottom - 7 : MARGIN.top, y2: frame.bottom });
     line.append(svg("title", {}, word));
+    if (many) return [line];
     const wide = 6 * word.length + 6;
     const before = x + wide > frame.right; // of the line, where there is no room behind it
     if (before ? x - wide < free : x < free) return [line];

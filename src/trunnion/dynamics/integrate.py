@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
+from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Dynamics, Layout
@@ -256,6 +257,7 @@ class Integration:
         rate = self._rate(sense, now, between)
         first = min(step, 0.5 * (until - time)) if step else None
         solver, marks = self._solver(rate, time, row, until, self._absolute(row), first), [time]
+        dead_centre = DeadCentre(self.motion, self.layout)
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
             marks.append(before)
@@ -275,6 +277,9 @@ class Integration:
                 return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
             self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
             self._follow(float(solver.t), np.array(solver.y), sense, now)
+            if found := dead_centre.reached(solver, float(solver.t) - before):
+                self.end("not_assembled", *found)
+                break
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:

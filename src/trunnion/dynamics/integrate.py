@@ -163,13 +163,8 @@ class Integration:
         self._follow(0.0, row, 0.0, 0.0)
         if not self._begins(row):
             return self.solution
-        before, time, step, sense = (
-            -1.0,
-            0.0,
-            None,
-            float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0,
-        )
-        stayed = 0
+        before, time, step, stayed = -1.0, 0.0, None, 0
+        sense = float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0
         for _ in range(MOST_EVENTS):
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
                 return self.solution
@@ -433,11 +428,8 @@ class Integration:
         bends = np.asarray(self.bends, float)
         low, high = self.limits
         if len(bends):
-            laps = (
-                [0.0]
-                if self.period is None
-                else np.floor(q / self.period) * self.period + self.period * np.arange(-1, 2)
-            )
+            period = 0.0 if self.period is None else self.period
+            laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else [0.0]
             every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
             near = 1e-12 * max(1.0, abs(q))
             # one at q itself is behind, by the way it goes

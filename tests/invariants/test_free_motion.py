@@ -11,8 +11,9 @@ from scipy.special import ellipk
 
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
-from trunnion.dynamics.start import places
+from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
@@ -114,6 +115,37 @@ def test_a_range_ends_the_motion() -> None:
     (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.range"]
     assert finding.figures["time"] == pytest.approx(np.sqrt(2 * 2 * 0.05 / 4), rel=1e-9)
     assert np.isnan(result["drive_rate"].values[0, -1])
+
+
+def rocker(friction: float) -> Mechanism:
+    """A crank-rocker driven at its rocker, which turns round at cos φ = −0.78125, coupler and crank in line."""
+    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
+    return Mechanism(
+        gravity=[0, 0],
+        links={
+            "ground": {"points": {"A": [0, 0], "D": [0.2, 0]}},
+            "crank": {"points": {"A": [0, 0], "B": [0.05, 0]}, "mass": 1, "centre": [0.025, 0], "inertia": 1e-3},
+            "coupler": {"points": {"B": [0, 0], "C": [0.18, 0]}, "mass": 0.5, "centre": [0.09, 0], "inertia": 1e-3},
+            "rocker": {"points": {"D": [0, 0], "C": [0.12, 0]}, "mass": 0.5, "centre": [0.06, 0], "inertia": 1e-3},
+        },
+        joints={name: {"type": "revolute", "links": links} for name, links in ends.items()},
+        joint_defaults={"pin": {"radius": 0.008}, **({"friction": friction} if friction else {})},
+        drivers={"D": {"speed": 1, "range": ["110 deg", "150 deg"], "motor": {"kind": "constant", "effort": 2}}},
+        assembly={"B": [0.05, 0.02]},
+    )
+
+
+@pytest.mark.parametrize(("friction", "close"), [(0.0, 1e-6), pytest.param(0.1, 1e-4, marks=pytest.mark.slow)])
+def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -> None:
+    """It is foreseen, told with its place and time, and reached in some hundred evaluations."""
+    motion = FreeMotion.of(prepare(rocker(friction)))
+    integration = Integration(motion, Walks(motion), 2.0, 1e-9)
+    found = integration.run(initial_row(motion))
+    assert found.ended is not None
+    assert found.ended.code == "simulate.not_assembled"
+    assert found.ended.figures["coordinate"] == pytest.approx(np.arccos(-0.78125), abs=close)
+    assert 0.0 < found.ended.time - found.end < 0.05 * found.end
+    assert found.asked < 1000
 
 
 @pytest.mark.parametrize(

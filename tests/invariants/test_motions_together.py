@@ -248,3 +248,17 @@ def test_every_figure_is_a_measure() -> None:
     from trunnion.model.measure_table import MEASURES
 
     assert set(FIGURES) == {name for name, one in MEASURES.items() if one.in_time}
+
+
+@pytest.mark.parametrize(("effort", "starts"), [(0.5, False), (0.7, True)])
+def test_what_is_larger_at_rest_holds_every_one(effort: float, starts: bool) -> None:
+    """A pin with 0.2 N m of sliding and 0.6 N m at rest."""
+    data = wheel({"kind": "constant", "effort": effort}, drag=0.0).data()
+    data["gravity"], data["links"]["wheel"]["mass"] = [0, -10], 10
+    law = {"law": "stiction", "coefficient": 0.1, "static": 0.3}
+    data["joints"]["A"].update(pin={"radius": 0.02}, friction=law)
+    mechanism, count = Mechanism(**data), 5
+    values = spread(mechanism, count, links__wheel__inertia=0.2)
+    course, _ = courses_of(prepare(mechanism), values, count, 1.0, 1e-9)
+    gone = 0.5 * (effort - 0.2) / values["links.wheel.inertia"][:, 0] if starts else np.zeros(count)
+    np.testing.assert_allclose(course.gone, gone, rtol=1e-8)

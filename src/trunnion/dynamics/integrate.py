@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
+from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import Dynamics, Layout
@@ -162,13 +163,8 @@ class Integration:
         self._follow(0.0, row, 0.0, 0.0)
         if not self._begins(row):
             return self.solution
-        before, time, step, sense = (
-            -1.0,
-            0.0,
-            None,
-            float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0,
-        )
-        stayed = 0
+        before, time, step, stayed = -1.0, 0.0, None, 0
+        sense = float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0
         for _ in range(MOST_EVENTS):
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
                 return self.solution
@@ -256,6 +252,7 @@ class Integration:
         rate = self._rate(sense, now, between)
         first = min(step, 0.5 * (until - time)) if step else None
         solver, marks = self._solver(rate, time, row, until, self._absolute(row), first), [time]
+        dead_centre = DeadCentre(self.motion, self.layout)
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
             marks.append(before)
@@ -275,6 +272,9 @@ class Integration:
                 return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
             self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
             self._follow(float(solver.t), np.array(solver.y), sense, now)
+            if found := dead_centre.reached(solver, float(solver.t) - before):
+                self.end("not_assembled", *found)
+                break
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
@@ -428,11 +428,8 @@ class Integration:
         bends = np.asarray(self.bends, float)
         low, high = self.limits
         if len(bends):
-            laps = (
-                [0.0]
-                if self.period is None
-                else np.floor(q / self.period) * self.period + self.period * np.arange(-1, 2)
-            )
+            period = 0.0 if self.period is None else self.period
+            laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else [0.0]
             every = np.sort((bends[None] + np.asarray(laps)[:, None]).ravel())
             near = 1e-12 * max(1.0, abs(q))
             # one at q itself is behind, by the way it goes

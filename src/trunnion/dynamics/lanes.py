@@ -96,7 +96,7 @@ class Lanes:
         """
         matrix, slips = self._numbers(at)
         known = self._known(matrix, 0.0 * at.speed, at.sense)
-        per = self._per(slips, 0.0 * at.speed, at.sense)
+        per = self._per(slips, 0.0 * at.speed, at.sense, resting=True)
         influence, first = matrix[:, 1:, FIXED:], known[:, 1:]
         friction, settled = self._settled(per, first, influence, 0.0 * self.friction)
         demanded = known[:, 0] + np.sum(matrix[:, 0, FIXED:] * friction, axis=1)
@@ -142,14 +142,18 @@ class Lanes:
         found: Array = matrix[:, :, 1] * (speed * speed)[:, None] + matrix[:, :, 2] * speed[:, None] + still
         return found
 
-    def _per(self, slips: Array, speed: Array, way: Array) -> Array:
-        """Friction of every contact for a normal load of 1 N; at rest that of the motion about to begin."""
+    def _per(self, slips: Array, speed: Array, way: Array, resting: bool = False) -> Array:
+        """Friction of every contact for a normal load of 1 N; at rest that of the motion about to begin.
+
+        resting: whether it has not begun, so that a law that jumps there has its value at rest.
+        """
         found = np.empty_like(slips)
         for k, (rub, law) in enumerate(zip(self.tables.rubs, self.laws, strict=True)):
             moves = slips[:, k] * speed
             if rub.interval:
                 moves = np.where(speed != 0.0, moves, np.sign(slips[:, k] * way) * BRINK)
-            found[:, k] = rub.function(1.0, moves, **law)
+            function = rub.at_rest if resting and rub.at_rest is not None else rub.function
+            found[:, k] = function(1.0, moves, **law)
         return found
 
     # ---- the equations ----------------------------------------------------------------------------------------

@@ -73,6 +73,7 @@ class Rub:
     rows: slice
     interval: bool
     bristle: int
+    at_rest: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -209,7 +210,9 @@ def rubs_of(motion: FreeMotion) -> tuple[Rub, ...]:
         for one in motion.system.geometry.contacts(walk, joint):
             size = len(_components(one.load, zero[joint]))
             rows = slice(row, row + size)
-            found.append(Rub(joint, law.function, parameters, one.load, rows, law.interval_at_rest, bristle))
+            found.append(
+                Rub(joint, law.function, parameters, one.load, rows, law.interval_at_rest, bristle, law.at_rest)
+            )
             row += size
     return tuple(found)
 

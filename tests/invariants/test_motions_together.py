@@ -9,18 +9,20 @@ import numpy as np
 import pytest
 
 from timed import LINEAR, slider_crank, wheel
-from trunnion.dynamics import batch
+from trunnion.dynamics import batch, lanes
 from trunnion.dynamics.batch import figures_in_time, together
 from trunnion.dynamics.course import FIGURES, Courses
 from trunnion.dynamics.lanes import picked_drive
+from trunnion.dynamics.rates import Layout, Rates, Walks
 from trunnion.dynamics.sampled import picked, sampled_tables, tabulates
 from trunnion.dynamics.start import places
 from trunnion.dynamics.starts import DONE, ENDED, LEFT, Starts
-from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.tabulated import TabulatedRates
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import Run, prepare
 
-AGREED = 1e-6  # relative, with the tolerance that figures are asked with
+AGREED = 1e-6  # relative
 
 
 def spread(mechanism: Mechanism, count: int, seed: int = 1, **numbers: float) -> dict[str, Any]:
@@ -133,13 +135,12 @@ def test_together_as_each_by_itself(name: str) -> None:
     assert together(run)
     varied = {"links__crank__points__P__x": 0.01, "links__piston__mass": 0.05, "links__crank__inertia": 0.05}
     values = spread(mechanism, 2, **varied, joints__P__friction__coefficient=0.1)
-    found = figures_in_time(run, "O", values, 2, 0.7)
+    found = figures_in_time(run, "O", values, 2, 0.5, 1e-10)
     for i in range(2):
-        for key, expected in alone(run, values, i, 0.7).items():
-            np.testing.assert_allclose(found[key][i], expected, rtol=AGREED, err_msg=f"{key} of {i}")
+        for key, expected in alone(run, values, i, 0.5).items():  # both to 1e-10
+            near = AGREED if key == "fluctuation" else 0.0  # a difference of speeds, by their mean
+            np.testing.assert_allclose(found[key][i], expected, AGREED, near, err_msg=f"{key} of {i}")
     assert np.all(np.isfinite(found["peak_effort"]))
-    if name == "geared":
-        assert np.all(np.isfinite(found["steady_speed"]))
 
 
 @pytest.mark.slow
@@ -195,9 +196,10 @@ def trunnion_gone(mechanism: Mechanism, effort: float) -> float:
 
 
 @pytest.mark.slow
-def test_what_is_not_certain_is_left_to_each_by_itself() -> None:
-    """Much friction: no bound shows that there is one solution, and walks decide, as they do by themselves."""
-    mechanism = slider_crank(0.8)
+def test_what_is_not_certain_is_left_to_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no bound shows that there is one solution a lane is integrated by itself."""
+    monkeypatch.setattr(lanes, "CONTRACTION", 1e-3)
+    mechanism = slider_crank(0.1)
     run = prepare(mechanism)
     values = spread(mechanism, 2, links__piston__mass=0.05)
     _, status = courses_of(run, values, 2, 0.05, 1e-9)
@@ -205,6 +207,29 @@ def test_what_is_not_certain_is_left_to_each_by_itself() -> None:
     found = figures_in_time(run, "O", values, 2, 0.05)
     for i in range(2):
         np.testing.assert_allclose(found["peak_effort"][i], alone(run, values, i, 0.05)["peak_effort"], rtol=AGREED)
+
+
+def test_near_locking_tables_are_walks() -> None:
+    """Much friction: the bound by the spectral radius shows one solution where the sum of a row does not."""
+    motion = FreeMotion.of(prepare(slider_crank(0.8)))
+    tables = tabulates(motion, places(motion))
+    assert tables is not None
+    asked: list[Moment] = []
+
+    def oracle(at: Moment) -> Rates:
+        asked.append(at)
+        return Walks(motion)(at)
+
+    rates, layout, draw, count = TabulatedRates(tables, oracle), Layout(1, 0), np.random.default_rng(3), 40
+    with np.errstate(all="ignore"):
+        for _ in range(count):
+            rows = np.zeros((layout.size, 1))
+            rows[0], rows[1] = draw.uniform(0, 2 * np.pi), draw.uniform(1, 60)
+            at = layout.moment(np.zeros(1), rows, 1.0, 0.0)
+            exact, found = Walks(motion)(at), rates(at)
+            if exact.sound:
+                np.testing.assert_allclose(found.second, exact.second, rtol=1e-8)
+    assert len(asked) < count // 4
 
 
 def test_bristles_are_not_tabulated() -> None:

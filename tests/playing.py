@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from trunnion.joints.contact import hertz_stiffness
 from trunnion.model.mechanism import Mechanism
+
+Array = NDArray[np.float64]
 
 SPEED = 523.5987755983  # rad/s, 5000 rpm
 STEEL = {"modulus": "207 GPa", "poisson_ratio": 0.3}
@@ -56,3 +63,52 @@ def loose_slider(stiffness: str = "5 MN/m", **contact: Any) -> Mechanism:
     links = {**one["links"], "slider": {**one["links"]["slider"], "inertia": 2e-4}}
     joints = {**one["joints"], "S": slider}
     return rattling({}, joints=joints, links=links, gravity=[0, -9.81], drivers={"O": {"speed": 30}})
+
+
+def own_equations(duration: float) -> tuple[Any, float]:
+    """Rod angle and slider of `rattling` with the contact of Lankarani and Nikravesh, written here by Lagrange's
+    equations of the two free coordinates; the first contact alone."""
+    r, length, mass, inertia, slider = 0.05, 0.12, 0.21, 2.5e-4, 0.14
+    half, clearance = length / 2, 0.5e-3
+    stiffness, factor = hertz_stiffness(9.5e-3, 10e-3, 207e9, 207e9, 0.3, 0.3), 0.75 * (1 - 0.81)
+
+    def offset(t: float, y: Array) -> tuple[Array, Array]:
+        a, phi, x, w, v = SPEED * t, *y
+        c = np.array([r * np.cos(a) + length * np.cos(phi) - x, r * np.sin(a) + length * np.sin(phi)])
+        u = np.array([-r * SPEED * np.sin(a) - length * w * np.sin(phi) - v,
+                      r * SPEED * np.cos(a) + length * w * np.cos(phi)])  # fmt: skip
+        return c, u
+
+    def rate(t: float, y: Array, onset: float) -> list[float]:
+        a, phi, _, w, v = SPEED * t, *y
+        c, u = offset(t, y)
+        size = float(np.hypot(*c))
+        depth, force = size - clearance, np.zeros(2)
+        if onset and depth > 0:
+            n = c / size
+            force = -n * stiffness * depth**1.5 * (1 + factor * float(n @ u) / onset)
+        base = -r * SPEED**2 * np.array([np.cos(a), np.sin(a)])
+        across = np.array([-np.sin(phi), np.cos(phi)])
+        moment = length * float(across @ force) - mass * half * float(across @ base)
+        return [w, v, moment / (inertia + mass * half**2), -force[0] / slider]
+
+    start = [0.0, r + length, -SPEED * r / length, 0.0]
+
+    def gap(t: float, y: Array, _: float) -> float:
+        return clearance - float(np.hypot(*offset(t, y)[0]))
+
+    gap.terminal, gap.direction = True, -1  # type: ignore[attr-defined]
+    flight = solve_ivp(rate, (0, duration), start, events=gap, args=(0.0,), rtol=1e-13, atol=1e-15)
+    t0, y0 = flight.t_events[0][0], flight.y_events[0][0]
+    c, u = offset(t0, y0)
+    onset = float(c @ u / np.hypot(*c))
+    gap.direction = 1  # type: ignore[attr-defined]
+    touch = solve_ivp(rate, (t0, duration), y0, events=gap, args=(onset,), rtol=1e-13, atol=1e-15, dense_output=True,
+                      max_step=1e-6)  # fmt: skip
+    times = np.linspace(t0, touch.t_events[0][-1], 20001)
+    forces = []
+    for time, y in zip(times, touch.sol(times).T, strict=True):
+        c, u = offset(time, y)
+        size = float(np.hypot(*c))
+        forces.append(stiffness * max(size - clearance, 0) ** 1.5 * (1 + factor * float(c @ u) / size / onset))
+    return (t0, times[-1] - t0, onset), max(forces)

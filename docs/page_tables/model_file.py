@@ -16,8 +16,8 @@ from page_tables.cells import code, rows_of, unit
 DOCS = Path(__file__).resolve().parents[1]
 
 
-SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Contact", "Friction", "JointDefaults",
-            "Misalignment", "Seat", "LoopJoint", "Driver", "Motor", "Initial", "Load", "Measure", "Variation",
+SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Contact", "Friction",
+            "JointDefaults", "Misalignment", "Seat", "LoopJoint", "Driver", "Motor", "Initial", "Load", "Measure", "Variation",
             "VariationDefaults", "Correlation", "Cost", "CostOption")  # fmt: skip
 
 

@@ -17,8 +17,8 @@ DOCS = Path(__file__).resolve().parents[1]
 
 
 SECTIONS = ("Link", "Point", "PolarPoint", "InertiaTensor", "Joint", "Pin", "Guide", "Contact", "Friction",
-            "JointDefaults", "Misalignment", "Seat", "LoopJoint", "Driver", "Motor", "Initial", "Load", "Measure", "Variation",
-            "VariationDefaults", "Correlation", "Cost", "CostOption")  # fmt: skip
+            "JointDefaults", "Misalignment", "Seat", "LoopJoint", "Driver", "Motor", "Initial", "Load", "Measure",
+            "Variation", "VariationDefaults", "Correlation", "Cost", "CostOption")  # fmt: skip
 
 
 def meanings() -> dict[str, dict[str, str]]:

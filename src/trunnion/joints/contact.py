@@ -97,15 +97,15 @@ def _halved(low: float, high: float, missing: Callable[[float], float]) -> float
 
 def restitution_of(factor: float) -> float:
     """The restitution e that a loss factor χ gives, from 1 (χ = 0) down."""
-    if factor == 0.0:
-        return 1.0
+    if factor == 0.0 or np.isinf(factor):
+        return 1.0 if factor == 0.0 else 0.0
     return _halved(0.0, min(1.0, (1.0 - 1e-16) / factor), lambda restitution: _missing(factor, restitution))
 
 
 def loss_factor(restitution: float) -> float:
     """The loss factor χ from which the restitution e comes back: the equation above, solved for χ < 1/e."""
-    if restitution >= 1.0:
-        return 0.0
+    if restitution >= 1.0 or restitution <= 0.0:
+        return 0.0 if restitution > 0.0 else np.inf
     return _halved(0.0, 1.0 / restitution, lambda factor: _missing(factor, restitution))
 
 

@@ -201,11 +201,11 @@ def test_less_clearance_gives_the_reactions_without_play() -> None:
         ({**LANKARANI, "restitution": 1.2}, "joints.Q.contact.restitution"),
         ({**LANKARANI, "restitution": 0}, "joints.Q.contact.restitution"),
         ({**LANKARANI, "modulus": "-1 GPa"}, "joints.Q.contact.modulus"),
-        ({**LANKARANI, "stiffness": "1 GN/m^1.5"}, "joints.Q.contact"),
+        ({**LANKARANI, "stiffness": "1e9 N/m^1.5"}, "joints.Q.contact"),
         ({"restitution": 0.5}, "joints.Q.contact"),
-        ({"stiffness": "1 GN/m^1.5"}, "joints.Q.contact"),
+        ({"stiffness": "1e9 N/m^1.5"}, "joints.Q.contact"),
         ({"restitution": 0.5, "stiffness": "3 N/m"}, "joints.Q.contact.stiffness"),
-        ({"law": "hertz", "restitution": 0.5, "stiffness": "1 GN/m^1.5"}, "joints.Q.contact.restitution"),
+        ({"law": "hertz", "restitution": 0.5, "stiffness": "1e9 N/m^1.5"}, "joints.Q.contact.restitution"),
         ({"restitution": 0.5, "stiffness": 1e9, "poisson_ratio": 0.3}, "joints.Q.contact.poisson_ratio"),
         ({**LANKARANI, "exponent": 2}, "joints.Q.contact.exponent"),
     ],
@@ -214,6 +214,15 @@ def test_contacts_that_cannot_be(contact: dict[str, Any], where: str) -> None:
     with pytest.raises(MechanismError) as raised:
         rattling(contact)
     assert where in [finding.where for finding in raised.value.findings]
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "exponent", "newton"),
+    [("60e9 N/m^1.5", 1.5, 6e10), ("2 MN/m", 1, 2e6), ("3 kN/mm^1.5", 1.5, 3e3 * 1000**1.5), (5e10, 1.5, 5e10)],
+)
+def test_a_stiffness_with_its_unit(stiffness: float | str, exponent: float, newton: float) -> None:
+    mechanism = rattling({"restitution": 0.5, "stiffness": stiffness, "exponent": exponent})
+    assert mechanism.parameters()["joints.Q.contact.stiffness"] == pytest.approx(newton, rel=1e-12)
 
 
 def test_a_contact_without_clearance() -> None:
@@ -242,6 +251,23 @@ def test_friction_that_sticks_is_refused_in_play() -> None:
     with pytest.raises(MechanismError) as raised:
         trunnion.simulate(rattling(joints=rubbed), duration=1e-3)
     assert [finding.where for finding in raised.value.findings] == ["joints.Q.friction"]
+
+
+def test_soft_surfaces_are_told() -> None:
+    soft = {"restitution": 0.5, "stiffness": 1e3, "exponent": 1}
+    codes = {one.code for one in trunnion.simulate(rattling(soft), duration=3e-3, steps=3).trunnion.findings}
+    assert "simulate.soft" in codes
+    codes = {one.code for one in trunnion.simulate(rattling(), duration=3e-4, steps=3).trunnion.findings}
+    assert "simulate.soft" not in codes
+
+
+def test_a_drive_that_hardly_moves() -> None:
+    """The mass matrix keeps its digits where weights are all that is large."""
+    slow = rattling({}, gravity=[0, -9.81]).data()
+    result = trunnion.simulate(
+        rattling(gravity=[0, -9.81], drivers={"O": {**slow["drivers"]["O"], "speed": 1e-5}}), 0.02, 20
+    )
+    assert float(abs(result["energy_residual"]).max()) < 1e-9 * float(np.ptp(result["potential_energy"].values))
 
 
 def test_friction_at_the_contact_only_loses() -> None:

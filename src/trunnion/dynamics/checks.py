@@ -95,7 +95,10 @@ def _unlike(mechanism: Mechanism, playing: list[str]) -> Iterator[Finding]:
 
 def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: str) -> Iterator[Finding]:
     """What may hold a joint at rest where several coordinates are free: joints would stick one by one."""
-    one_by_one, remedy = f"{why} joints stick one by one", "remove it, or use one free driver and no joint in play"
+    one_by_one, remedy = (
+        f"{why} joints stick one by one",
+        "remove it, or let no joint be in play" if playing else "remove it, or use one free driver",
+    )
     for name in free:
         motor = mechanism.drivers[name].motor
         if motor is None:
@@ -125,4 +128,6 @@ def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: st
     for name, load in mechanism.loads.items():
         if load.joint is not None:
             what = f"it may hold its joint at rest, and {one_by_one}"
-            yield Finding(what, f"loads.{name}", "use a damper (springs: damping) instead, or one free driver")
+            remedy = "state it as a force at a point of a link, use a damper instead, or no joint in play"
+            other = "use a damper (springs: damping) instead, or one free driver"
+            yield Finding(what, f"loads.{name}", remedy if playing else other)

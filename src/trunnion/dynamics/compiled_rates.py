@@ -94,7 +94,7 @@ class CompiledRates:
         touching = tuple(onset is not None for onset in onsets)
         key = what, touching, now
         if key not in self._programs:
-            rates = functools.partial(_rates_of, unit=self.motion.unit.tolist())
+            rates = functools.partial(_rates_of, unit=self.motion.trial.tolist())
             figures: Figures = rates if what == "rates" else _seen
             self._programs[key] = _Program(self.motion, figures, touching, now)
         return self._programs[key]

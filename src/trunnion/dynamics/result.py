@@ -77,7 +77,10 @@ def result_of(
     mechanism, system = run.system.mechanism, run.system
     residual, turned_over = _energy(books)
     turned_over = max(turned_over, _turned_over(motion, solution))
-    findings = [*_findings(motion, solution, run), *_unbalanced(residual, turned_over, solution.stepped)]
+    findings = [
+        *_findings(motion, solution, run, impacts),
+        *_unbalanced(books, residual, turned_over, solution.stepped),
+    ]
     attributes = encoded(
         {
             **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
@@ -185,9 +188,10 @@ ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
-def _unbalanced(residual: Array, turned_over: float, stepped: bool) -> Iterator[Finding]:
+def _unbalanced(books: Books, residual: Array, turned_over: float, stepped: bool) -> Iterator[Finding]:
     worst = float(np.nanmax(np.abs(residual), initial=0.0))
-    if turned_over > 0 and worst > WORST * turned_over:
+    rounding = ROUNDING * float(np.nanmax(np.abs(books.energies), initial=0.0))
+    if turned_over > 0 and worst > max(WORST * turned_over, rounding):
         code = "simulate.energy_stepped" if stepped else "simulate.energy"
         yield finding_for(code, share=worst / turned_over)
 
@@ -195,14 +199,13 @@ def _unbalanced(residual: Array, turned_over: float, stepped: bool) -> Iterator[
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterator[Finding]:
+def _findings(motion: FreeMotion, solution: Solution, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
     system = motion.system
     yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
     centred = [one.joint for one in motion.run.seats]
     if centred:
         yield finding_for("simulate.centred", joints=centred)
-    if contact_findings := list(_of_contacts(motion, run, solution)):
-        yield from contact_findings
+    yield from _of_contacts(motion, run, impacts)
     yield from (finding_for(code, "joints", **figures) for code, figures in solution.notes.items())
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
@@ -225,8 +228,13 @@ def _findings(motion: FreeMotion, solution: Solution, run: Run) -> Iterator[Find
         yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
 
 
-def _of_contacts(motion: FreeMotion, run: Run, solution: Solution) -> Iterator[Finding]:
-    """What the laws of the contacts return, where that is not what was stated."""
+def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
+    """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in."""
+    for one in motion.contacts.each:
+        depth = max((impact.depth for impact in impacts if impact.label == one.label), default=0.0)
+        if depth > one.clearance:
+            yield finding_for("simulate.soft", f"joints.{one.joint}.contact", contact=one.label, depth=depth,
+                              clearance=one.clearance)  # fmt: skip
     for one in {one.joint: one for one in motion.contacts.each}.values():
         law = run.system.mechanism.effective_joints[one.joint].contact
         returned = restitution_of(one.factor)

@@ -130,6 +130,15 @@ class FreeMotion:
         size = float(np.ravel(self.system.size(self.values))[0])
         return np.array([pace * pace * (1.0 if self.system.turns(name) else size) for name in self.names])
 
+    @cached_property
+    def trial(self) -> Array:
+        """An acceleration of each coordinate by whose force inertia is told, rad/s² or m/s²: the typical one, or that of
+        a fall where it is more, so that weights leave its digits."""
+        size = float(np.ravel(self.system.size(self.values))[0])
+        gravity = np.hypot.reduce([float(np.ravel(primal(g))[0]) for g in self.system.vector(self.values, "gravity")])
+        fall = [gravity / (size if self.system.turns(name) else 1.0) for name in self.names]
+        return np.maximum(self.unit, fall)
+
     # ---- walks ------------------------------------------------------------------------------------------------
 
     def values_at(self, at: Moment, second: Array) -> Values:
@@ -253,7 +262,7 @@ class FreeMotion:
         if not self.affine:
             steps = DIFFERENCE * np.maximum(np.abs(second), 1e-2 * steps)
         else:
-            steps = np.maximum(steps, np.abs(second))
+            steps = np.maximum(np.maximum(steps, self.trial[:, None]), np.abs(second))
         tried = [second] + [second + np.where(np.arange(count)[:, None] == i, steps, 0.0) for i in range(count)]
         q, rate, integral, bristles = (
             np.tile(part, (1, count + 1)) for part in (at.q, at.rate, at.integral, at.bristles)

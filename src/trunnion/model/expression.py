@@ -28,7 +28,7 @@ MAX_LENGTH = 500
 MAX_DEPTH = 40
 
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![0-9.])"  # whole: a part of a number is none
-_WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?![\w.]))?"
+_WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?:\.[0-9]{1,2})?(?![\w.]))?"
 _UNIT = rf"(?:{_WORD})(?:[ /*·⋅](?:{_WORD}))*"
 LITERAL = re.compile(rf"(?P<number>{_NUMBER})(?:\s*(?P<unit>{_UNIT})|\s+(?P<per>1/{_UNIT}))?")
 _NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*\.[^\W\d]\w*|\.[^\W\d]\w+)?"  # also S.slide and ram.Q.x

@@ -222,7 +222,7 @@ def _contact_stiffness(contact: Contact) -> Kind:
     power = Fraction(str(exponent.evaluate())).limit_denominator(1000)
     text = f"N/m^{float(power):g}" if power != 1 else "N/m"
     dimension = (1 - power, Fraction(1), Fraction(-2), Fraction(0))
-    return Kind("contact stiffness", text, f"60 G{text}", (dimension,))
+    return Kind("contact stiffness", text, f"60e9 {text}", (dimension,))
 
 
 def _law_kind(friction: Friction, parameter: str) -> Kind:

@@ -54,7 +54,7 @@ def _needs(joint: Joint, contact: Contact, where: str) -> Iterator[Finding]:
         yield Finding("'restitution' is missing", where, f"add restitution: 0.8, or law: {elastic}")
     both = contact.stiffness is not None and contact.modulus is not None
     if both or (contact.stiffness is None and contact.modulus is None):
-        remedy = "state stiffness: 60 GN/m^1.5, or modulus: 210 GPa"
+        remedy = "state stiffness: 60e9 N/m^1.5, or modulus: 210 GPa"
         yield Finding(f"states {'both' if both else 'neither'} of stiffness and modulus", where, remedy)
         return
     if contact.modulus is not None and PAIRS[joint.type].guided:

@@ -54,6 +54,11 @@ DYNAMICS: dict[str, Sentence] = {
         "pins of {joints} are taken in the middle of their holes: a seat that follows the load is left out",
         quiet=True,
     ),
+    "simulate.soft": Sentence(
+        WARNING,
+        "{contact}: the surfaces sink {depth:~m} into each other, more than the clearance of {clearance:~m}",
+        "check the stiffness of the contact; a contact law holds for small penetrations",
+    ),
     "simulate.restitution": Sentence(
         NOTE,
         "{joint}: with a stated restitution of {stated:.3g} the contact law {law} returns {returned:.3g}",

@@ -19,7 +19,7 @@ __all__ = ["events", "impacts", "times"]
 CONTACT = ("contact_gap", "contact_normal_force", "contact_friction_force", "contact_slip", "contact_touching")
 IMPACT = (
     ("begin", "s"), ("end", "s"), ("approach", "m/s"), ("separation", "m/s"), ("force", "N"), ("depth", "m"),
-    ("wear", "J"),
+    ("impulse", "N s"), ("wear", "J"),
 )  # fmt: skip
 ENERGY = (
     *("work_drive", "work_loads", "work_springs", "work_friction", "kinetic_energy", "potential_energy"),

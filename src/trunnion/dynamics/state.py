@@ -132,8 +132,10 @@ class FreeMotion:
 
     @cached_property
     def trial(self) -> Array:
-        """An acceleration of each coordinate by whose force its inertia is told, rad/s² or m/s²: the typical one, or that
-        of a fall where it is more, so that weights leave its digits."""
+        """An acceleration of each coordinate by whose force its inertia is told, rad/s² or m/s².
+
+        The typical one, or that of a fall where it is more, so that weights leave its digits.
+        """
         size = float(np.ravel(self.system.size(self.values))[0])
         gravity = np.hypot.reduce([float(np.ravel(primal(g))[0]) for g in self.system.vector(self.values, "gravity")])
         fall = [gravity / (size if self.system.turns(name) else 1.0) for name in self.names]

@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["OF_CONTACTS", "forces", "gaps", "in_play", "orbit"]
+__all__ = ["OF_CONTACTS", "OF_IMPACTS", "forces", "gaps", "in_play", "orbit"]
 
 OF_CONTACTS = ("contacts", "gaps", "orbit")  # kinds of figures that need a joint in play
+OF_IMPACTS = ("impact", "lift-off", "closes")  # events that figures do not mark
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
 MOST_SPOKES = 240  # forces drawn around a hole
 SIDE = 4.6  # of the figure of a hole, inches

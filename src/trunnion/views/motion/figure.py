@@ -121,7 +121,8 @@ def _largest(values: Any) -> float:
 
 def _events(axes: Axes, motion: Shown, over: Abscissa) -> None:
     """Thin lines where something happens, with a word above."""
-    events, last = motion.events, float(motion.rows["time"].values[-1])
+    events = [one for one in motion.events if one.word not in contacts.OF_IMPACTS]  # the curves show these
+    last = float(motion.rows["time"].values[-1])
     if len(events) > MOST_MARKED or not last > 0:
         return
     for one in events:

@@ -96,11 +96,7 @@ def simulated(
     integration = integration_of(motion, known, duration, tolerance, progress)
     row = initial_row(motion)
     _check_start(motion, row, known.limits)
-    try:
-        solution = integration.run(row)
-    except KeyboardInterrupt:  # what is done is kept
-        solution = integration.solution
-        integration.end("stopped", solution.end)
+    solution = _run(integration, row)
     time = np.linspace(0.0, duration, steps + 1)
     return result_of(motion, solution, Filling(motion, solution, time).books())
 
@@ -126,14 +122,19 @@ def _with_play(
         integration.impact_step = impact_step
     else:
         integration = ContactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
-    try:
-        solution = integration.run(row)
-    except KeyboardInterrupt:  # what is done is kept
-        solution = integration.solution
-        integration.end("stopped", solution.end)
+    solution = _run(integration, row)
     time = np.linspace(0.0, duration, steps + 1)
     books = Filling(motion, solution, time, run).books()
     return result_of(motion, solution, books, run, integration.finished())
+
+
+def _run(integration: Integration, row: Array) -> Solution:
+    """The motion from an initial row; of one that is interrupted what is done."""
+    try:
+        return integration.run(row)
+    except KeyboardInterrupt:
+        integration.end("stopped", integration.solution.end)
+        return integration.solution
 
 
 def integration_of(

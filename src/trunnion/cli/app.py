@@ -48,6 +48,7 @@ from trunnion.cli.play import play
 from trunnion.cli.result import Shown, check_files, check_page, write_text
 from trunnion.cli.rig import rig
 from trunnion.cli.simulate import simulate
+from trunnion.cli.studio import studio
 from trunnion.cli.sweep import sweep
 from trunnion.cli.terminal import bar, console, say, show_figures, wrote
 from trunnion.cli.tolerance import tolerance
@@ -186,6 +187,7 @@ def design(
 
 
 verb(simulate)
+verb(studio)
 verb(locking)
 verb(assemble)
 verb(tolerance)

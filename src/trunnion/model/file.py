@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import lru_cache
+from io import StringIO
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,7 +29,10 @@ from trunnion.model.csv_table import TableFiles, place_findings, with_own_points
 from trunnion.model.named_file import in_folder, stated_files
 from trunnion.model.text import read_text
 
-__all__ = ["Lines", "composed", "files_named", "place", "placed", "read_entries", "read_model", "write_model"]
+__all__ = [
+    "Lines", "composed", "entries_of", "files_named", "place", "placed", "read_entries", "read_model", "text_of",
+    "version_findings", "write_model",
+]  # fmt: skip
 
 MAX_BYTES = 1_000_000  # some ten thousand links; parsing takes seconds
 MAX_DEPTH = 30
@@ -52,7 +56,7 @@ def read_model(
     """
     path = Path(path)
     data, lines = read_entries(path)
-    findings = [] if "trunnion" in data else [_unversioned().at(str(path), 1)]
+    findings = [one.at(str(path), 1) for one in version_findings(data)]
     data, read = with_points(data, tables or {})
     try:
         data, own = with_own_points(data, path)
@@ -85,7 +89,7 @@ def read_entries(
     """
     try:
         kind = _file_type(path)
-        return _parse(read_text(path, noun, MAX_BYTES, start_from), kind)
+        return entries_of(read_text(path, noun, MAX_BYTES, start_from), kind)
     except MechanismError as error:
         raise MechanismError(finding.at(str(path), finding.line) for finding in error.findings) from None
 
@@ -100,7 +104,7 @@ def placed(findings: Iterable[Finding], path: str | os.PathLike[str], sections: 
         return []
     only = set(sections)
     text = read_text(path, "a model file", MAX_BYTES, "start from one of the examples")
-    data, lines = _parse(text, _file_type(path))
+    data, lines = entries_of(text, _file_type(path))
     rows = _rows(data)
     found: list[Finding] = []
     for finding in findings:
@@ -127,6 +131,13 @@ def write_model(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
             _yaml().dump(data, stream)
 
 
+def text_of(data: Mapping[str, Any]) -> str:
+    """The plain data of a model as YAML."""
+    stream = StringIO()
+    _yaml().dump(data, stream)
+    return stream.getvalue()
+
+
 def _yaml() -> YAML:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None  # the innermost groups on one line
@@ -136,8 +147,10 @@ def _yaml() -> YAML:
     return yaml
 
 
-def _unversioned() -> Finding:
-    return Finding("the version of the file is missing", "trunnion", "begin the file with trunnion: 1", line=1)
+def version_findings(data: Mapping[str, Any]) -> list[Finding]:
+    """That a file does not state its version."""
+    missing = Finding("the version of the file is missing", "trunnion", "begin the file with trunnion: 1", line=1)
+    return [] if "trunnion" in data else [missing]
 
 
 def _file_type(path: Path) -> str:
@@ -153,8 +166,8 @@ def _file_type(path: Path) -> str:
     return _TYPES[suffix]
 
 
-def _parse(text: str, kind: str) -> tuple[dict[str, Any], Lines]:
-    """Plain data of the text, and the line of every path in it."""
+def entries_of(text: str, kind: str = "YAML") -> tuple[dict[str, Any], Lines]:
+    """Plain data of a text in YAML, JSON or TOML, and the line of every path in it; MechanismError if it is none."""
     try:
         return _parse_toml(text) if kind == "TOML" else _parse_yaml(text, kind)
     except RecursionError:

@@ -11,16 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.file import composed, read_entries
+from trunnion.model.file import composed, entries_of, read_entries, text_of
 from trunnion.model.mechanism import Mechanism, read_mechanism
 from trunnion.model.named_file import stated_files
 
-__all__ = ["rewrite_mechanism"]
+__all__ = ["changed_text", "rewrite_mechanism"]
 
 YAMLS = (".yaml", ".yml")
 Location = tuple[str | int, ...]
@@ -46,6 +47,24 @@ def rewrite_mechanism(
         mechanism.write(temporary)  # a way of writing that was not foreseen: without the comments then
 
 
+def changed_text(text: str, after: Mapping[str, Any]) -> str:
+    """A YAML text of a model with other entries, given as plain data; comments and order stay where they can.
+
+    MechanismError if the text cannot be read.
+    """
+    before = entries_of(text)[0]
+    if before == after:
+        return text
+    for change in (_edited, _rewritten):
+        try:
+            found = change(text, before, after)
+            if found is not None and entries_of(found)[0] == after:
+                return found
+        except (MechanismError, YAMLError, ValueError, TypeError, LookupError):
+            continue  # a way of writing that was not foreseen
+    return text_of(after)
+
+
 def _holds(path: Path, mechanism: Mechanism) -> bool:
     try:
         return read_mechanism(path) == mechanism
@@ -66,7 +85,7 @@ def _texts(mechanism: Mechanism, source: Path, beside: bool) -> Iterator[str]:
         return
     if found is not None:
         yield found
-    again = _rewritten(text, before, mechanism)
+    again = _rewritten(text, before, mechanism.data())
     if again is not None:
         yield again
 
@@ -170,7 +189,7 @@ def _scalar(value: float | str, *, quoted: bool) -> str:
 # ---- entries that came or went --------------------------------------------------------------------------------
 
 
-def _rewritten(text: str, before: Mapping[str, Any], mechanism: Mechanism) -> str | None:
+def _rewritten(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
     """The text of the source with what is different put in; None if it cannot be had."""
     yaml = YAML(typ="rt", pure=True)
     yaml.preserve_quotes = True
@@ -179,7 +198,7 @@ def _rewritten(text: str, before: Mapping[str, Any], mechanism: Mechanism) -> st
     try:
         yaml.composer.warn_double_anchors = False  # nothing may refer to one
         tree = yaml.load(text)
-        _change(tree, before, mechanism.data())
+        _change(tree, before, after)
         stream = StringIO()
         yaml.dump(tree, stream)
     except (MechanismError, YAMLError, OSError, ValueError, TypeError, KeyError):
@@ -200,7 +219,21 @@ def _change(tree: MutableMapping[Any, Any], before: Mapping[str, Any], after: Ma
         if isinstance(there, MutableMapping) and isinstance(value, Mapping) and isinstance(before.get(key), Mapping):
             _change(there, before[key], value)
         else:
-            tree[own] = _short(value)
+            tree[own] = _laid_out(_short(value))
+
+
+def _laid_out(value: Any) -> Any:
+    """A new value as models are usually written: lists, and the innermost groups, on one line."""
+    if isinstance(value, list):
+        row = CommentedSeq(map(_laid_out, value))
+        row.fa.set_flow_style()
+        return row
+    if not isinstance(value, Mapping):
+        return value
+    group = CommentedMap((key, _laid_out(one)) for key, one in value.items())
+    if not any(isinstance(one, Mapping) for one in value.values()):
+        group.fa.set_flow_style()
+    return group
 
 
 def _short(value: Any) -> Any:

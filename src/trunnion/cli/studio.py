@@ -1,0 +1,60 @@
+"""`trunnion studio`: draw a mechanism in the browser, drag it, watch its forces."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trunnion.cli.terminal import console
+from trunnion.errors import Finding, MechanismError
+
+__all__ = ["studio"]
+
+
+def studio(
+    file: Annotated[
+        Path | None, typer.Argument(help="Model to open, or the folder of models.", show_default=False)
+    ] = None,
+    port: Annotated[int, typer.Option("--port", help="Port on this machine; 0: any that is free.")] = 0,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the browser.")] = True,
+) -> None:
+    """Draw a mechanism in the browser, drag it, watch its forces."""
+    try:
+        import uvicorn
+
+        from trunnion.studio.server import Studio
+    except ImportError:
+        what = "the studio is not installed"
+        raise MechanismError(Finding(what, remedy="install it: pip install trunnion[studio]")) from None
+    path = (file or Path()).resolve()
+    if file is not None and not path.exists():
+        raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
+    folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
+    bound = _bound(port)
+    own = Studio(folder, opened, bound.getsockname()[1])
+    for line in (f"studio: {own.address}", "It answers this machine alone. Ctrl-C ends it."):
+        console().print(line, markup=False, highlight=False, soft_wrap=True)
+    if open_:
+        import webbrowser
+
+        webbrowser.open(own.address)
+    server = uvicorn.Server(uvicorn.Config(own.app(), log_level="warning", ws="websockets-sansio", ws_max_size=4 << 20))
+    server.run(sockets=[bound])
+
+
+def _bound(port: int) -> socket.socket:
+    """A socket on the loopback; MechanismError if the port is taken."""
+    found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        found.bind(("127.0.0.1", port))
+    except (OSError, OverflowError) as error:
+        found.close()
+        reason = getattr(error, "strerror", None) or str(error)
+        raise MechanismError(
+            Finding(f"port {port} cannot be had: {reason}", "--port", "choose another, or 0")
+        ) from None
+    return found

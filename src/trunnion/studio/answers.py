@@ -1,0 +1,268 @@
+"""Questions of the page and their answers: one pure function from bytes to bytes, whatever carries them.
+
+No threads, files or sockets behind it. A question is JSON, `{"ask": …, "revision": …}`; an answer is a header with
+columns (`studio.message`). The state is the text of the model, which every question brings with it; what was read and
+prepared of a text is kept for the next question about the same.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.errors import Finding, MechanismError
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.file import entries_of, text_of
+from trunnion.model.rewrite import changed_text
+from trunnion.results.attributes import findings_of, summary_of
+from trunnion.results.quantities import quantity
+from trunnion.solve.backward import Backward
+from trunnion.solve.system import rubbing
+from trunnion.studio.exports import exported
+from trunnion.studio.gestures import done
+from trunnion.studio.loaded import Loaded, loaded
+from trunnion.studio.message import packed
+from trunnion.studio.readiness import readiness
+from trunnion.studio.sketch import Change, Sketch
+from trunnion.version import __version__
+from trunnion.views.common.cycle import abscissa
+from trunnion.views.cycle.scene import scene
+
+__all__ = ["ANSWERS", "answer", "examples"]
+
+Asked = Mapping[str, Any]
+Array = NDArray[np.float64]
+
+STEPS = 360
+MOST_STEPS = 3600
+MARGIN_KNOWN = 10.0  # a larger one is told as this
+
+
+def answer(request: bytes) -> bytes:
+    """The answer to a question; one that cannot be answered says why in a sentence."""
+    head: dict[str, Any] = {}
+    try:
+        asked = json.loads(request)
+        if not isinstance(asked, dict):
+            raise ValueError("not a group of entries")
+        head = {key: asked.get(key) for key in ("ask", "revision")}
+        about = ANSWERS.get(str(asked.get("ask")))
+        if about is None:
+            raise ValueError(f"nothing is known of '{asked.get('ask')}'")
+        return packed(head | about(asked))
+    except MechanismError as error:
+        return packed(head | {"error": "; ".join(_sentence(one) for one in error.findings[:3])})
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        return packed(head | {"error": f"The question cannot be answered ({type(error).__name__}: {error})"})
+
+
+def _sentence(finding: Finding) -> str:
+    return " ".join(
+        part for part in (finding.where, finding.what, f"— {finding.remedy}" if finding.remedy else "") if part
+    )
+
+
+def _steps(asked: Asked) -> int:
+    return min(max(int(asked.get("steps") or STEPS), 1), MOST_STEPS)
+
+
+# ---- what there is to begin with --------------------------------------------------------------------------------
+
+
+def _start(asked: Asked) -> dict[str, Any]:
+    rows = [{"name": name, "title": _stated(text, "name"), "space": _stated(text, "space") or "planar"}
+            for name, text in examples().items()]  # fmt: skip
+    return {"version": __version__, "examples": rows, "laws": list(FRICTION_LAWS)}
+
+
+def _stated(text: str, key: str) -> str:
+    """What a line of the file states."""
+    return next((line.partition(":")[2].strip() for line in text.splitlines() if line.startswith(f"{key}:")), "")
+
+
+@lru_cache(maxsize=1)
+def examples() -> dict[str, str]:
+    """The example models that stand alone in one file, by name."""
+    shipped = files("trunnion") / "examples"
+    if not shipped.is_dir():  # a working tree
+        shipped = files("trunnion") / ".." / ".." / "examples"
+    found = {one.name[:-5]: one.read_text(encoding="utf-8") for one in shipped.iterdir() if one.name.endswith(".yaml")}
+    alone = {name: text for name, text in found.items() if "\nlinks:" in text or "\nloop:" in text}
+    return dict(sorted(alone.items()))
+
+
+def _example(asked: Asked) -> dict[str, Any]:
+    name = str(asked["name"])
+    if name not in examples():
+        raise MechanismError(Finding(f"there is no example '{name}'", remedy="choose one of the list"))
+    return {"text": examples()[name]}
+
+
+# ---- a model ------------------------------------------------------------------------------------------------------
+
+
+def _model(asked: Asked) -> dict[str, Any]:
+    """Findings, numbers and the solved cycle of a text."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    found, result = list(state.findings), None
+    friction = asked.get("friction") != "off"
+    if state.mechanism is not None:
+        try:
+            result = state.result(steps, friction)
+            found = state.placed(tuple(findings_of(result))) or found
+        except MechanismError as error:
+            found += state.placed(error.findings)
+    numbers = _plain(state.mechanism.parameters()) if state.mechanism else {}
+    head = {
+        "findings": [_row(one) for one in found],
+        "entries": state.entries,
+        "numbers": numbers,
+        "solved": result is not None,
+        "ready": readiness(state.mechanism, result, found),
+        "scene": None,
+    }
+    if result is None:
+        return head
+    ideal = state.result(steps, False) if asked.get("ideal") and friction else None
+    shown = scene(result, ideal, max_positions=MOST_STEPS)
+    return head | {
+        "scene": shown,
+        "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
+        **_margin(result, bool(rubbing(state.run.system))),
+        "facts": [["structure", str(result.attrs.get("formula", ""))]],
+        "figures": [
+            [one.label, one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"]
+            for one in summary_of(result)
+            if not one.numerical
+        ],
+    }
+
+
+def _row(one: Finding) -> dict[str, Any]:
+    keys = ("code", "what", "where", "remedy", "line")
+    return {"severity": one.severity.value} | {key: getattr(one, key) for key in keys}
+
+
+def _plain(numbers: Mapping[str, Any]) -> dict[str, float]:
+    return {path: float(np.ravel(primal(value))[0]) for path, value in numbers.items()}
+
+
+def _margin(result: Any, rubs: bool) -> dict[str, Any]:
+    """The locking margin over the cycle, the least and where it is; none where nothing rubs."""
+    margin = result["locking_margin"].values
+    if not rubs or np.all(np.isnan(margin)):
+        return {"margin": None, "margin_least": None}
+    index = int(np.nanargmin(margin))
+    least = {"value": min(float(margin[index]), MARGIN_KNOWN), "beyond": bool(margin[index] > MARGIN_KNOWN)}
+    return {"margin": np.minimum(margin, MARGIN_KNOWN), "margin_least": least | {"at": abscissa(result).say(index)}}
+
+
+# ---- dragging -----------------------------------------------------------------------------------------------------
+
+
+def _drag(asked: Asked) -> dict[str, Any]:
+    """The cycle with a joint or point dragged to a place: nothing is written."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
+    sketch = _shown(state, steps, index)
+    point = str(asked["point"])
+    changes = sketch.moved(point, to)
+    back = _walked(state, {change.path: change.value for change in changes}, steps)
+    columns = _columns(back, steps)
+    shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
+    track = columns["points"][shown]
+    far = np.hypot(track["x"] - to[0], track["y"] - to[1])
+    near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
+    if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
+        near = index
+    return columns | {"solved": True, "index": near, "changes": _told(sketch, changes)}
+
+
+def _shown(state: Loaded, steps: int, index: int) -> Sketch:
+    """The sketch of a model at a position of its cycle."""
+    tracks = _columns(_walked(state, {}, steps), steps)["points"]
+    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in tracks.items()}
+    if any(not np.isfinite(part) for place in places.values() for part in place):
+        what = "cannot be assembled at the position that is shown"
+        raise MechanismError(Finding(what, remedy="go to another position"))
+    return Sketch(copy.deepcopy(dict(state.entries or {})), places)
+
+
+@np.errstate(all="ignore")
+def _walked(state: Loaded, values: Mapping[str, float], steps: int) -> Backward:
+    """Motion and forces over the cycle with some numbers replaced."""
+    run = state.run
+    if run.system.mechanism.space != "planar":
+        raise MechanismError(Finding("cannot be dragged in space", remedy="change its numbers instead"))
+    time = run.cycle.times(steps)
+    return run.solve(time, run.system.mechanism.parameters(values)) if values else run.solve(time)
+
+
+def _columns(back: Backward, steps: int) -> dict[str, Any]:
+    """What the page draws of a walk in the plane."""
+    walk = back.walk
+
+    def column(number: Any) -> Array:
+        return np.broadcast_to(np.asarray(primal(number), float), (steps,))
+
+    points = {
+        f"{link}.{name}": dict(zip("xy", map(column, walk.point(link, name).place), strict=True))
+        for link, name in walk.system.points
+    }
+    angles = {link: column(np.arctan2(one.frame.s, one.frame.c)) for link, one in walk.motions.items()}
+    return {"points": points, "angles": angles, "efforts": {name: column(one) for name, one in back.efforts.items()}}
+
+
+def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
+    """What a drag changes: name, before, after."""
+    return [
+        [change.path.removeprefix("dimensions.").removeprefix("links."),
+         sketch.length(float(sketch.numbers[change.path])), sketch.length(change.value)]
+        for change in changes
+    ]  # fmt: skip
+
+
+# ---- editing ------------------------------------------------------------------------------------------------------
+
+
+def _edit(asked: Asked) -> dict[str, Any]:
+    """The text of the model after some gestures, and where its points are shown."""
+    text = str(asked["text"])
+    entries = (
+        copy.deepcopy(entries_of(text)[0])
+        if text.strip()
+        else {"trunnion": 1, "name": "New mechanism", "space": "planar"}
+    )
+    places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
+    sketch = Sketch(entries, places)
+    says = [done(sketch, given) for given in asked["gestures"]]
+    empty = ("drivers", "loads", "springs", "assembly", "dimensions", "joints")
+    after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
+    changed = changed_text(text, after) if text.strip() else text_of(after)
+    known = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
+    kept = {key: place for key, place in sketch.places.items() if key in known}
+    return {"text": changed, "places": {key: list(place) for key, place in kept.items()}, "says": ", ".join(says)}
+
+
+def _export(asked: Asked) -> dict[str, Any]:
+    """A file of the solved cycle."""
+    state = loaded(str(asked["text"]))
+    return exported(state, str(asked["what"]), _steps(asked))
+
+
+ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
+    "start": _start,
+    "example": _example,
+    "model": _model,
+    "drag": _drag,
+    "edit": _edit,
+    "export": _export,
+}

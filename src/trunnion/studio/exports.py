@@ -1,0 +1,84 @@
+"""Files of a solved cycle for the page: table, report, pictures, a script that does the same."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.studio.loaded import Loaded
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["EXPORTS", "exported"]
+
+
+def exported(state: Loaded, what: str, steps: int) -> dict[str, Any]:
+    """Name, type and bytes of a file; MechanismError where the model has no cycle."""
+    if what not in EXPORTS:
+        raise MechanismError(Finding(f"'{what}' is no file of the studio", remedy=f"use {', '.join(EXPORTS)}"))
+    ending, mime, make = EXPORTS[what]
+    stem = "".join(sign if sign.isalnum() else "-" for sign in str((state.entries or {}).get("name") or "mechanism"))
+    content = make(state, steps)
+    return {"name": f"{stem[:60].strip('-') or 'mechanism'}.{ending}", "mime": mime, "bytes": content}
+
+
+def _result(state: Loaded, steps: int) -> xr.Dataset:
+    return state.result(steps, True)
+
+
+def _csv(state: Loaded, steps: int) -> bytes:
+    from trunnion.results.export import frame
+
+    text: str = frame(_result(state, steps)).to_csv(index=False, lineterminator="\n")
+    return text.encode()
+
+
+def _report(state: Loaded, steps: int) -> bytes:
+    from trunnion.views.cycle.report import report
+
+    return report(_result(state, steps), state.result(steps, False)).encode()
+
+
+def _picture(kind: str) -> Callable[[Loaded, int], bytes]:
+    def make(state: Loaded, steps: int) -> bytes:
+        from trunnion.views.cycle.plots import figure
+
+        stream = io.BytesIO()
+        figure(_result(state, steps), "mechanism").savefig(stream, format=kind)
+        return stream.getvalue()
+
+    return make
+
+
+def _script(state: Loaded, steps: int) -> bytes:
+    """The model and what was asked of it, as Python."""
+    lines = [
+        '"""The session of the studio as a script: the model, its cycle, a table and a report."""',
+        "",
+        "from pathlib import Path",
+        "",
+        "import trunnion",
+        "",
+        f"MODEL = {state.text!r}",
+        "",
+        'path = Path("model.yaml")',
+        'path.write_text(MODEL, encoding="utf-8")',
+        "mechanism = trunnion.read(path)",
+        f"result = trunnion.analyse(mechanism, steps={steps})",
+        "print(result.trunnion)",
+        'trunnion.save(result, "result.csv")',
+        "",
+    ]
+    return "\n".join(lines).encode()
+
+
+EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int], bytes]]] = {
+    "csv": ("csv", "text/csv", _csv),
+    "report": ("html", "text/html", _report),
+    "png": ("png", "image/png", _picture("png")),
+    "svg": ("svg", "image/svg+xml", _picture("svg")),
+    "script": ("py", "text/x-python", _script),
+}

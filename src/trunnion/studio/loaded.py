@@ -1,0 +1,91 @@
+"""A model given as text: read, checked and prepared once, for the questions that follow about the same text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+from trunnion.cycle.analyse import analyse
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.file import Lines, entries_of, place, version_findings
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.named_file import stated_files
+from trunnion.solve.run import Run, prepare
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["MOST_LINKS", "Loaded", "loaded"]
+
+MOST_SIGNS = 300_000  # of a text: what is longer takes seconds to read at every stroke of a key
+MOST_LINKS = 400  # that are solved while one draws
+
+
+@dataclass(frozen=True, eq=False)  # one for each text, by which its results are kept
+class Loaded:
+    """entries: plain data, None of a text that cannot be read; mechanism: None where it is not sound.
+
+    findings: everything known before it is solved, with lines of the text.
+    """
+
+    text: str
+    entries: Mapping[str, Any] | None
+    lines: Lines
+    mechanism: Mechanism | None
+    findings: tuple[Finding, ...]
+
+    def placed(self, findings: tuple[Finding, ...]) -> list[Finding]:
+        """Findings with their lines."""
+        return place(findings, "", self.lines, self.entries or {})
+
+    @cached_property
+    def run(self) -> Run:
+        """The mechanism prepared; MechanismError if its structure does not determine its motion."""
+        if self.mechanism is None:
+            raise MechanismError(self.findings)
+        return prepare(self.mechanism)
+
+    @lru_cache(maxsize=2)  # noqa: B019  # a handful of texts is kept, see `loaded`
+    def result(self, steps: int, friction: bool) -> xr.Dataset:
+        """Its cycle with or without friction; MechanismError where it has none."""
+        if self.mechanism is None:
+            raise MechanismError(self.findings)
+        mechanism = self.mechanism if friction else self.mechanism.with_friction("off")
+        return analyse(mechanism, steps)
+
+
+@lru_cache(maxsize=8)
+def loaded(text: str) -> Loaded:
+    """A model of a text, whatever the text is."""
+    try:
+        if len(text) > MOST_SIGNS:
+            what = f"has {len(text):,} signs; the studio reads {MOST_SIGNS:,} at most"
+            raise MechanismError(Finding(what, remedy="analyse it on the command line"))
+        entries, lines = entries_of(text)
+    except MechanismError as error:
+        return Loaded(text, None, {}, None, error.findings)
+    mechanism, found = None, version_findings(entries)
+    try:
+        found += _refusals(entries)
+        if not found:
+            mechanism = Mechanism(**entries)
+            found = [one for one in mechanism.checked if one.severity is not Severity.ERROR]
+    except MechanismError as error:
+        found += error.findings
+    return Loaded(text, entries, lines, mechanism, tuple(place(found, "", lines, entries)))
+
+
+def _refusals(entries: Mapping[str, Any]) -> list[Finding]:
+    """What the studio does not do: read other files, solve masses of links."""
+    found = [
+        Finding(f"names the file '{name[:60]}', which the studio does not read", f"{section}.{key}.file",
+                "write its points into the model, or analyse it on the command line")
+        for section, key, name in stated_files(entries)
+    ]  # fmt: skip
+    links = entries.get("links")
+    if isinstance(links, dict) and len(links) > MOST_LINKS:
+        what = f"are {len(links):,}; the studio solves {MOST_LINKS} at most"
+        found.append(Finding(what, "links", "analyse it on the command line"))
+    return found

@@ -1,0 +1,89 @@
+"""Answers as bytes: a JSON header, then columns of numbers as float32, then files.
+
+uint32 n (little-endian), n bytes of header (a multiple of 4), columns. In the header a column is
+`{"column": [first, count]}`, in numbers from the end of the header; NaN stands where there is none. A file is
+`{"bytes": [first, count]}`, in bytes from there.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+__all__ = ["packed", "unpacked"]
+
+SHORTEST = 16  # numbers: shorter lists stay in the header
+
+
+def packed(header: Mapping[str, Any]) -> bytes:
+    """A header with its arrays, long lists of numbers and bytes moved into columns."""
+    columns: list[np.ndarray] = []
+    files: list[bytes] = []
+    plain = _without_columns(header, columns, files)
+    body = np.concatenate(columns).astype("<f4").tobytes() if columns else b""
+    first = len(body)
+    for place in plain.pop("", []):
+        place["bytes"][0] = first
+        first += place["bytes"][1]
+    text = json.dumps(plain, ensure_ascii=False, allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<I", len(text)) + text + body + b"".join(files)
+
+
+def _without_columns(header: Mapping[str, Any], columns: list[np.ndarray], files: list[bytes]) -> dict[str, Any]:
+    count, places = 0, []
+
+    def column(numbers: np.ndarray) -> dict[str, Any]:
+        nonlocal count
+        columns.append(numbers)
+        count += numbers.size
+        return {"column": [count - numbers.size, int(numbers.size)]}
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {str(key): plain(one) for key, one in value.items()}
+        if isinstance(value, np.ndarray):
+            return column(np.ravel(value))
+        if isinstance(value, bytes):
+            files.append(value)
+            places.append({"bytes": [0, len(value)]})
+            return places[-1]
+        if isinstance(value, (list, tuple)):
+            if len(value) >= SHORTEST and all(one is None or type(one) in (int, float) for one in value):
+                return column(np.array(value, float))
+            return [plain(one) for one in value]
+        if isinstance(value, float) and not np.isfinite(value):
+            return None
+        return value.item() if isinstance(value, np.generic) else value
+
+    found: dict[str, Any] = plain(header)
+    if places:
+        found[""] = places
+    return found
+
+
+def unpacked(answer: bytes) -> dict[str, Any]:
+    """The header of an answer with its columns as lists (None where there is no number) and its files as bytes."""
+    (length,) = struct.unpack_from("<I", answer)
+    header, body = json.loads(answer[4 : 4 + length]), answer[4 + length :]
+
+    def whole(value: Any) -> Any:
+        if isinstance(value, list):
+            return [whole(one) for one in value]
+        if not isinstance(value, dict):
+            return value
+        if value.keys() == {"bytes"}:
+            first, count = value["bytes"]
+            return body[first : first + count]
+        if value.keys() == {"column"}:
+            first, count = value["column"]
+            numbers = np.frombuffer(body, "<f4", count, 4 * first)
+            return [float(one) if np.isfinite(one) else None for one in numbers]
+        return {key: whole(one) for key, one in value.items()}
+
+    found: dict[str, Any] = whole(header)
+    return found

@@ -1,0 +1,58 @@
+"""What a model can be asked already, and what it still lacks for the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.errors import Finding, Severity, Status, counted
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import prepare
+from trunnion.solve.system import rubbing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["readiness"]
+
+
+def readiness(
+    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding]
+) -> list[dict[str, Any]]:
+    """For motion, forces, friction, play, tolerance and time: whether there is what it takes, and why."""
+    rows = zip(
+        ("motion", "forces", "friction", "play", "tolerance", "time"), _said(mechanism, result, findings), strict=True
+    )
+    return [{"what": what, "ok": ok, "why": why} for what, (ok, why) in rows]
+
+
+def _said(
+    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding]
+) -> Iterator[tuple[bool, str]]:
+    errors = [one for one in findings if one.severity is Severity.ERROR]
+    if mechanism is None or result is None:
+        why = f"{errors[0].where} {errors[0].what}".strip() if errors else "Draw links and drive a joint."
+        yield False, why
+        yield from [(False, "The motion comes first.")] * 5
+        return
+    status = result["status"].values
+    stands, count = int(np.sum(status >= Status.SINGULAR)), len(status)
+    yield (
+        not stands,
+        f"No position in {stands} of {count}." if stands else f"Moves through {counted(count, 'position')}.",
+    )
+    values = mechanism.parameters()
+    acts = bool(mechanism.loads) or any(
+        path.endswith((".mass", ".stiffness")) and bool(np.any(np.asarray(value) != 0))
+        for path, value in values.items()
+    )
+    yield acts, "Loads or masses act on it." if acts else "Add a load, a mass or a spring."
+    rubs = bool(rubbing(prepare(mechanism).system))
+    yield rubs, "Joints rub." if rubs else "State friction of a joint, and the radius of its pin."
+    yield bool(mechanism.seated), "Pins have play." if mechanism.seated else "State a clearance or fit of a pin."
+    tolerated = bool(mechanism.tolerances())
+    yield tolerated, "Numbers have tolerances." if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
+    free = any(driver.found for driver in mechanism.drivers.values())
+    yield free, "A motor drives it." if free else "Give a driver a motor."

@@ -1,0 +1,280 @@
+"""A planar model as it is drawn: its plain data, which may be unfinished, and where its points are shown.
+
+Gestures of the hand become changes of the numbers of the file: what is dragged follows the pointer, its neighbours
+keep their places, and lengths follow.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import atan2, cos, hypot, isfinite, sin
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.fields import FIXED_NAMES
+from trunnion.model.numbers import Numbers
+from trunnion.model.units import unit
+
+__all__ = ["Change", "Frame", "Sketch", "length_unit"]
+
+Vector = tuple[float, float]
+Entries = dict[str, Any]
+
+TOGETHER = 1e-9  # of the size: joints nearer than this lie on one spot
+FIGURES = 9
+LENGTH = re.compile(r"[\d.]\s*(mm|cm|m|in|ft)\b")
+NAME = re.compile(r"\s*(-?)\s*([^\W\d]\w*)\s*")
+
+
+class Frame(NamedTuple):
+    """A frame of a link in the plane: its origin, m, and the direction of its x."""
+
+    x: float
+    y: float
+    c: float
+    s: float
+
+    def out(self, local: Vector) -> Vector:
+        """Where a point of the link is."""
+        return self.x + self.c * local[0] - self.s * local[1], self.y + self.s * local[0] + self.c * local[1]
+
+    def into(self, place: Vector) -> Vector:
+        """A place in coordinates of the link."""
+        x, y = place[0] - self.x, place[1] - self.y
+        return self.c * x + self.s * y, -self.s * x + self.c * y
+
+
+GROUND = Frame(0.0, 0.0, 1.0, 0.0)
+
+
+class Change(NamedTuple):
+    """A number to be changed: a path such as `dimensions.AB`, where it stands in the entries, and its value, m."""
+
+    path: str
+    location: tuple[str | int, ...]
+    value: float
+
+
+@dataclass
+class Sketch:
+    """entries: plain data of the model, changed in place; places: of "link.point" in the plane, m, as shown."""
+
+    entries: Entries
+    places: dict[str, Vector] = field(default_factory=dict)
+
+    # ---- what is there ----------------------------------------------------------------------------------------
+
+    def section(self, name: str) -> Entries:
+        """A group of entries, made if it is missing."""
+        found = self.entries.setdefault(name, {})
+        if not isinstance(found, dict):
+            raise MechanismError(Finding("is not a group of entries", name, "correct it in the text of the model"))
+        return found
+
+    def of(self, section: str) -> Mapping[str, Any]:
+        """The groups of a section, as far as it is sound."""
+        found = self.entries.get(section)
+        sound = found.items() if isinstance(found, dict) else ()
+        return {name: one for name, one in sound if isinstance(one, dict)}
+
+    @property
+    def ground(self) -> str:
+        """The fixed link."""
+        usual = next((name for name in FIXED_NAMES if name in self.of("links")), FIXED_NAMES[0])
+        return str(self.entries.get("ground") or usual)
+
+    @property
+    def joints(self) -> Mapping[str, Any]:
+        """Joints with their two links."""
+        return {name: one for name, one in self.of("joints").items() if len(one.get("links") or ()) == 2}
+
+    def points(self, link: str) -> Mapping[str, Any]:
+        """Points of a link, as stated."""
+        found = self.of("links").get(link, {}).get("points")
+        return found if isinstance(found, dict) else {}
+
+    @cached_property
+    def numbers(self) -> Mapping[str, Any]:
+        """Every number of the model in SI, by path."""
+        try:
+            return Numbers(**self.entries).parameter_set.nominal
+        except (ValidationError, TypeError):
+            what = "has entries that cannot be read"
+            raise MechanismError(Finding(what, "the model", "correct what is found in its text first")) from None
+
+    def local(self, link: str, point: str) -> Vector:
+        """A point in the frame of its link, m."""
+        x, y = (float(self.numbers.get(f"links.{link}.points.{point}.{axis}", 0.0)) for axis in "xy")
+        return (x, y) if isfinite(x) and isfinite(y) else (0.0, 0.0)
+
+    @cached_property
+    def size(self) -> float:
+        """The extent of what is shown, m."""
+        spots = list(self.places.values()) or [(0.0, 0.0)]
+        return max(*(max(spot[i] for spot in spots) - min(spot[i] for spot in spots) for i in (0, 1)), 1e-12)
+
+    def frame(self, link: str) -> Frame:
+        """The frame of a link that fits its points best to where they are shown."""
+        if link == self.ground:
+            return GROUND
+        pairs = [
+            (self.local(link, point), self.places[f"{link}.{point}"])
+            for point in self.points(link)
+            if f"{link}.{point}" in self.places
+        ]
+        if not pairs:
+            return GROUND
+        middle = [[sum(one[side][i] for one in pairs) / len(pairs) for i in (0, 1)] for side in (0, 1)]
+        along = across = 0.0
+        for local, place in pairs:
+            (a, b), (x, y) = (
+                (one[0] - mid[0], one[1] - mid[1]) for one, mid in zip((local, place), middle, strict=True)
+            )
+            along, across = along + a * x + b * y, across + a * y - b * x
+        turn = atan2(across, along) if hypot(along, across) > 0.0 else 0.0
+        turned = Frame(0.0, 0.0, cos(turn), sin(turn))
+        x, y = turned.out((middle[0][0], middle[0][1]))
+        return turned._replace(x=middle[1][0] - x, y=middle[1][1] - y)
+
+    def show(self, link: str, frame: Frame) -> None:
+        """Show the points of a link where its frame has them."""
+        for point in self.points(link):
+            self.places[f"{link}.{point}"] = frame.out(self.local(link, point))
+
+    def forget(self) -> None:
+        """The entries have changed: read the numbers anew."""
+        self.__dict__.pop("numbers", None)
+        self.__dict__.pop("size", None)
+
+    # ---- dragging ---------------------------------------------------------------------------------------------
+
+    def moved(self, point: str, to: Vector) -> list[Change]:
+        """What changes where a joint, or a free point "link.point", is dragged to a place."""
+        if point not in self.joints:
+            link, _, name = point.partition(".")
+            if name not in self.points(link):
+                raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
+            return list(self._at(link, name, self.frame(link).into(to)))
+        joints = self._together(point)
+        found: list[Change] = []
+        for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
+            mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
+            if link == self.ground:
+                found += [change for joint in mine for change in self._at(link, joint, to)]
+            elif guide := self._guide(link):
+                found += self._shifted(guide, to)
+            elif mine:
+                found += self._relocated(link, mine, to)
+        return found
+
+    def _turns(self, joint: str) -> bool:
+        return bool(self.joints[joint].get("type", "revolute") == "revolute")
+
+    def _together(self, joint: str) -> list[str]:
+        """The joints on the spot of a joint that are connected with it by links."""
+        found, links = [joint], set(self.joints[joint]["links"])
+        spot = self.places.get(f"{self.joints[joint]['links'][1]}.{joint}")
+        for name, one in self.joints.items():
+            other = self.places.get(f"{one['links'][1]}.{name}")
+            near = spot and other and hypot(spot[0] - other[0], spot[1] - other[1]) <= TOGETHER * self.size
+            if name != joint and near and links & set(one["links"]):
+                found.append(name)
+                links |= set(one["links"])
+        return found
+
+    def _guide(self, link: str) -> str | None:
+        """The sliding joint of a block: a link with one of them that has a pin on the same spot or none at all."""
+        slides = [name for name, one in self.joints.items() if link in one["links"] and not self._turns(name)]
+        turning = [name for name, one in self.joints.items() if link in one["links"] and self._turns(name)]
+        spots = {self.places.get(f"{link}.{name}") for name in (*slides, *turning)}
+        return slides[0] if slides and len(spots) == 1 and self.joints[slides[0]]["links"][1] == link else None
+
+    def _shifted(self, joint: str, to: Vector) -> Iterator[Change]:
+        """The guide of a block, if it stands on the ground, shifted across to where its block is dragged."""
+        first, second = self.joints[joint]["links"]
+        if first != self.ground:
+            return
+        x, y = (float(self.numbers.get(f"links.{first}.points.{joint}.axis.{axis}", 0.0)) for axis in "xy")
+        norm = hypot(x, y) or 1.0
+        before, base = self.places[f"{second}.{joint}"], self.local(first, joint)
+        across = ((to[1] - before[1]) * x - (to[0] - before[0]) * y) / norm
+        yield from self._at(first, joint, (base[0] - across * y / norm, base[1] + across * x / norm))
+
+    def _relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
+        """New coordinates of the joints of a link where some of them go to a place and the others stay.
+
+        A link whose frame begins at one joint and has its x through another keeps that form.
+        """
+        old = self.frame(link)
+        own = [one for one in self.points(link) if one in self.joints and self._turns(one)]
+        local = {point: self.local(link, point) for point in own}
+        places = {point: to if point in moving else old.out(local[point]) for point in own}
+        origin = next((point for point in own if local[point] == (0.0, 0.0)), None)
+        ahead = next((point for point in own if local[point][1] == 0.0 and local[point][0] != 0.0), None)
+        frame = old
+        if origin and ahead and {origin, ahead} & set(moving):
+            sign = 1.0 if local[ahead][0] > 0 else -1.0
+            (x, y), (a, b) = places[origin], places[ahead]
+            length = hypot(a - x, b - y)
+            if length <= TOGETHER * self.size:
+                raise MechanismError(Finding("would have no length", f"links.{link}", "keep its joints apart"))
+            frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
+        elif origin in moving:
+            frame = old._replace(x=to[0], y=to[1])
+        for point in own:
+            place = frame.into(places[point])
+            fixed = (0.0, 0.0) if point == origin and frame is not old else place
+            yield from self._at(link, point, (fixed[0], 0.0) if point == ahead and frame is not old else fixed)
+
+    def _at(self, link: str, point: str, local: Vector) -> Iterator[Change]:
+        """The numbers to be changed so that a point has these coordinates: dimensions, where they are stated so."""
+        stated = self.points(link)[point]
+        where: tuple[str | int, ...] = ("links", link, "points", point, *(("at",) if isinstance(stated, dict) else ()))
+        parts = stated["at"] if isinstance(stated, dict) else stated
+        for i, (axis, before, value) in enumerate(zip("xy", self.local(link, point), local, strict=True)):
+            if abs(value - before) <= TOGETHER * self.size:
+                continue
+            name = NAME.fullmatch(parts[i]) if isinstance(parts[i], str) else None
+            if name and name[2] in self.section("dimensions"):
+                sign = -1.0 if name[1] else 1.0
+                yield Change(f"dimensions.{name[2]}", ("dimensions", name[2]), sign * value)
+            else:
+                yield Change(f"links.{link}.points.{point}.{axis}", (*where, i), value)
+
+    # ---- writing ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def unit(self) -> str:
+        """The unit that lengths are written in."""
+        return length_unit(self.entries)
+
+    def length(self, value: float) -> str:
+        """A length as it is written."""
+        factor = float(unit(self.unit)[0])
+        digits = round(value / factor, 6)
+        return f"{digits + 0.0:.{FIGURES}g} {self.unit}"
+
+    def write(self, changes: list[Change]) -> None:
+        """Put changed lengths into the entries; a tolerance that is stated stays."""
+        for _, location, value in changes:
+            *way, last = location
+            group: Any = self.entries
+            for key in way:
+                group = group[key]
+            limits = (
+                re.search(r"\s*(?:±|\+/-|\+-|\s[+-]\S.*/).*$", group[last]) if isinstance(group[last], str) else None
+            )
+            group[last] = self.length(value) + (limits[0] if limits else "")
+        self.forget()
+
+
+def length_unit(entries: Entries) -> str:
+    """The unit of lengths that a model states most often; mm if it states none."""
+    texts = str([entries.get("dimensions"), entries.get("links")])
+    found = LENGTH.findall(texts)
+    return max(set(found), key=found.count) if found else "mm"

@@ -1,0 +1,250 @@
+"""Questions of the studio's page and their answers, without a server."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import trunnion
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+from trunnion.studio.answers import answer, examples
+from trunnion.studio.message import packed, unpacked
+
+FOURBAR = "durango-fourbar"
+
+
+def ask(**question):
+    return unpacked(answer(json.dumps(question | {"revision": 1}).encode()))
+
+
+def edited(text, places, *gestures):
+    """Text and places after some gestures, one question each."""
+    for gesture in gestures:
+        found = ask(ask="edit", text=text, places=places, gestures=[gesture])
+        assert "error" not in found, found
+        text, places = found["text"], found["places"]
+    return text, places
+
+
+def drawn_four_bar():
+    """A four-bar drawn from nothing, its crank driven."""
+    return edited(
+        "",
+        {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.05, 0.05]},
+        {"do": "link", "from": "link1.B", "to": [0.2, 0.12]},
+        {"do": "link", "from": "link2.C", "to": {"ground": [0.18, 0.0]}},
+        {"do": "driver", "joint": "A", "speed": "60 rpm"},
+    )
+
+
+def test_columns_come_back():
+    header = {"a": np.array([1.0, np.nan, 3.0]), "b": [0.5] * 20, "c": {"d": [1, 2]}, "e": b"file", "f": float("inf")}
+    found = unpacked(packed(header))
+    assert found == {"a": [1.0, None, 3.0], "b": [0.5] * 20, "c": {"d": [1, 2]}, "e": b"file", "f": None}
+
+
+def test_the_answer_bears_the_question():
+    found = unpacked(answer(b'{"ask": "start", "revision": 7}'))
+    assert (found["ask"], found["revision"], found["version"]) == ("start", 7, trunnion.__version__)
+    assert len(found["examples"]) > 40
+
+
+@pytest.mark.parametrize(
+    "question", [b"", b"[]", b"{", b'{"ask": "x"}', b'{"ask": "model"}', b'{"ask": "drag", "text": "", "to": [1]}',
+                 b'{"ask": "edit", "text": "a: 1", "gestures": [{"do": "fly"}]}', b'{"ask": "example", "name": "../x"}'],
+)  # fmt: skip
+def test_bad_questions_get_a_sentence(question):
+    assert len(unpacked(answer(question))["error"]) > 10
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a", "trunnion: 1", "links: 3", "trunnion: 1\nlinks: {a: {}}", "- 1", "\x00", "x" * 400_000]
+)
+def test_bad_models_get_findings(text):
+    found = ask(ask="model", text=text)
+    assert not found["solved"]
+    assert found["scene"] is None
+    assert any(one["severity"] == "error" and one["what"] for one in found["findings"])
+
+
+def test_masses_of_links_are_not_solved():
+    links = "".join(f"  l{k}: {{points: {{A: [0, 0]}}}}\n" for k in range(500))
+    found = ask(ask="model", text=f"trunnion: 1\nlinks:\n{links}")
+    assert [one["where"] for one in found["findings"]] == ["links"]
+
+
+def test_a_model_reads_no_other_file():
+    text = examples()[FOURBAR].replace("A: {speed: 10 rad/s}", "A: {law: table, file: secret.csv}")
+    found = ask(ask="model", text=text)
+    assert not found["solved"]
+    assert "secret.csv" in found["findings"][0]["what"]
+
+
+def test_the_cycle_is_that_of_analyse():
+    found = ask(ask="model", text=examples()[FOURBAR], ideal=True)
+    mechanism = Mechanism(**entries_of(examples()[FOURBAR])[0])
+    result = trunnion.analyse(mechanism, 360)
+    (driver,) = found["scene"]["drivers"]
+    np.testing.assert_allclose(driver["effort"], result.drive_effort.values[0], rtol=6e-7)
+    free = trunnion.analyse(mechanism.with_friction("off"), 360)
+    np.testing.assert_allclose(driver["ideal"], free.drive_effort.values[0], rtol=6e-7)
+    assert found["margin_least"]["beyond"]
+    assert found["numbers"]["dimensions.AB"] == 2.0
+    assert {one["what"]: one["ok"] for one in found["ready"]} == {
+        "motion": True, "forces": True, "friction": True, "play": False, "tolerance": False, "time": False,
+    }  # fmt: skip
+
+
+@pytest.mark.spread(6, "jansen", "rssr")
+def test_every_example_opens(example):
+    found = ask(ask="model", text=examples()[example])
+    assert "error" not in found
+    why = [one["code"] for one in found["findings"] if one["severity"] == "error"]
+    assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
+
+
+def pytest_generate_tests(metafunc):
+    if "example" in metafunc.fixturenames:
+        metafunc.parametrize("example", sorted(examples()))
+
+
+# ---- drawing -------------------------------------------------------------------------------------------------------
+
+
+def test_a_four_bar_drawn_from_nothing_is_that_of_analyse():
+    text, places = drawn_four_bar()
+    found = ask(ask="model", text=text)
+    assert found["solved"], found["findings"]
+    for key, place in places.items():  # it begins as it was drawn
+        np.testing.assert_allclose(found["places"][key], place, atol=2e-7)
+    text, _ = edited(
+        text, places,
+        {"do": "set", "path": ["joint_defaults"], "value": {"pin": {"radius": "5 mm"}, "friction": 0.1}},
+        {"do": "load", "link": "link3", "at": "C", "force": ["-100 N", "0 N"]},
+    )  # fmt: skip
+    shown = ask(ask="model", text=text)["scene"]["drivers"][0]["effort"]
+    result = trunnion.analyse(Mechanism(**entries_of(text)[0]), 360)
+    peak = np.abs(result.drive_effort.values).max()
+    assert abs(shown[60] - float(result.drive_effort.values[0, 60])) <= 1e-6 * peak
+
+
+def test_what_is_unfinished_says_what_is_missing():
+    text, places = edited("", {}, {"do": "link", "from": {"ground": [0, 0]}, "to": [0.05, 0.0]})
+    assert places["link1.B"] == pytest.approx([0.05, 0.0])
+    found = ask(ask="model", text=text)
+    assert not found["solved"]
+    assert "driver" in " ".join(one["what"] + one["remedy"] + one["where"] for one in found["findings"])
+
+
+def test_a_slider_crank_with_a_third_link_on_a_pin():
+    text, places = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.0, 0.05]},
+        {"do": "link", "from": "link1.B", "to": [0.2, 0.0]},
+        {"do": "slide", "joint": "link2.C", "angle": 0.0},
+        {"do": "driver", "joint": "A"},
+        {"do": "link", "from": "B", "to": [0.1, 0.2]},
+        {"do": "link", "from": "link3.F", "to": {"ground": [0.2, 0.2]}},
+    )  # fmt: skip
+    found = ask(ask="model", text=text)
+    assert found["solved"], found["findings"]
+    assert sorted(one["type"] for one in found["scene"]["joints"]) == ["prismatic"] + ["revolute"] * 6
+    assert found["places"]["link1.B"] == pytest.approx(found["places"]["link3.E"])
+
+
+def test_what_is_deleted_takes_along_what_needs_it():
+    text, places = drawn_four_bar()
+    text, places = edited(text, places, {"do": "delete", "what": ["links", "link3"]})
+    entries = entries_of(text)[0]
+    assert list(entries["joints"]) == ["A", "B"]
+    assert list(entries["links"]["ground"]["points"]) == ["A"]
+    assert "C" in entries["links"]["link2"]["points"]
+
+
+def test_a_name_is_changed_wherever_it_stands():
+    text = examples()[FOURBAR]
+    before = trunnion.analyse(Mechanism(**entries_of(text)[0]), 36)
+    for what, new in ((["links", "coupler"], "rod"), (["joints", "C"], "K"), (["dimensions", "BC"], "length")):
+        text, _ = edited(text, {}, {"do": "rename", "what": what, "to": new})
+    assert not {"coupler", "BC"} & set(str(entries_of(text)[0]).replace("'", " ").split())
+    after = trunnion.analyse(Mechanism(**entries_of(text)[0]), 36)
+    np.testing.assert_allclose(after.drive_effort, before.drive_effort, rtol=1e-12)
+    assert "the paper neglects weight" in text  # comments stay
+
+
+# ---- dragging ------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 359), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
+def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
+    text = examples()[FOURBAR]
+    scene = ask(ask="model", text=text)["scene"]
+    was = {key: np.array([track["x"][index % len(track["x"])], track["y"][index % len(track["y"])]])
+           for key, track in scene["points"].items()}  # fmt: skip
+    to = was["rocker.C"] + [x, y]
+    found = ask(ask="drag", text=text, point="C", index=index, to=list(to))
+    points = {key: np.array([track["x"][index], track["y"][index]]) for key, track in found["points"].items()}
+    if None in points["rocker.C"]:  # on the other assembly, or none
+        return
+    np.testing.assert_allclose(points["crank.B"], was["crank.B"], atol=1e-6)
+    np.testing.assert_allclose(
+        np.hypot(*(points["rocker.C"] - points["crank.B"])), np.hypot(*(to - was["crank.B"])), atol=2e-6
+    )
+    np.testing.assert_allclose(
+        np.hypot(*(points["rocker.C"] - points["rocker.D"])), np.hypot(*(to - was["rocker.D"])), atol=2e-6
+    )
+
+
+def test_a_drop_writes_what_the_drag_showed():
+    text = examples()[FOURBAR]
+    places = ask(ask="model", text=text)["places"]
+    to = [4.0, 2.6]
+    dragged = ask(ask="drag", text=text, point="C", index=0, to=to)
+    assert [row[0] for row in dragged["changes"]] == ["BC", "CD"]
+    text, _ = edited(text, places, {"do": "move", "point": "C", "to": to})
+    found = ask(ask="model", text=text)
+    efforts = found["scene"]["drivers"][0]["effort"], dragged["efforts"]["A"]
+    np.testing.assert_allclose(*(np.array(effort, float) for effort in efforts), rtol=1e-4)
+    assert found["places"]["rocker.C"] == pytest.approx(to, abs=1e-5)
+    assert "chooses the branch" in text
+
+
+def test_a_crank_follows_by_turning():
+    found = ask(ask="drag", text=examples()[FOURBAR], point="B", index=10, to=[0.0, 2.2])
+    track = found["points"]["crank.B"]
+    assert found["index"] == 90
+    assert (track["x"][90], track["y"][90]) == pytest.approx((0.0, 2.2), abs=1e-6)
+
+
+def test_a_guide_goes_across_and_the_rod_along():
+    text = examples()["slider-crank"]
+    names = {one["type"]: one for one in ask(ask="model", text=text)["scene"]["joints"]}
+    slide = names["prismatic"]["name"]
+    before = ask(ask="model", text=text)["places"]
+    spot = np.array(before[names["prismatic"]["at"]])
+    found = ask(ask="drag", text=text, point=slide, index=0, to=list(spot + [0.001, 0.002]))
+    assert "error" not in found, found
+    moved = [found["points"][names["prismatic"]["at"]][axis][0] for axis in "xy"]
+    np.testing.assert_allclose(moved, spot + [0.001, 0.002], atol=1e-6)
+
+
+def test_what_has_no_length_is_refused():
+    text, places = drawn_four_bar()
+    found = ask(ask="edit", text=text, places=places, gestures=[{"do": "move", "point": "B", "to": places["link1.A"]}])
+    assert "no length" in found["error"]
+
+
+@pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "script"])
+def test_files(what):
+    found = ask(ask="export", text=examples()[FOURBAR], what=what, steps=36)
+    assert len(found["bytes"]) > 500
+    assert found["name"].startswith("Four-bar-of-Durango")
+    if what == "csv":
+        assert found["bytes"].count(b"\n") == 37

@@ -56,8 +56,11 @@ def test_the_answer_bears_the_question():
 
 
 @pytest.mark.parametrize(
-    "question", [b"", b"[]", b"{", b'{"ask": "x"}', b'{"ask": "model"}', b'{"ask": "drag", "text": "", "to": [1]}',
-                 b'{"ask": "edit", "text": "a: 1", "gestures": [{"do": "fly"}]}', b'{"ask": "example", "name": "../x"}'],
+    "question",
+    [
+        b"", b"[]", b"{", b'{"ask": "x"}', b'{"ask": "model"}', b'{"ask": "example", "name": "../x"}',
+        b'{"ask": "drag", "text": "", "to": [1]}', b'{"ask": "edit", "text": "a: 1", "gestures": [{"do": "fly"}]}',
+    ],
 )  # fmt: skip
 def test_bad_questions_get_a_sentence(question):
     assert len(unpacked(answer(question))["error"]) > 10
@@ -143,7 +146,7 @@ def test_what_is_unfinished_says_what_is_missing():
 
 
 def test_a_slider_crank_with_a_third_link_on_a_pin():
-    text, places = edited(
+    text, _ = edited(
         "", {},
         {"do": "link", "from": {"ground": [0, 0]}, "to": [0.0, 0.05]},
         {"do": "link", "from": "link1.B", "to": [0.2, 0.0]},
@@ -229,10 +232,10 @@ def test_a_guide_goes_across_and_the_rod_along():
     slide = names["prismatic"]["name"]
     before = ask(ask="model", text=text)["places"]
     spot = np.array(before[names["prismatic"]["at"]])
-    found = ask(ask="drag", text=text, point=slide, index=0, to=list(spot + [0.001, 0.002]))
+    found = ask(ask="drag", text=text, point=slide, index=0, to=[spot[0] + 0.001, spot[1] + 0.002])
     assert "error" not in found, found
     moved = [found["points"][names["prismatic"]["at"]][axis][0] for axis in "xy"]
-    np.testing.assert_allclose(moved, spot + [0.001, 0.002], atol=1e-6)
+    np.testing.assert_allclose(moved, [spot[0] + 0.001, spot[1] + 0.002], atol=1e-6)
 
 
 def test_what_has_no_length_is_refused():

@@ -244,7 +244,18 @@ def test_what_has_no_length_is_refused():
     assert "no length" in found["error"]
 
 
-@pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "script"])
+def test_the_other_assembly_is_one_click_away():
+    text = examples()[FOURBAR]
+    was = ask(ask="model", text=text)
+    (other,) = ask(ask="assemblies", text=text)["others"]
+    ghost = {key: (track["x"][0], track["y"][0]) for key, track in other["points"].items()}
+    assert ghost["crank.B"] == pytest.approx(was["places"]["crank.B"])
+    assert ghost["rocker.C"][1] < 0 < was["places"]["rocker.C"][1]
+    text, _ = edited(text, was["places"], *other["gestures"])
+    assert ask(ask="model", text=text)["places"]["rocker.C"] == pytest.approx(ghost["rocker.C"])
+
+
+@pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "script", "gif"])
 def test_files(what):
     found = ask(ask="export", text=examples()[FOURBAR], what=what, steps=36)
     assert len(found["bytes"]) > 500

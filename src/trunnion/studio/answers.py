@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.resources import files
 from typing import Any
 
@@ -25,7 +25,9 @@ from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.backward import Backward
+from trunnion.solve.forward import Forward
 from trunnion.solve.system import rubbing
+from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
@@ -208,17 +210,24 @@ def _walked(state: Loaded, values: Mapping[str, float], steps: int) -> Backward:
 
 def _columns(back: Backward, steps: int) -> dict[str, Any]:
     """What the page draws of a walk in the plane."""
-    walk = back.walk
-
-    def column(number: Any) -> Array:
-        return np.broadcast_to(np.asarray(primal(number), float), (steps,))
-
-    points = {
-        f"{link}.{name}": dict(zip("xy", map(column, walk.point(link, name).place), strict=True))
-        for link, name in walk.system.points
-    }
+    walk, column = back.walk, partial(_column, steps=steps)
+    points = _tracks(walk, steps)
     angles = {link: column(np.arctan2(one.frame.s, one.frame.c)) for link, one in walk.motions.items()}
     return {"points": points, "angles": angles, "efforts": {name: column(one) for name, one in back.efforts.items()}}
+
+
+def _column(number: Any, steps: int) -> Array:
+    return np.broadcast_to(np.asarray(primal(number), float), (steps,))
+
+
+def _tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
+    """Where the points of the links are over the cycle."""
+    return {
+        f"{link}.{name}": {
+            axis: _column(part, steps) for axis, part in zip("xy", walk.point(link, name).place, strict=True)
+        }
+        for link, name in walk.system.points
+    }
 
 
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
@@ -252,6 +261,16 @@ def _edit(asked: Asked) -> dict[str, Any]:
     return {"text": changed, "places": {key: list(place) for key, place in kept.items()}, "says": ", ".join(says)}
 
 
+def _assemblies(asked: Asked) -> dict[str, Any]:
+    """The other assemblies of a model in the plane, with the gestures that take them."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    if state.run.system.mechanism.space != "planar":
+        return {"others": []}
+    found = other_assemblies(state.run, state.entries or {}, steps)
+    rows = [{"name": name, "gestures": gestures, "points": _tracks(walk, steps)} for name, gestures, walk in found]
+    return {"others": rows}
+
+
 def _export(asked: Asked) -> dict[str, Any]:
     """A file of the solved cycle."""
     state = loaded(str(asked["text"]))
@@ -265,4 +284,5 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "drag": _drag,
     "edit": _edit,
     "export": _export,
+    "assemblies": _assemblies,
 }

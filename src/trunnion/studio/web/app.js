@@ -1,0 +1,84 @@
+// The page: bars, sheet or space, player, and the panel at the right.
+
+import { discard } from "./actions.js";
+import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
+import { Dialogs } from "./dialogs.js";
+import { Findings } from "./findings.js";
+import { Motion } from "./motion.js";
+import { Plots } from "./plots.js";
+import { Properties } from "./properties.js";
+import { Space } from "./space.js";
+import { Stage } from "./stage.js";
+import * as state from "./state.js";
+import { Text } from "./text.js";
+import { choose } from "./tools.js";
+import { Button, html } from "./ui.js";
+
+const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
+
+export function App() {
+  return html`<${TopBar} />
+    <main class="studio">
+      <${ToolBar} />
+      <div class="middle-part">
+        <div class="window">
+          ${state.spatial.value ? html`<${Space} />` : html`<${Stage} /><${ZoomBar} /><${Welcome} />`}
+          <${Messages} />
+        </div>
+        <${Motion} />
+      </div>
+      <${Panel} />
+    </main>
+    <${BottomBar} />
+    <${Dialogs} />`;
+}
+
+function Panel() {
+  const open = state.tab.value;
+  const found = state.text.value.trim() ? (state.answer.value?.findings ?? []) : [];
+  const count = found.filter(({ severity }) => severity !== "note").length;
+  const step = (event) => {
+    const names = Object.keys(TABS);
+    const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!by) return;
+    state.tab.value = names[(names.indexOf(open) + by + names.length) % names.length];
+    requestAnimationFrame(() => document.querySelector("[role=tab][aria-selected=true]")?.focus());
+  };
+  const [title, Body] = TABS[open];
+  return html`<aside class="panel">
+    <div class="tabs" role="tablist" aria-label="Panel" onKeyDown=${step}>
+      ${Object.entries(TABS).map(([name, [label]]) => html`<button type="button" role="tab" class="tab" aria-selected=${name === open} tabindex=${name === open ? 0 : -1}
+        onClick=${() => (state.tab.value = name)}>${label}${name === "findings" && count > 0 ? html` <span class="count">${count}</span>` : ""}</button>`)}
+    </div>
+    <div class="body" role="tabpanel" aria-label=${title}><${Body} /></div>
+  </aside>`; // prettier-ignore
+}
+
+/** Recovered work, and in a sentence why it does not move. */
+function Messages() {
+  const time = state.recovered.value;
+  const wrong = (state.answer.value?.findings ?? []).filter(({ severity }) => severity === "error");
+  const empty = !state.text.value.trim();
+  const at = time && new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+  return html`<div class="messages">
+    <${Hint} />
+    ${time && html`<div class="message-card">Unsaved work of ${at} recovered.
+      <${Button} label="Discard it" onClick=${discard} /> <${Button} label="Keep it" onClick=${() => (state.recovered.value = null)} /></div>`}
+    ${!empty && wrong.length > 0 && html`<button type="button" class="message-card bad" onClick=${() => (state.tab.value = "findings")}>
+      <b>${wrong[0].where}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}</button>`}
+  </div>`; // prettier-ignore
+}
+
+function Welcome() {
+  const entries = state.answer.value?.entries;
+  if (!state.answer.value || Object.keys(entries?.links ?? {}).length > 0 || state.text.value.trim() || state.tool.value !== "select") return null;
+  return html`<div class="welcome">
+    <h2>An empty sheet</h2>
+    <p>Draw links with two clicks each; ends that meet become joints. Pin two of them to the ground, choose the driven joint, and it moves.</p>
+    <p class="row-of-buttons">
+      <button type="button" class="plain strong" onClick=${() => choose("link")}>Draw a link</button>
+      <${Button} label="Open an example …" onClick=${() => (state.dialog.value = "examples")} />
+      <${Button} label="Open a file …" onClick=${() => (state.dialog.value = "open")} />
+    </p>
+  </div>`;
+}

@@ -1,0 +1,93 @@
+// The bars around the sheet: file, undo, friction and export above; tools at the left; readiness and margin below.
+
+import { exported, openText, redo, save, undo } from "./actions.js";
+import { sheet } from "./sheet.js";
+import * as state from "./state.js";
+import { nextTheme, theme } from "./theme.js";
+import { TOOLS, choose, hint } from "./tools.js";
+import { Button, Icon, Menu, html } from "./ui.js";
+
+const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["gif", "Animation (GIF)"], ["report", "Report (HTML)"], ["script", "Python script"]]; // prettier-ignore
+const LAYERS = [["reactions", "Reactions"], ["curves", "Paths of points"], ["names", "Names"], ["grid", "Grid"]];
+
+export function TopBar() {
+  const { past, future, fileName, unsaved, dialog } = state;
+  const [before, after] = [past, future].map(({ value }) => value[value.length - 1]?.name);
+  return html`<header class="bar top">
+    <b class="brand">Trunnion</b>
+    <${Menu} label="File">
+      <${Button} label="New sheet" onClick=${() => openText("", "New sheet")} />
+      <${Button} label="Open …" title="Open (Ctrl+O)" onClick=${() => (dialog.value = "open")} />
+      <${Button} label="Examples …" onClick=${() => (dialog.value = "examples")} />
+      <${Button} label="Save" title="Save (Ctrl+S)" onClick=${() => save()} />
+      <${Button} label="Save as …" onClick=${() => (dialog.value = "save")} />
+    <//>
+    <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}${unsaved.value ? html`<span class="changed" title="There are changes that are not saved"> · changed</span>` : ""}</span>
+    <${Button} kind="icon" label=${before ? `Undo: ${before}` : "Undo"} title=${before ? `Undo: ${before} (Ctrl+Z)` : "Nothing to undo"} disabled=${!before} onClick=${undo}><${Icon} name="undo" /><//>
+    <${Button} kind="icon" label=${after ? `Redo: ${after}` : "Redo"} title=${after ? `Redo: ${after} (Ctrl+Shift+Z)` : "Nothing to redo"} disabled=${!after} onClick=${redo}><${Icon} name="redo" /><//>
+    <span class="step-name">${before ? `after “${before}”` : ""}</span>
+    <span class="room"></span>
+    <label class="choice">Friction
+      <select value=${state.friction.value} onChange=${(event) => (state.friction.value = event.target.value)}>
+        <option value="stated">as stated</option><option value="compare">with and without</option><option value="off">none</option>
+      </select>
+    </label>
+    <${Menu} label="Show">
+      ${LAYERS.map(([name, label]) => html`<label class="tick"><input type="checkbox" checked=${state.layers.value[name]}
+        onChange=${(event) => (state.layers.value = { ...state.layers.value, [name]: event.target.checked })} /> ${label}</label>`)}
+      <label class="tick"><input type="checkbox" checked=${state.snapping.value} onChange=${(event) => (state.snapping.value = event.target.checked)} /> Snap to the grid</label>
+    <//>
+    <${Menu} label="Export" disabled=${!state.solved.value}>${EXPORTS.map(([what, label]) => html`<${Button} label=${label} onClick=${() => exported(what)} />`)}<//>
+    <${Button} kind="icon" label=${`Colours: ${theme.value}`} title=${`Colours: ${theme.value}; click for the next`} onClick=${nextTheme}><${Icon} name=${theme.value} /><//>
+  </header>`; // prettier-ignore
+}
+
+export function ToolBar() {
+  if (state.spatial.value) return null;
+  return html`<nav class="tools" aria-label="Tools">
+    ${TOOLS.map(
+      ({ id, label, key, hint: words }) => html`<button type="button" class="tool" aria-pressed=${state.tool.value === id}
+        title=${`${label} (${key}): ${words[0]}`} onClick=${() => choose(id)}><${Icon} name=${id} /><span>${label}</span></button>`,
+    )}
+  </nav>`; // prettier-ignore
+}
+
+/** What to do next with the tool, over the sheet. */
+export function Hint() {
+  return state.tool.value === "select" ? null : html`<p class="next-step">${hint()}</p>`;
+}
+
+export function ZoomBar() {
+  return html`<div class="zoom">
+    <${Button} kind="icon" label="Zoom in" title="Zoom in (+)" onClick=${() => sheet.zoom(1.25)}>+<//>
+    <${Button} kind="icon" label="Zoom out" title="Zoom out (−)" onClick=${() => sheet.zoom(0.8)}>−<//>
+    <${Button} kind="icon" label="Show all" title="Show all (0)" onClick=${() => sheet.fit()}><${Icon} name="fit" /><//>
+  </div>`;
+}
+
+/** Readiness, locking margin, what to do next. */
+export function BottomBar() {
+  const { ready = [] } = state.answer.value ?? {};
+  const { words, bad } = state.notice.value;
+  return html`<footer class="bar bottom">
+    <ul class="ready" aria-label="What the model is ready for">
+      ${ready.map(({ what, ok, why }) => html`<li><button type="button" class=${ok ? "chip ok" : "chip"} title=${why} aria-label=${`${what}: ${ok ? "ready" : "not yet"}. ${why}`}
+        onClick=${() => state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`)}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
+    </ul>
+    <${Margin} />
+    <span class=${bad ? "notice bad" : "notice"}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>
+    <span class="state">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
+    <span class="unseen" role="status" aria-live="polite">${words}</span>
+  </footer>`; // prettier-ignore
+}
+
+/** How many times the friction may grow until it locks. */
+function Margin() {
+  const { margin_least: least } = state.answer.value ?? {};
+  if (!state.solved.value) return html`<span class="margin"><b>Locking margin</b> —</span>`;
+  if (!least) return html`<span class="margin" title="Nothing rubs, so nothing locks"><b>Locking margin</b> no friction</span>`;
+  const told = `${least.beyond ? "> " : ""}${Number(least.value).toPrecision(3).replace(/\.?0+$/, "")}`;
+  const near = !least.beyond && least.value < 2;
+  const words = "So many times the friction may grow before this position locks; at 1 it locks.";
+  return html`<span class=${near ? "margin near" : "margin"} title=${words}><b>Locking margin</b> ${told}${least.at && !least.beyond ? ` at ${least.at}` : ""}</span>`;
+}

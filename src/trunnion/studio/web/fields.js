@@ -1,0 +1,79 @@
+// The file as written, as fields: a row for each value that is there, and for the usual ones that are not.
+
+import { dictionary } from "./geometry.js";
+
+/** Values a part may well have: path within it, and an example. */
+const USUAL = {
+  links: [["mass", "2 kg"], ["inertia", "0.01 kg m^2"], ["centre", ["50 mm", "0"]]],
+  joints: [["friction.coefficient", "0.1"], ["pin.radius", "5 mm"], ["pin.clearance", "0.02 mm"]],
+  drivers: [["speed", "60 rpm"], ["range", ["0 deg", "90 deg"]], ["start", "0 deg"]],
+  loads: [["force", ["0 N", "-100 N"]], ["moment", "1 N m"]],
+  springs: [["stiffness", "1 N/mm"], ["free_length", "50 mm"], ["preload", "0 N"]],
+  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"]],
+}; // prettier-ignore
+
+const FIXED = new Set(["type", "links", "link", "at", "between", "joint"]); // drawn, not typed
+const OWN_PLACE = ["links", "joints", "drivers", "loads", "springs", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
+
+/**
+ * Rows of a part, [{path, label, value, example, fixed}]; value is a text, a list of texts, or null where the file says
+ * nothing. kind: a section of the file, or "model" for what is in no section.
+ */
+export function rowsOf(entries, kind, name) {
+  const part = kind === "model" ? ownOf(entries) : dictionary(entries?.[kind])[name];
+  const from = kind === "model" ? [] : [kind, name];
+  const there = leaves(part, from).map((row) => ({ ...row, example: null }));
+  const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
+  const missing = (USUAL[kind] ?? [])
+    .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false }))
+    .filter(({ path }) => !known(path));
+  return [...there, ...missing].map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)) }));
+}
+
+function ownOf(entries) {
+  return Object.fromEntries(Object.entries(dictionary(entries)).filter(([key]) => !OWN_PLACE.includes(key)));
+}
+
+function leaves(part, path) {
+  const fixed = path.length === 3 && FIXED.has(path[2]);
+  if (Array.isArray(part)) {
+    const plain = part.every((one) => one === null || typeof one !== "object");
+    return plain ? [{ path, value: part.map(String), fixed }] : [{ path, value: "see the text", fixed: true }];
+  }
+  if (part === null || part === undefined) return path.length > 2 ? [{ path, value: "", fixed }] : [];
+  if (typeof part !== "object") return [{ path, value: String(part), fixed }];
+  return Object.entries(part).flatMap(([key, one]) => leaves(one, [...path, key]));
+}
+
+function starts(path, other) {
+  return other.length <= path.length && other.every((key, order) => path[order] === key);
+}
+
+function labelOf(path) {
+  return path.filter((key) => key !== "points").join(" ").replaceAll("_", " ");
+}
+
+/** What is written for typed letters: a number stays a number, nothing takes the entry away. */
+export function written(typed) {
+  const plain = typed.trim();
+  if (plain === "") return null;
+  return Number.isFinite(Number(plain)) ? Number(plain) : plain;
+}
+
+/** A number with what follows it, {value, rest}, or null where it is an expression. */
+export function numberOf(typed) {
+  const found = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*((?:[a-zµ°"'^0-9/ ]*)(?:±.*)?)$/i.exec(String(typed));
+  return found && { value: Number(found[1]), rest: found[2].trim() };
+}
+
+/** The findings of a part or of one of its values. */
+export function findingsOf(findings, path) {
+  const at = path.join(".");
+  return (findings ?? []).filter(({ where }) => where === at || where?.startsWith(`${at}.`));
+}
+
+/** The part that a finding is about, {kind, name}, or null. */
+export function partOf({ where }, entries) {
+  const [kind, name] = String(where ?? "").split(".");
+  return kind in USUAL && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
+}

@@ -1,0 +1,33 @@
+// What the checks found, each with its place, its line and a remedy.
+
+import { partOf } from "./fields.js";
+import * as state from "./state.js";
+import { html } from "./ui.js";
+
+const MOST = 200;
+
+export function Findings() {
+  const found = state.text.value.trim() ? (state.answer.value?.findings ?? []) : [];
+  if (!found.length) return html`<p class="calm">No errors or warnings.</p>`;
+  return html`<div>
+    ${found.slice(0, MOST).map((one) => html`<${Finding} one=${one} />`)}
+    ${found.length > MOST && html`<p class="calm">and ${found.length - MOST} more.</p>`}
+  </div>`;
+}
+
+export function Finding({ one, onLine = null }) {
+  const { severity, what, where, remedy, line } = one;
+  const part = partOf(one, state.answer.value?.entries);
+  const show = () => {
+    state.selection.value = part;
+    state.tab.value = "properties";
+  };
+  return html`<div class=${`finding ${severity}`}>
+    <p>
+      <span class="severity">${severity[0].toUpperCase() + severity.slice(1)}</span>
+      ${where && (part ? html`<button type="button" class="where link" onClick=${show}>${where}</button> ` : html`<span class="where">${where}</span> `)}
+      ${what} ${remedy && html`<span class="remedy">— ${remedy}</span>`}
+      ${line && (onLine ? html` <button type="button" class="link" onClick=${() => onLine(line)}>line ${line}</button>` : html` <span class="remedy">line ${line}</span>`)}
+    </p>
+  </div>`; // prettier-ignore
+}

@@ -1,0 +1,52 @@
+// What a hand or a key takes hold of: a target of 24 px over every joint and free point, in the order of the plan.
+
+import { set, svg } from "../web/dom.js";
+import { stated } from "../web/format.js";
+import { TARGET } from "./drawing.js";
+
+const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
+
+/** Put targets over the spots; `chosen` {kind, name} is marked. */
+export function poseHandles(view, spots, chosen) {
+  const { layers, frame } = view;
+  const few = spots.slice(0, MOST);
+  const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
+  if (view.handled !== names) build(view, few, names);
+  few.forEach(({ kind, name, at }, order) => {
+    const [x, y] = frame.to(at);
+    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}, at ${stated(at[0], "m")}, ${stated(at[1], "m")}`;
+    const active = chosen?.kind === kind && chosen.name === name;
+    set(layers.handles.children[order], {
+      cx: x.toFixed(1),
+      cy: y.toFixed(1),
+      "aria-label": words,
+      class: active ? "handle chosen" : "handle",
+    });
+  });
+}
+
+function build(view, spots, names) {
+  const { handles } = view.layers;
+  const held = handles.contains(document.activeElement) ? document.activeElement.dataset : null;
+  view.handled = names;
+  handles.replaceChildren(
+    ...spots.map(({ kind, name, key }) =>
+      svg("circle", {
+        r: TARGET,
+        tabindex: 0,
+        role: "button",
+        "data-kind": kind,
+        "data-name": name,
+        "data-key": key,
+      }),
+    ),
+  );
+  if (held) [...handles.children].find((one) => one.dataset.kind === held.kind && one.dataset.name === held.name)?.focus();
+}
+
+/** Mark the chosen link, load or spring. */
+export function markChosen(view, chosen) {
+  for (const node of view.root.querySelectorAll("g[data-kind]")) {
+    node.classList.toggle("chosen", node.dataset.kind === chosen?.kind && node.dataset.name === chosen.name);
+  }
+}

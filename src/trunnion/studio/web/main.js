@@ -1,0 +1,15 @@
+// The start of the page.
+
+import { render } from "preact";
+import { start } from "./actions.js";
+import { App } from "./app.js";
+import { listenToDrops } from "./dialogs.js";
+import { listenToKeys } from "./keys.js";
+import { keepTheme } from "./theme.js";
+import { html } from "./ui.js";
+
+keepTheme();
+render(html`<${App} />`, document.getElementById("studio"));
+listenToKeys(document);
+listenToDrops(document);
+start();

@@ -1,0 +1,80 @@
+// The player under the sheet, and the figures of the present position.
+
+import { effect, untracked } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { gaps, say } from "../web/data.js";
+import { html as element, svg } from "../web/dom.js";
+import { player } from "../web/player.js";
+import { readout } from "../web/report.js";
+import * as state from "./state.js";
+import { html } from "./ui.js";
+
+/** The crank of the present scene. */
+export const crank = {
+  player: null,
+  go: (index) => crank.player?.go(index),
+  toggle: () => crank.player?.toggle(),
+  /** Move to where a reader points; a played motion only if it is meant. */
+  pick: (index, firm) => (firm || !crank.player?.playing()) && crank.go(index),
+};
+
+export function Motion() {
+  const holder = useRef(null);
+  useEffect(() => effect(() => fill(holder.current)), []);
+  useEffect(() =>
+    effect(() => {
+      const index = state.index.value;
+      if (crank.player && crank.player.index() !== index) crank.player.go(index);
+    }), []); // prettier-ignore
+  return html`<div class="motion" ref=${holder}></div>`;
+}
+
+function fill(holder) {
+  const scene = state.solved.value ? state.answer.value.scene : null;
+  untracked(() => {
+    if (!scene) {
+      crank.player?.pause();
+      crank.player = null;
+      holder.replaceChildren(element("p", { class: "calm" }, "The mechanism moves as soon as it is whole and has a driver."));
+      return;
+    }
+    const figures = readout(scene);
+    const show = (index) => {
+      state.index.value = index;
+      figures.show(index);
+    };
+    const same = crank.player && crank.count === scene.count && !scene.motion && !crank.once;
+    if (!same) {
+      crank.player?.pause();
+      crank.player = player(scene.count, (index) => crank.words(index), (index) => crank.show(index), {
+        svg,
+        duration: scene.motion?.duration ?? null,
+      });
+      lightUp(crank);
+    }
+    Object.assign(crank, { count: scene.count, once: Boolean(scene.motion), words: figures.words, show });
+    crank.strip.replaceChildren(...strips(scene));
+    holder.replaceChildren(crank.player.element, figures.element);
+    figures.show(state.index.value);
+    if (!same) crank.player.go(Math.min(state.index.value, scene.count - 1));
+  });
+}
+
+/** A strip under the slider for the positions that cannot be reached. */
+function lightUp(held) {
+  const slider = held.player.element.querySelector("input[type=range]");
+  held.strip = element("span", { class: "strip" });
+  const track = element("span", { class: "track-of-slider" });
+  slider.replaceWith(track);
+  track.append(slider, held.strip);
+}
+
+function strips(scene) {
+  const last = Math.max(scene.count - 1, 1);
+  return gaps(scene).map(([from, to]) => {
+    const strip = element("span", { class: "lit", title: `no answer from ${say(scene, from)} to ${say(scene, to)}` });
+    strip.style.left = `${(100 * from) / last}%`;
+    strip.style.width = `max(3px, ${(100 * (to - from)) / last}%)`;
+    return strip;
+  });
+}

@@ -1,0 +1,69 @@
+// Questions to Python and their answers: a JSON header with float32 columns behind it. A late answer is dropped.
+
+/** @typedef {Record<string, any>} Answer */
+
+const AGAIN = 800; // ms until a lost connection is tried again
+
+/** An answer's header with its columns as arrays, null for NaN; `body` are the bytes behind the header. */
+export function decode(/** @type {ArrayBuffer} */ buffer) {
+  const size = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));
+  const from = 4 + size;
+  const floats = new Float32Array(buffer, from, Math.floor((buffer.byteLength - from) / 4));
+  return { ...unpacked(header, floats), body: new Uint8Array(buffer, from) };
+}
+
+function unpacked(part, floats) {
+  if (part === null || typeof part !== "object") return part;
+  if (Array.isArray(part)) return part.map((one) => unpacked(one, floats));
+  const keys = Object.keys(part);
+  if (keys.length === 1 && keys[0] === "column") {
+    const [first, count] = part.column;
+    return Array.from(floats.subarray(first, first + count), (value) => (Number.isNaN(value) ? null : value));
+  }
+  return Object.fromEntries(keys.map((key) => [key, unpacked(part[key], floats)]));
+}
+
+/**
+ * A connection that comes back by itself; `onState(open)` tells of it.
+ * `ask(kind, fields)` gives the answer, or null where a newer question of its kind or a lost connection overtook it.
+ */
+export function connection(/** @type {string} */ url, /** @type {(open: boolean) => void} */ onState) {
+  const revisions = {};
+  const waiting = {};
+  let socket;
+  let ready;
+
+  const open = () => {
+    socket = new WebSocket(url);
+    socket.binaryType = "arraybuffer";
+    ready = new Promise((resolve) => socket.addEventListener("open", resolve));
+    socket.addEventListener("open", () => onState(true));
+    socket.addEventListener("message", ({ data }) => settle(decode(data)));
+    socket.addEventListener("close", () => {
+      onState(false);
+      for (const kind of Object.keys(waiting)) finish(kind, null);
+      setTimeout(open, AGAIN);
+    });
+  };
+  const finish = (kind, answer) => {
+    const one = waiting[kind];
+    delete waiting[kind];
+    one?.resolve(answer);
+  };
+  const settle = (/** @type {Answer} */ answer) => {
+    if (waiting[answer.ask]?.revision === answer.revision) finish(answer.ask, answer);
+  };
+  open();
+  return {
+    /** @returns {Promise<Answer | null>} */
+    async ask(kind, fields) {
+      const revision = (revisions[kind] = (revisions[kind] ?? 0) + 1);
+      finish(kind, null);
+      const answer = new Promise((resolve) => (waiting[kind] = { revision, resolve }));
+      await ready;
+      if (waiting[kind]?.revision === revision) socket.send(JSON.stringify({ ask: kind, revision, ...fields }));
+      return answer;
+    },
+  };
+}

@@ -1,0 +1,123 @@
+// The sheet: the mechanism, the grid, what is being drawn; pan, zoom, and the pointer's gestures.
+
+import { effect, untracked } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { set, svg } from "../web/dom.js";
+import { build, drawTracks, drawing, pose } from "./drawing.js";
+import { gridStep, lengthText, lengthUnit } from "./geometry.js";
+import { markChosen, poseHandles } from "./handles.js";
+import { listenToPointer } from "./hand.js";
+import { kindsOf, sheet, shown } from "./sheet.js";
+import * as state from "./state.js";
+import { pointer, typedLength } from "./tools.js";
+import { html } from "./ui.js";
+
+export function Stage() {
+  const holder = useRef(null);
+  useEffect(() => mount(holder.current), []);
+  return html`<div class="sheet" ref=${holder}></div>`;
+}
+
+function mount(holder) {
+  const root = svg("svg", {
+    tabindex: 0,
+    role: "application",
+    "aria-label": "Sheet with the mechanism. Tab goes through its joints; arrow keys move the cross, Enter uses the tool there.",
+  });
+  holder.append(root);
+  const view = drawing(root);
+  sheet.view = view;
+  sheet.after = () => {
+    chosen(view);
+    untracked(() => preview(view));
+  };
+  const stop = [
+    watchSize(holder, view),
+    listenToPointer(root, view),
+    effect(() => show(view)),
+    effect(() => {
+      state.selection.value;
+      untracked(() => chosen(view));
+    }),
+    effect(() => preview(view)),
+  ];
+  return () => {
+    stop.forEach((end) => end());
+    root.remove();
+    sheet.view = null;
+  };
+}
+
+function watchSize(holder, view) {
+  const observer = new ResizeObserver(() => {
+    const { clientWidth: width, clientHeight: height } = holder;
+    if (!width || !height) return;
+    sheet.resize(width, height);
+    if (!view.sized) sheet.fit();
+    view.sized = true;
+  });
+  observer.observe(holder);
+  return () => observer.disconnect();
+}
+
+/** Build what is new, move what is known. */
+function show(view) {
+  const found = shown.value;
+  const { curves, reactions, names, grid } = state.layers.value;
+  const index = state.index.value;
+  if (!found) {
+    if (!state.answer.value) view.fresh = true;
+    return;
+  }
+  const other = view.shown.curves !== curves || view.shown.reactions !== reactions || view.shown.grid !== grid;
+  view.shown = { curves, reactions, names, grid };
+  view.index = index;
+  view.still = Boolean(state.live.value);
+  if (view.structure !== found.structure || other) {
+    view.structure = found.structure;
+    build(view, found.scene, kindsOf(found.scene));
+  } else if (view.scene !== found.scene) {
+    view.scene = found.scene;
+    drawTracks(view);
+  }
+  pose(view, found.scene, index);
+  if (view.fresh && view.sized) {
+    view.fresh = false;
+    untracked(sheet.fit);
+  }
+  untracked(() => chosen(view));
+}
+
+function chosen(view) {
+  if (!view.scene) return;
+  poseHandles(view, sheet.spots(), state.selection.value);
+  markChosen(view, state.selection.value);
+}
+
+/** The cross, the snap mark, and the line that is being drawn with its length. */
+function preview(view) {
+  const { layers, frame } = view;
+  const from = state.pending.value;
+  const now = pointer.value;
+  const parts = [];
+  if (now && (state.tool.value !== "select" || now.keyboard)) {
+    const [x, y] = frame.to(now.spot.at);
+    parts.push(svg("path", { class: "cross", d: `M${x - 9},${y}h18M${x},${y - 9}v18` }));
+    if (now.spot.kind) parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 11 }));
+  }
+  if (from && now) parts.push(...rubber(frame, from.at, now.spot.at, typedLength.value));
+  layers.tools.replaceChildren(...parts);
+}
+
+function rubber(frame, a, b, typed) {
+  const [[x1, y1], [x2, y2]] = [frame.to(a), frame.to(b)];
+  const unit = lengthUnit(frame.width / frame.scale);
+  const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+  const angle = ((Math.atan2(dy, dx) * 180) / Math.PI).toFixed(1);
+  const told = `${lengthText(Math.hypot(dx, dy), unit, gridStep(frame.scale) / 10)}, ${angle}°`;
+  const words = typed ? `${typed}${/[a-z]/i.test(typed) ? "" : ` ${unit}`} ⏎` : told;
+  const label = svg("text", { class: typed ? "measure typed" : "measure", x: (x1 + x2) / 2 + 12, y: (y1 + y2) / 2 - 12 }, words);
+  const line = svg("line", { class: "rubber" });
+  set(line, { x1, y1, x2, y2 });
+  return [line, label];
+}

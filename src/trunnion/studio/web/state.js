@@ -1,0 +1,155 @@
+// What the page knows: the file and its places, the latest answer, what is chosen, and the steps that can be undone.
+
+import { batch, computed, effect, signal } from "@preact/signals";
+
+const STEPS = 100; // that can be undone
+const ROOM = 2e6; // characters of them that are kept over a reload
+
+export const connected = signal(false);
+/** Of the program: {version, examples, laws}. */
+export const about = signal({ version: "", examples: [], laws: [] });
+/** Of the opened folder: {folder, names}. */
+export const folder = signal({ folder: "", names: [] });
+/** Name of the open file in the folder, or null for a sheet that was never saved. */
+export const fileName = signal(null);
+export const savedText = signal("");
+export const text = signal("");
+/** World positions, m, by "link.point": what unfinished mechanisms are drawn from. */
+export const places = signal({});
+/** Answer to the latest `model` question, with the text it is for. */
+export const answer = signal(null);
+export const busy = signal(0);
+export const index = signal(0);
+/** {kind, name}, kind being links, joints, points, loads, springs or drivers; or null. */
+export const selection = signal(null);
+export const tool = signal("select");
+/** First end of what is being drawn: {at, end, …}, or null. */
+export const pending = signal(null);
+/** Answer to the latest `drag` question while a joint is dragged. */
+export const live = signal(null);
+export const past = signal([]);
+export const future = signal([]);
+/** "stated", "compare" (and without) or "off". */
+export const friction = signal("stated");
+export const layers = signal({ curves: true, reactions: true, names: true, grid: true });
+export const snapping = signal(true);
+export const tab = signal("properties");
+export const dialog = signal(null);
+/** {words, bad}: the latest remark, said to screen readers too. */
+export const notice = signal({ words: "", bad: false });
+/** When the recovered work was left, or null. */
+export const recovered = signal(null);
+
+export const unsaved = computed(() => text.value !== savedText.value);
+export const spatial = computed(() => answer.value?.scene?.space === "spatial");
+export const solved = computed(() => Boolean(answer.value?.solved && answer.value.scene));
+
+export function say(words, bad = false) {
+  notice.value = { words, bad };
+}
+
+/**
+ * Take a text and its places as the present ones, `before` {text, places} becoming a step to undo. Steps with the same
+ * `merge` in a row (arrow keys, a slider, typed letters) are one.
+ */
+export function commit(name, before, next, merge = null) {
+  const last = past.value[past.value.length - 1];
+  batch(() => {
+    if (!merge || last?.merge !== merge) past.value = [...past.value, { name, merge, ...before }].slice(-STEPS);
+    future.value = [];
+    text.value = next.text;
+    places.value = next.places;
+  });
+}
+
+/** The next step is one of its own. */
+export function settle() {
+  const last = past.value[past.value.length - 1];
+  if (last?.merge) past.value = [...past.value.slice(0, -1), { ...last, merge: null }];
+}
+
+function swap(from, to) {
+  const step = from.value[from.value.length - 1];
+  if (!step) return null;
+  batch(() => {
+    from.value = from.value.slice(0, -1);
+    to.value = [...to.value, { name: step.name, text: text.value, places: places.value }];
+    text.value = step.text;
+    places.value = step.places;
+    recovered.value = null;
+  });
+  return step.name;
+}
+
+/** The name of the step that was undone, or null. */
+export const undo = () => swap(past, future);
+/** The name of the step that was done again, or null. */
+export const redo = () => swap(future, past);
+
+/** Begin with a text; nothing of what was before can be undone. */
+export function begin({ name, saved, content, steps = null }) {
+  batch(() => {
+    fileName.value = name;
+    savedText.value = saved;
+    text.value = content;
+    places.value = steps?.places ?? {};
+    past.value = steps?.past ?? [];
+    future.value = steps?.future ?? [];
+    answer.value = null;
+    selection.value = null;
+    pending.value = null;
+    live.value = null;
+    index.value = 0;
+    tool.value = "select";
+    recovered.value = steps && content !== saved ? steps.time : null;
+  });
+}
+
+const keyOf = (name) => `trunnion studio ${folder.value.folder} ${name ?? ""}`;
+const LAST = "trunnion studio last sheet";
+
+/** What was left of a sheet when the page was closed: {text, saved, places, past, future, time}, or null. */
+export function kept(name) {
+  return read(localStorage, keyOf(name));
+}
+
+/** The sheet that this tab showed before it was loaded again: {folder, name}, or null. */
+export function lastSheet() {
+  return read(sessionStorage, LAST);
+}
+
+function read(storage, key) {
+  try {
+    return JSON.parse(storage.getItem(key) ?? "null");
+  } catch {
+    return null; // storage is off, or of another version
+  }
+}
+
+export function forget(name) {
+  try {
+    localStorage.removeItem(keyOf(name));
+  } catch {
+    // storage is off
+  }
+}
+
+/** Keep every step over a reload and a crash; older steps give way where there is no room. */
+export function keepSteps() {
+  effect(() => {
+    const [saved, name] = [savedText.value, fileName.value];
+    const work = { text: text.value, saved, places: places.peek(), past: past.value, future: future.value };
+    while (work.past.length > 5 && size(work) > ROOM) work.past = work.past.slice(Math.ceil(work.past.length / 2));
+    try {
+      sessionStorage.setItem(LAST, JSON.stringify({ folder: folder.value.folder, name }));
+      if (work.text === saved && !work.past.length && !work.future.length && name) return;
+      localStorage.setItem(keyOf(name), JSON.stringify({ ...work, time: new Date().toISOString() }));
+    } catch {
+      // no room or no storage: the steps live as long as the page
+    }
+  });
+}
+
+function size({ past: before, future: after }) {
+  return [...before, ...after].reduce((sum, step) => sum + 2 * step.text.length, 0);
+}

@@ -1,0 +1,57 @@
+// Preact's elements written as text, and the few controls that panels share.
+
+import { h } from "preact";
+import htm from "htm";
+
+export const html = htm.bind(h);
+
+/** A button that tells its key in the tooltip. */
+export function Button({ label, title, onClick, disabled = false, pressed, kind = "", children }) {
+  return html`<button type="button" class=${`plain ${kind}`} title=${title ?? label} aria-label=${label} aria-pressed=${pressed} disabled=${disabled} onClick=${onClick}>
+    ${children ?? label}
+  </button>`;
+}
+
+/** A menu that opens below its label; a choice or a click elsewhere closes it. */
+export function Menu({ label, disabled = false, children }) {
+  const close = (event) => {
+    if (event.target.closest("button")) event.currentTarget.open = false;
+  };
+  const away = (event) => {
+    if (!event.currentTarget.contains(event.relatedTarget)) event.currentTarget.open = false;
+  };
+  const escape = (event) => {
+    if (event.key !== "Escape" || !event.currentTarget.open) return;
+    event.stopPropagation();
+    event.currentTarget.open = false;
+    event.currentTarget.firstElementChild.focus();
+  };
+  if (disabled) return html`<span class="menu"><button type="button" class="plain" disabled>${label}</button></span>`;
+  return html`<details class="menu" onClick=${close} onFocusOut=${away} onKeyDown=${escape}>
+    <summary class="plain">${label}</summary>
+    <div class="choices">${children}</div>
+  </details>`;
+}
+
+/** Pictures of 20 × 20, lines only. */
+const ICONS = {
+  select: "M5 3l11 7-5 1.2 3 5-2 1.2-3-5.1L5 16z",
+  link: "M5 15L15 5M5 15m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0-5 0M15 5m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0-5 0",
+  pin: "M10 6m-2.5 0a2.5 2.5 0 1 0 5 0a2.5 2.5 0 1 0-5 0M10 8.5L6 15h8zM3 15h14M5 15l-2 3M9 15l-2 3M13 15l-2 3M17 15l-2 3",
+  slide: "M6 6h8v6h-8zM2 14.5h16M5 14.5l-2 3M9 14.5l-2 3M13 14.5l-2 3M17 14.5l-2 3",
+  driver: "M10 10m-2 0a2 2 0 1 0 4 0a2 2 0 1 0-4 0M16.5 10a6.5 6.5 0 1 0-3 5.5M13.5 15.5l3.2-.2M13.5 15.5l.6-3.2",
+  point: "M3 16C3 7 9 3 16 4M11.5 5.2m-2 0a2 2 0 1 0 4 0a2 2 0 1 0-4 0",
+  load: "M10 2v12M10 17l-3.5-5h7zM5 18h10",
+  spring: "M2 10h3l1.5-4 3 8 3-8 2.5 8 1-4h2",
+  delete: "M5 5l10 10M15 5L5 15",
+  undo: "M8 4L4 8l4 4M4 8h8a4 4 0 0 1 0 8H8",
+  redo: "M12 4l4 4-4 4M16 8H8a4 4 0 0 0 0 8h4",
+  fit: "M3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4",
+  light: "M10 10m-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0-7 0M10 2v2M10 16v2M2 10h2M16 10h2M4.3 4.3l1.4 1.4M14.3 14.3l1.4 1.4M4.3 15.7l1.4-1.4M14.3 5.7l1.4-1.4",
+  dark: "M16 12A7 7 0 0 1 8 4a6.5 6.5 0 1 0 8 8z",
+  system: "M3 4h14v9H3zM7 17h6M10 13v4",
+};
+
+export function Icon({ name }) {
+  return html`<svg class="icon" viewBox="0 0 20 20" aria-hidden="true"><path d=${ICONS[name]} /></svg>`;
+}

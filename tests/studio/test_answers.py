@@ -67,13 +67,18 @@ def test_bad_questions_get_a_sentence(question):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "a", "trunnion: 1", "links: 3", "trunnion: 1\nlinks: {a: {}}", "- 1", "\x00", "x" * 400_000]
+    "text", ["a", "trunnion: 1", "links: 3", "trunnion: 1\nlinks: {a: {}}", "- 1", "\x00", "x" * 400_000]
 )
 def test_bad_models_get_findings(text):
     found = ask(ask="model", text=text)
     assert not found["solved"]
     assert found["scene"] is None
     assert any(one["severity"] == "error" and one["what"] for one in found["findings"])
+
+
+def test_an_empty_sheet_has_nothing_wrong():
+    found = ask(ask="model", text="\n")
+    assert (found["entries"], found["findings"], found["solved"]) == ({}, [], False)
 
 
 def test_masses_of_links_are_not_solved():

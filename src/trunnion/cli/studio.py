@@ -13,12 +13,19 @@ from trunnion.errors import Finding, MechanismError
 
 __all__ = ["studio"]
 
+USUAL = 8765
+
 
 def studio(
     file: Annotated[
         Path | None, typer.Argument(help="Model to open, or the folder of models.", show_default=False)
     ] = None,
-    port: Annotated[int, typer.Option("--port", help="Port on this machine; 0: any that is free.")] = 0,
+    port: Annotated[
+        int | None,
+        typer.Option(
+            "--port", help="Port on this machine; default: 8765, or any if that is taken.", show_default=False
+        ),
+    ] = None,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the browser.")] = True,
 ) -> None:
     """Draw a mechanism in the browser, drag it, watch its forces."""
@@ -33,7 +40,7 @@ def studio(
     if file is not None and not path.exists():
         raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
     folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
-    bound = _bound(port)
+    bound = _usual() if port is None else _bound(port)
     own = Studio(folder, opened, bound.getsockname()[1])
     for line in (f"studio: {own.address}", "It answers this machine alone. Ctrl-C ends it."):
         console().print(line, markup=False, highlight=False, soft_wrap=True)
@@ -43,6 +50,14 @@ def studio(
         webbrowser.open(own.address)
     server = uvicorn.Server(uvicorn.Config(own.app(), log_level="warning", ws="websockets-sansio", ws_max_size=4 << 20))
     server.run(sockets=[bound])
+
+
+def _usual() -> socket.socket:
+    """A socket on the usual port, where the browser finds unsaved work again; on any if that is taken."""
+    try:
+        return _bound(USUAL)
+    except MechanismError:
+        return _bound(0)
 
 
 def _bound(port: int) -> socket.socket:

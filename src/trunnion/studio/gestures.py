@@ -19,6 +19,7 @@ Gesture = Callable[[Sketch, Given], str]
 SECTIONS = {"links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver"}
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 SHORTEST = 1e-9  # m
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def done(sketch: Sketch, given: Given) -> str:
@@ -88,7 +89,7 @@ def _link(sketch: Sketch, given: Given) -> str:
         sketch.section("links")[name]["points"][point] = local
     sketch.forget()
     sketch.show(name, frame)
-    return f"link {name}"
+    return f"Draw {name}"
 
 
 def _ground(sketch: Sketch) -> None:
@@ -168,7 +169,7 @@ def _pinned(sketch: Sketch, given: Given) -> str:
     place = sketch.places[f"{link}.{point}"]
     _put(sketch, sketch.ground, point, place)
     _pin(sketch, point, sketch.ground, link, place)
-    return f"pin {point} to the ground"
+    return f"Pin {point} to the ground"
 
 
 def _free(sketch: Sketch, name: str) -> tuple[str, str]:
@@ -192,14 +193,15 @@ def _slide(sketch: Sketch, given: Given) -> str:
     sketch.section("joints")[guide] = {"type": "prismatic", "links": [sketch.ground, block]}
     _pin(sketch, point, link, block, place)
     sketch.show(block, Frame(*place, cos(angle), sin(angle)))
-    return f"guide {guide}"
+    return f"Guide {point}"
 
 
 def _added_point(sketch: Sketch, given: Given) -> str:
     """A point on a link."""
+    _ground(sketch)
     point = _letter(sketch)
     _put(sketch, str(given["link"]), point, _vector(given["at"]))
-    return f"point {point}"
+    return f"Add point {point}"
 
 
 # ---- what acts on it --------------------------------------------------------------------------------------------
@@ -221,14 +223,14 @@ def _driver(sketch: Sketch, given: Given) -> str:
         start = round(degrees(turn[1] - turn[0]) % 360.0, 4) % 360.0
         entry = {"speed": given.get("speed") or "60 rpm"} | ({"start": f"{start:g} deg"} if start else {})
     sketch.section("drivers")[joint] = entry
-    return f"drive {joint}"
+    return f"Drive {joint}"
 
 
 def _load(sketch: Sketch, given: Given) -> str:
     """A force at a point of a link."""
     name = _numbered(sketch, "loads", "load")
     sketch.section("loads")[name] = {"link": given["link"], "at": given["at"], "force": list(given["force"])}
-    return f"load {name}"
+    return f"Add {name}"
 
 
 def _spring(sketch: Sketch, given: Given) -> str:
@@ -237,7 +239,7 @@ def _spring(sketch: Sketch, given: Given) -> str:
     (x, y), (a, b) = (sketch.places[end] for end in ends)
     entry = {"between": ends, "stiffness": given.get("stiffness") or "1 N/mm"}
     sketch.section("springs")[name] = entry | {"free_length": sketch.length(hypot(a - x, b - y))}
-    return f"spring {name}"
+    return f"Add {name}"
 
 
 # ---- changing -----------------------------------------------------------------------------------------------------
@@ -254,7 +256,7 @@ def _move(sketch: Sketch, given: Given) -> str:
         sketch.places[f"{link}.{point.rpartition('.')[2]}"] = to
     for link in _links_at(sketch, point):
         sketch.show(link, sketch.frame(link))
-    return f"move {point}"
+    return f"Move {point}"
 
 
 def _links_at(sketch: Sketch, point: str) -> list[str]:
@@ -270,10 +272,20 @@ def _set(sketch: Sketch, given: Given) -> str:
         if not isinstance(group, (dict, list)):
             raise _refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
     if given.get("value") is not None:
-        group[last] = given["value"]
+        group[last] = _typed(given["value"])
     elif isinstance(group, dict):
         group.pop(last, None)
-    return f"{'.'.join(map(str, given['path'][1:] or given['path']))}"
+    return f"Set {'.'.join(map(str, given['path']))}"
+
+
+def _typed(value: Any) -> Any:
+    """What was typed, as it is written: "0.3" as a number."""
+    if isinstance(value, list):
+        return [_typed(part) for part in value]
+    if isinstance(value, str) and NUMBER.fullmatch(value.strip()):
+        number = float(value)
+        return int(number) if number.is_integer() and abs(number) < 1e15 and "." not in value else number
+    return value
 
 
 def _delete(sketch: Sketch, given: Given) -> str:
@@ -284,7 +296,7 @@ def _delete(sketch: Sketch, given: Given) -> str:
         del sketch.section("links")[link]["points"][point]
         _drop(sketch, "loads", lambda load: load.get("link") == link and load.get("at") == point)
         _drop(sketch, "springs", lambda spring: name in (spring.get("between") or ()))
-        return f"delete point {point}"
+        return f"Delete point {point}"
     if section not in SECTIONS or name not in sketch.of(section):
         raise _refused("is not there", f"{section}.{name}", "choose what is drawn")
     if section == "links" and name == sketch.ground:
@@ -298,7 +310,7 @@ def _delete(sketch: Sketch, given: Given) -> str:
         _drop(sketch, "springs", lambda spring: any(end.startswith(f"{name}.") for end in spring.get("between") or ()))
     for joint in gone:
         _without_joint(sketch, joint)
-    return f"delete {SECTIONS[section]} {name}"
+    return f"Delete {SECTIONS[section]} {name}"
 
 
 def _without_joint(sketch: Sketch, joint: str) -> None:
@@ -334,7 +346,7 @@ def _rename(sketch: Sketch, given: Given) -> str:
         parts = key.split(".")
         parts[side] = new
         sketch.places[".".join(parts)] = sketch.places.pop(key)
-    return f"rename {old} to {new}"
+    return f"Rename {old} to {new}"
 
 
 def _renamed(group: Any, section: str, old: str, new: str, way: tuple[str, ...] = ()) -> Any:

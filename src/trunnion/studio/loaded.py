@@ -63,9 +63,11 @@ def loaded(text: str) -> Loaded:
         if len(text) > MOST_SIGNS:
             what = f"has {len(text):,} signs; the studio reads {MOST_SIGNS:,} at most"
             raise MechanismError(Finding(what, remedy="analyse it on the command line"))
-        entries, lines = entries_of(text)
+        entries, lines = entries_of(text) if text.strip() else ({}, {})
     except MechanismError as error:
         return Loaded(text, None, {}, None, error.findings)
+    if not entries:
+        return Loaded(text, {}, {}, None, ())
     mechanism, found = None, version_findings(entries)
     try:
         found += _refusals(entries)

@@ -13,12 +13,12 @@ import { seatCharts } from "./seat.js";
 import { spaceView } from "./space.js";
 
 /** Class that colours the n-th joint's curves and vectors; after six the dash changes. */
-function kindOf(order) {
+export function kindOf(order) {
   return `k${order % 6} d${Math.floor(order / 6) % 4}`;
 }
 
 /** Every chart of the scene that has something to show, as [{show, element}]. */
-function charts(scene, kinds, pick) {
+export function charts(scene, kinds, pick) {
   const { count, sums, drivers, joints, motion } = scene;
   const lost = total(
     joints.map((joint) => joint.friction_power),
@@ -155,7 +155,7 @@ function powerChart(scene, lost, pick) {
 }
 
 /** The figures of the present position. */
-function readout(scene) {
+export function readout(scene) {
   const { abscissa, drivers, joints, count } = scene;
   const lost = total(
     joints.map((joint) => joint.friction_power),

@@ -40,11 +40,15 @@ async function counted(promise) {
 }
 
 /** Ask for the answer to the present text. */
-export async function solve() {
+export function solve() {
+  return counted(answered());
+}
+
+async function answered() {
   const sent = state.text.value;
   const friction = state.friction.value;
   const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated", ideal: friction === "compare" };
-  const found = await counted(link.ask("model", asked));
+  const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
   state.answer.value = { ...found, text: sent };
@@ -78,12 +82,12 @@ let queue = Promise.resolve();
  */
 export function edit(gestures, merge = null) {
   queue = queue.then(() => carryOut(gestures, merge)).catch((problem) => refuse(String(problem.message ?? problem)));
-  return queue;
+  return counted(queue);
 }
 
 async function carryOut(gestures, merge) {
   const before = present();
-  const done = await counted(link.ask("edit", { ...before, gestures }));
+  const done = await link.ask("edit", { ...before, gestures });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);

@@ -116,6 +116,12 @@ export function drag(fields) {
   return link.ask("drag", { text: state.text.value, steps: STEPS, ...fields });
 }
 
+/** The other assemblies of the present text. */
+export async function assemblies() {
+  const found = await link.ask("assemblies", { text: state.text.value, steps: STEPS });
+  return found?.others ?? [];
+}
+
 /** Take typed text; words typed in one go are one step. */
 export function typed(content) {
   const before = present();

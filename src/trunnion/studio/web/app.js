@@ -59,7 +59,7 @@ function Messages() {
   const time = state.recovered.value;
   const wrong = (state.answer.value?.findings ?? []).filter(({ severity }) => severity === "error");
   const empty = !state.text.value.trim();
-  const at = time && new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
+  const at = time && new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   return html`<div class="messages">
     <${Hint} />
     ${time && html`<div class="message-card">Unsaved work of ${at} recovered.

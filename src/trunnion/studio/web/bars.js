@@ -8,7 +8,7 @@ import { TOOLS, choose, hint } from "./tools.js";
 import { Button, Icon, Menu, html } from "./ui.js";
 
 const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["gif", "Animation (GIF)"], ["report", "Report (HTML)"], ["script", "Python script"]]; // prettier-ignore
-const LAYERS = [["reactions", "Reactions"], ["curves", "Paths of points"], ["names", "Names"], ["grid", "Grid"]];
+const LAYERS = [["reactions", "Reactions"], ["curves", "Paths of points"], ["names", "Names"], ["grid", "Grid"], ["others", "Other assemblies"]];
 
 export function TopBar() {
   const { past, future, fileName, unsaved, dialog } = state;

@@ -2,6 +2,7 @@
 
 import { drag, edit, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
+import { takeOther } from "./ghosts.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { click, pointer } from "./tools.js";
@@ -127,6 +128,7 @@ async function release(held, shift) {
 function tap({ spot, part, panning }, shift) {
   if (panning) return;
   if (state.tool.value !== "select") return click(spot, { shift, part });
+  if (part?.kind === "others") return takeOther(part.name);
   state.selection.value = part && { kind: part.kind, name: part.name };
   if (part) state.tab.value = state.tab.value === "plots" ? "plots" : "properties";
 }

@@ -4,6 +4,7 @@ import { useRef, useState } from "preact/hooks";
 import { edit, setValue } from "./actions.js";
 import { findingsOf, numberOf, rowsOf, written } from "./fields.js";
 import { dictionary } from "./geometry.js";
+import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
 import { removePart } from "./tools.js";
 import { Button, html } from "./ui.js";
@@ -90,7 +91,9 @@ function Model() {
     ${dimensions.length > 0 && html`<section><h2>Dimensions</h2><div class="rows">
       ${dimensions.map(([name, value]) => html`<${Dimension} key=${name} name=${name} value=${value} findings=${findings} />`)}
     </div></section>`}
-    <section><h2>Parts</h2>${SECTIONS.map((kind) => html`<${Parts} kind=${kind} names=${Object.keys(dictionary(entries?.[kind]))} />`)}</section>`; // prettier-ignore
+    <section><h2>Parts</h2>${SECTIONS.map((kind) => html`<${Parts} kind=${kind} names=${Object.keys(dictionary(entries?.[kind]))} />`)}</section>
+    ${others.value.length > 0 && html`<section><h2>Other assemblies</h2><p class="row-of-buttons">
+      ${others.value.map(({ name }) => html`<${Button} label=${`Take ${name}`} onClick=${() => takeOther(name)} />`)}</p></section>`}`; // prettier-ignore
 }
 
 function Parts({ kind, names }) {

@@ -1,6 +1,7 @@
 // The scene that is shown and the part of the plane that the window looks at.
 
 import { computed } from "@preact/signals";
+import { kindOf } from "../web/report.js";
 import { drawing, fitted, frameOf, reframe } from "./drawing.js";
 import { extentOf, gridStep, nearOf, sketch, snap, spotsOf } from "./geometry.js";
 import * as state from "./state.js";
@@ -24,7 +25,7 @@ function moved(scene, { points, angles, status }) {
 
 /** Colour classes of the joints, as the report has them. */
 export function kindsOf(scene) {
-  return new Map(scene.joints.map((joint, order) => [joint.name, `k${order % 6} d${Math.floor(order / 6) % 4}`]));
+  return new Map(scene.joints.map((joint, order) => [joint.name, kindOf(order)]));
 }
 
 /** The view while the sheet is on the page, and what moves the window; `after` is called when it has moved. */

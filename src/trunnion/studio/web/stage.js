@@ -5,6 +5,7 @@ import { useEffect, useRef } from "preact/hooks";
 import { set, svg } from "../web/dom.js";
 import { build, drawTracks, drawing, pose } from "./drawing.js";
 import { gridStep, lengthText, lengthUnit } from "./geometry.js";
+import { others, poseGhosts } from "./ghosts.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
@@ -37,6 +38,7 @@ function mount(holder) {
     effect(() => show(view)),
     effect(() => {
       state.selection.value;
+      others.value;
       untracked(() => chosen(view));
     }),
     effect(() => preview(view)),
@@ -92,6 +94,7 @@ function chosen(view) {
   if (!view.scene) return;
   poseHandles(view, sheet.spots(), state.selection.value);
   markChosen(view, state.selection.value);
+  poseGhosts(view, state.live.value ? [] : others.value);
 }
 
 /** The cross, the snap mark, and the line that is being drawn with its length. */

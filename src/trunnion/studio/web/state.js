@@ -31,7 +31,7 @@ export const past = signal([]);
 export const future = signal([]);
 /** "stated", "compare" (and without) or "off". */
 export const friction = signal("stated");
-export const layers = signal({ curves: true, reactions: true, names: true, grid: true });
+export const layers = signal({ curves: true, reactions: true, names: true, grid: true, others: false });
 export const snapping = signal(true);
 export const tab = signal("properties");
 export const dialog = signal(null);

@@ -1,6 +1,7 @@
 // Preact's elements written as text, and the few controls that panels share.
 
 import { h } from "preact";
+import { useEffect, useRef } from "preact/hooks";
 import htm from "htm";
 
 export const html = htm.bind(h);
@@ -14,11 +15,16 @@ export function Button({ label, title, onClick, disabled = false, pressed, kind 
 
 /** A menu that opens below its label; a choice or a click elsewhere closes it. */
 export function Menu({ label, disabled = false, children }) {
+  const element = useRef(null);
+  useEffect(() => {
+    const away = ({ target }) => {
+      if (element.current?.open && !element.current.contains(target)) element.current.open = false;
+    };
+    for (const kind of ["pointerdown", "focusin"]) document.addEventListener(kind, away);
+    return () => ["pointerdown", "focusin"].forEach((kind) => document.removeEventListener(kind, away));
+  }, []);
   const close = (event) => {
     if (event.target.closest("button")) event.currentTarget.open = false;
-  };
-  const away = (event) => {
-    if (!event.currentTarget.contains(event.relatedTarget)) event.currentTarget.open = false;
   };
   const escape = (event) => {
     if (event.key !== "Escape" || !event.currentTarget.open) return;
@@ -27,7 +33,7 @@ export function Menu({ label, disabled = false, children }) {
     event.currentTarget.firstElementChild.focus();
   };
   if (disabled) return html`<span class="menu"><button type="button" class="plain" disabled>${label}</button></span>`;
-  return html`<details class="menu" onClick=${close} onFocusOut=${away} onKeyDown=${escape}>
+  return html`<details class="menu" ref=${element} onClick=${close} onKeyDown=${escape}>
     <summary class="plain">${label}</summary>
     <div class="choices">${children}</div>
   </details>`;

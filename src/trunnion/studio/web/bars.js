@@ -76,7 +76,7 @@ export function BottomBar() {
     </ul>
     <${Margin} />
     <span class=${bad ? "notice bad" : "notice"}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>
-    <span class="state">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
+    <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore
 }

@@ -2,7 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
-import { placesAt } from "./geometry.js";
+import { placesAt, posedAt } from "./geometry.js";
 import { connection } from "./socket.js";
 
 const STEPS = 360; // positions of a run
@@ -30,6 +30,7 @@ export async function start() {
   });
 }
 
+/** A promise that counts as work until it is settled. */
 async function counted(promise) {
   state.busy.value += 1;
   try {
@@ -70,7 +71,7 @@ function solveSoon() {
 export function present() {
   const { scene } = state.answer.value ?? {};
   const fresh = state.solved.value && state.answer.value.text === state.text.value && !state.spatial.value;
-  const places = fresh ? { ...state.places.value, ...placesAt(scene, state.index.value) } : state.places.value;
+  const places = fresh ? { ...state.places.value, ...placesAt(scene, posedAt(scene, state.index.value)) } : state.places.value;
   return { text: state.text.value, places };
 }
 
@@ -161,7 +162,11 @@ export function discard() {
   openSheet({ name: state.fileName.value, saved: state.savedText.value, content: state.savedText.value });
 }
 
-export async function openFile(name) {
+export function openFile(name) {
+  return counted(fetched(name));
+}
+
+async function fetched(name) {
   const reply = await fetch(`/file/${encodeURIComponent(name)}`);
   if (!reply.ok) return state.say(`${name} could not be read.`, true);
   const content = await reply.text();
@@ -172,21 +177,29 @@ export async function openFile(name) {
 export function openText(content, words) {
   const left = state.fileName.value === null && state.unsaved.value ? { name: words, ...present() } : null;
   state.forget(null);
-  openSheet({ name: null, saved: content, content });
+  const opened = openSheet({ name: null, saved: content, content });
   if (left) state.past.value = [left];
   state.say(`${words}.`);
+  return opened;
 }
 
-export async function openExample({ name, title }) {
-  const found = await counted(link.ask("example", { name }));
+export function openExample(example) {
+  return counted(shipped(example));
+}
+
+async function shipped({ name, title }) {
+  const found = await link.ask("example", { name });
   if (!found) return;
   if (found.error) return state.say(found.error, true);
-  openText(found.text, `Example ${title || name} opened`);
+  await openText(found.text, `Example ${title || name} opened`);
 }
 
 /** Save under the name, or ask for one. */
-export async function save(name = state.fileName.value) {
-  if (!name) return void (state.dialog.value = "save");
+export function save(name = state.fileName.value) {
+  return name ? counted(stored(name)) : void (state.dialog.value = "save");
+}
+
+async function stored(name) {
   const content = state.text.value;
   const reply = await fetch(`/file/${encodeURIComponent(name)}`, { method: "PUT", body: content });
   const told = await reply.json().catch(() => ({ error: `${name} could not be saved.` }));

@@ -7,7 +7,7 @@ import { roundBelow, short, stated } from "../web/format.js";
 import { loadsOf, poseLoad } from "../web/load.js";
 import { poseSlot, slotsOf } from "../web/slot.js";
 import { coil } from "../web/spring.js";
-import { gridStep } from "./geometry.js";
+import { gridStep, posedAt } from "./geometry.js";
 
 const MANY = 2000; // parts above which each kind is one plain path
 const TARGET = 12; // px, radius of what a pointer may hit
@@ -252,27 +252,28 @@ export function drawKey(view) {
 /** Move everything to a position of a scene of the same structure. */
 export function pose(view, scene, index) {
   Object.assign(view, { scene, index: Math.min(index, scene.count - 1) });
+  view.posed = posedAt(scene, view.index);
   const { parts, frame } = view;
   const known = solved(scene, view.index) || scene.count === 1;
   for (const name of ["bodies", "parts", "names"]) view.layers[name].classList.toggle("without-answer", !known);
   const spot = (key) => {
-    const found = place(scene, key, view.index);
+    const found = place(scene, key, view.posed);
     return found && frame.to(found);
   };
   if (parts.plain) return posePlain(view, spot);
   const spots = (keys) => keys.map(spot).filter(Boolean);
   parts.supports.forEach(({ joint: one, node }) => moveTo(node, spot(one.on) ?? spot(one.at)));
   parts.bodies.forEach((one) => poseBody(one, spots(one.link.points)));
-  parts.slots.forEach((one) => poseSlot(one, scene, frame, view.index));
+  parts.slots.forEach((one) => poseSlot(one, scene, frame, view.posed));
   parts.points.forEach(({ key, node }) => moveTo(node, spot(key)));
-  parts.joints.forEach(({ joint: one, node }) => moveTo(node, spot(one.at) ?? spot(one.on), one.type === "prismatic" ? guide(scene, one, view.index) : 0));
+  parts.joints.forEach(({ joint: one, node }) => moveTo(node, spot(one.at) ?? spot(one.on), one.type === "prismatic" ? guide(scene, one, view.posed) : 0));
   parts.springs.forEach((one) => one.parts.forEach((part) => set(part, { d: coil(spots(one.ends)) })));
   parts.gears.forEach(({ key, radius, node }) => {
     moveTo(node, spot(key));
     set(node, { r: radius * frame.scale });
   });
   parts.loads.forEach((one) => {
-    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.index) ?? 0);
+    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed) ?? 0);
     poseLoad(one, spots(one.keys), frame);
   });
   parts.drives.forEach((one) => poseDrive(view, one, spot(one.joint.at)));
@@ -308,7 +309,7 @@ function moveTo(node, spot, angle = 0) {
 }
 
 /** An arc around a turning drive in the sense it turns; along its way, for a sliding one an arrow. */
-function poseDrive({ scene, index }, { driver, joint: one, node }, spot) {
+function poseDrive({ scene, posed: index }, { driver, joint: one, node }, spot) {
   if (!spot) return set(node, { d: "" });
   const [x, y] = spot;
   const { values, period } = scene.abscissa;

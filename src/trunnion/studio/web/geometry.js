@@ -46,6 +46,24 @@ export function spotsOf(scene, index) {
   return [...joints, ...free].filter((one) => one.at);
 }
 
+/** Whether the mechanism can be drawn at any position. */
+export function assembled(scene) {
+  const posed = posedAt(scene, 0);
+  return Object.keys(scene.points).every((key) => place(scene, key, posed));
+}
+
+/** The position nearest to `index` at which all points have a place: where the mechanism can be drawn. */
+export function posedAt(scene, index) {
+  const tracks = Object.keys(scene.points);
+  const drawable = (one) => one >= 0 && one < scene.count && tracks.every((key) => place(scene, key, one));
+  if (!tracks.length) return index;
+  for (let far = 0; far < scene.count; far += 1) {
+    if (drawable(index - far)) return index - far;
+    if (drawable(index + far)) return index + far;
+  }
+  return index;
+}
+
 /** The places of all points at a position, {"link.point": [x, y]}. */
 export function placesAt(scene, index) {
   const known = Object.keys(scene.points).map((key) => [key, place(scene, key, index)]);

@@ -3,7 +3,7 @@
 import { drag, edit, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
-import { sheet } from "./sheet.js";
+import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { click, pointer } from "./tools.js";
 
@@ -63,19 +63,19 @@ export function partUnder(target) {
 function pull(view, held, at) {
   const far = Math.hypot(at[0] - held.start[0], at[1] - held.start[1]);
   if (!held.moved && far <= STILL) return;
-  if (!held.moved) takeHold(held);
+  if (!held.moved) takeHold(view, held);
   held.moved = true;
   if (held.joint) dragTo(held.joint, view.frame.from(at), gridStep(view.frame.scale) / 10);
   else if (held.panning || state.tool.value === "select") sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
 
-function takeHold(held) {
+function takeHold(view, held) {
   const { kind, name, key } = held.part ?? {};
   if (held.panning || state.tool.value !== "select" || (kind !== "joints" && kind !== "points")) return;
   const base = present();
-  const sketched = !state.solved.value;
-  held.joint = { name, key, index: state.index.value, asked: false, wanted: null, sketched, base, together: sketched ? together(kind, name, base.places) : [] };
+  const { sketched } = shown.peek();
+  held.joint = { name, key, index: view.posed, asked: false, wanted: null, sketched, base, together: sketched ? together(kind, name, base.places) : [] };
   state.selection.value = { kind, name };
 }
 

@@ -88,7 +88,7 @@ function arrow({ target, key, shiftKey, altKey }) {
 
 function nudge({ kind, name }, at) {
   state.selection.value = { kind, name };
-  actions.edit([{ do: "move", point: name, to: at, index: state.index.value }], `nudge ${name}`);
+  actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed }], `nudge ${name}`);
 }
 
 /** Enter: the tool at the cross or at the joint in focus; with no tool, the properties of it. */

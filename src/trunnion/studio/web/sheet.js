@@ -3,18 +3,19 @@
 import { computed } from "@preact/signals";
 import { kindOf } from "../web/report.js";
 import { drawing, fitted, frameOf, reframe } from "./drawing.js";
-import { extentOf, gridStep, nearOf, sketch, snap, spotsOf } from "./geometry.js";
+import { assembled, extentOf, gridStep, nearOf, sketch, snap, spotsOf } from "./geometry.js";
 import * as state from "./state.js";
 
 /** The scene that is shown, and what its parts are built from. */
 export const shown = computed(() => {
   const found = state.answer.value;
   if (!found || state.spatial.value) return null;
-  if (!state.solved.value) {
+  if (!state.solved.value || !assembled(found.scene)) {
     const scene = sketch(found.entries, state.places.value, found.numbers);
-    return { scene, structure: scene };
+    return { scene, structure: scene, sketched: true };
   }
-  return { scene: state.live.value?.points ? moved(found.scene, state.live.value) : found.scene, structure: found };
+  const scene = state.live.value?.points ? moved(found.scene, state.live.value) : found.scene;
+  return { scene, structure: found, sketched: false };
 });
 
 /** The scene with points and angles of a mechanism that is dragged. */
@@ -54,7 +55,7 @@ export const sheet = {
   },
   /** Distance of the grid's lines, m. */
   step: () => gridStep(sheet.view.frame.scale),
-  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.index) : []),
+  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.posed) : []),
   /** What lies at a place: a joint, a point, or the grid; `loose` leaves the grid out. */
   snap(at, loose = false) {
     const step = sheet.step() / (loose || !state.snapping.value ? 100 : 1);

@@ -1,0 +1,74 @@
+// Arithmetic of the studio's page, run by node in a folder where the modules lie as they are served: studio/ and web/.
+import assert from "node:assert/strict";
+import { pathToFileURL } from "node:url";
+
+const served = pathToFileURL(`${process.argv[2]}/`);
+const load = (name) => import(new URL(name, served));
+const geometry = await load("studio/geometry.js");
+const fields = await load("studio/fields.js");
+const { decode } = await load("studio/socket.js");
+
+// ---- grid and lengths
+assert.equal(geometry.roundAbove(0.013), 0.02);
+assert.equal(geometry.roundAbove(0.02), 0.02);
+assert.equal(geometry.roundAbove(21), 50);
+assert.equal(geometry.onGrid(0.12499999, 0.01), 0.12);
+assert.equal(geometry.onGrid(0.30000000000000004, 0.1), 0.3);
+assert.equal(geometry.lengthOf("60", "mm"), 0.06);
+assert.equal(geometry.lengthOf("2,5 in", "mm"), 0.0635);
+assert.equal(geometry.lengthOf("1.2m", "mm"), 1.2);
+for (const wrong of ["", "0", "-3 mm", "3 kg", "a", "1 2"]) assert.equal(geometry.lengthOf(wrong, "mm"), null, wrong);
+assert.equal(geometry.lengthText(0.0512, "mm", 0.001), "51 mm");
+
+// ---- what a pointer takes
+const spots = [{ kind: "joints", name: "A", key: "crank.A", at: [0, 0] }, { kind: "points", name: "bar.E", key: "bar.E", at: [0.01, 0] }];
+assert.equal(geometry.snap(spots, [0.004, 0], { near: 0.02, step: 0.01 }).end, "A");
+assert.equal(geometry.snap(spots, [0.006, 0], { near: 0.02, step: 0.01 }).end, "bar.E");
+assert.deepEqual(geometry.snap(spots, [0.112, 0.058], { near: 0.02, step: 0.01 }).end, [0.11, 0.06]);
+
+// ---- a mechanism that is only drawn
+const entries = {
+  links: { ground: { points: { A: [0, 0] } }, bar: { points: { A: [0, 0], B: [1, 0] } } },
+  joints: { A: { type: "revolute", links: ["ground", "bar"] }, half: { type: "revolute" } },
+  loads: "nonsense",
+};
+const places = { "ground.A": [0, 0], "bar.A": [0, 0], "bar.B": [0.6, 0.8], "gone.C": [1, 1] };
+const drawn = geometry.sketch(entries, places);
+assert.deepEqual(drawn.joints.map((one) => one.name), ["A"]);
+assert.deepEqual(drawn.links.map((one) => one.ground), [true, false]);
+assert.deepEqual(geometry.spotsOf(drawn, 0).map((one) => one.name), ["A", "bar.B"]);
+assert.deepEqual(geometry.placesAt(drawn, 0)["bar.B"], [0.6, 0.8]);
+for (const odd of [null, {}, { links: 3, joints: [] }, { links: { a: null } }]) geometry.sketch(odd, {});
+
+// ---- the position that can be drawn
+const track = { count: 5, points: { "a.P": { x: [null, null, 1, 2, null], y: [0] } } };
+assert.deepEqual([0, 1, 2, 3, 4].map((index) => geometry.posedAt(track, index)), [2, 2, 2, 3, 3]);
+assert.ok(geometry.assembled(track));
+assert.ok(!geometry.assembled({ count: 2, points: { "a.P": { x: [null], y: [0] } } }));
+
+// ---- values as the file writes them
+assert.equal(fields.written(" 0.3 "), 0.3);
+assert.equal(fields.written("2 kg"), "2 kg");
+assert.equal(fields.written("  "), null);
+assert.deepEqual(fields.numberOf("60 mm ± 0.05"), { value: 60, rest: "mm ± 0.05" });
+assert.deepEqual(fields.numberOf("2.5e-3"), { value: 0.0025, rest: "" });
+assert.equal(fields.numberOf("r / 3"), null);
+assert.equal(fields.numberOf("2 * AB"), null);
+const rows = fields.rowsOf({ links: { bar: { points: { A: [0, "L"] }, mass: "2 kg" } } }, "links", "bar");
+assert.deepEqual(rows.map(({ label, value }) => [label, value]), [["A", ["0", "L"]], ["mass", "2 kg"], ["inertia", null], ["centre", null]]);
+const found = [{ where: "links.bar.mass" }, { where: "links.barrel" }, { where: null }];
+assert.equal(fields.findingsOf(found, ["links", "bar"]).length, 1);
+assert.deepEqual(fields.partOf({ where: "links.bar.mass" }, { links: { bar: {} } }), { kind: "links", name: "bar" });
+assert.equal(fields.partOf({ where: "drivers" }, {}), null);
+
+// ---- answers
+const header = JSON.stringify({ ask: "model", points: { A: { x: { column: [1, 2] } } }, list: [1, null] });
+const text = new TextEncoder().encode(header.padEnd(Math.ceil(header.length / 4) * 4));
+const bytes = new Uint8Array(4 + text.length + 12);
+new DataView(bytes.buffer).setUint32(0, text.length, true);
+bytes.set(text, 4);
+bytes.set(new Uint8Array(new Float32Array([9, 0.5, NaN]).buffer), 4 + text.length);
+const answer = decode(bytes.buffer);
+assert.deepEqual(answer.points.A.x, [0.5, null]);
+assert.deepEqual(answer.list, [1, null]);
+assert.equal(answer.body.length, 12);

@@ -23,6 +23,8 @@ export async function start() {
   const again = last?.folder === files.folder ? last.name : files.open;
   if (again && (files.open === again || files.files.includes(again))) await openFile(again);
   else openSheet({ name: null, saved: "", content: "" });
+  const left = state.kept(null);
+  if (state.fileName.value !== null && left && left.text !== left.saved) state.waiting.value = left.time;
   state.keepSteps();
   effect(() => {
     state.friction.value; // another friction is another answer
@@ -154,6 +156,14 @@ export function openSheet({ name, saved, content }) {
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
   state.dialog.value = null;
   return solve();
+}
+
+/** Open the unsaved sheet without a name, or throw it away. */
+export function takeWaiting(open) {
+  state.waiting.value = null;
+  if (open) return openSheet({ name: null, saved: "", content: "" });
+  state.forget(null);
+  return null;
 }
 
 /** Leave the recovered work and go back to the file as it was saved. */

@@ -1,6 +1,6 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
-import { discard } from "./actions.js";
+import { discard, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
@@ -59,11 +59,14 @@ function Messages() {
   const time = state.recovered.value;
   const wrong = (state.answer.value?.findings ?? []).filter(({ severity }) => severity === "error");
   const empty = !state.text.value.trim();
-  const at = time && new Date(time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+  const clock = (one) => new Date(one).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+  const waiting = state.waiting.value;
   return html`<div class="messages">
     <${Hint} />
-    ${time && html`<div class="message-card">Unsaved work of ${at} recovered.
+    ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.
       <${Button} label="Discard it" onClick=${discard} /> <${Button} label="Keep it" onClick=${() => (state.recovered.value = null)} /></div>`}
+    ${waiting && html`<div class="message-card">A sheet that was not saved is left from ${clock(waiting)}.
+      <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}
     ${!empty && wrong.length > 0 && html`<button type="button" class="message-card bad" onClick=${() => (state.tab.value = "findings")}>
       <b>${wrong[0].where}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}</button>`}
   </div>`; // prettier-ignore

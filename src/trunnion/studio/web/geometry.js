@@ -3,7 +3,7 @@
 import { bounds, place } from "../web/data.js";
 
 const FINE = 13; // px, the least distance of grid lines
-const NEAR = 14; // px within which a point is taken
+const NEAR = 16; // px within which a point is taken
 
 /** The round number at or above `value`: 1, 2 or 5 times a power of ten. */
 export function roundAbove(value) {

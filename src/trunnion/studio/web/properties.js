@@ -70,7 +70,7 @@ function Row({ row, findings }) {
     <span class="values">
       ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} placeholder=${example && `e.g. ${list ? example[order] : example}`}
         aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0}
-        aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck="false" />`)}
+        aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>
     ${wrong.length > 0 && html`<p class="wrong" id=${`${id}-wrong`}>${wrong.map(({ what, remedy }) => `${what}${remedy ? ` — ${remedy}` : ""}`).join("; ")}</p>`}
   </div>`; // prettier-ignore

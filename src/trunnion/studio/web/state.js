@@ -37,6 +37,8 @@ export const tab = signal("properties");
 export const dialog = signal(null);
 /** {words, bad}: the latest remark, said to screen readers too. */
 export const notice = signal({ words: "", bad: false });
+/** When work on a sheet without a name was left that is not the open one, or null. */
+export const waiting = signal(null);
 /** When the recovered work was left, or null. */
 export const recovered = signal(null);
 

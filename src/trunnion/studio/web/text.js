@@ -28,7 +28,7 @@ export function Text() {
   return html`<div class="text-of-model">
     <div class="editor">
       <pre class="gutter" ref=${gutter} aria-hidden="true"></pre>
-      <textarea ref=${area} aria-label="Model file" spellcheck="false" wrap="off" autocomplete="off"
+      <textarea ref=${area} aria-label="Model file" spellcheck=${false} wrap="off" autocomplete="off"
         onInput=${(event) => typed(event.target.value)}
         onScroll=${(event) => (gutter.current.scrollTop = event.target.scrollTop)}></textarea>
     </div>

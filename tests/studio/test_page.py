@@ -1,0 +1,325 @@
+"""The studio's page in a real browser, where there is one: as a user draws, drags, types, reloads and saves.
+
+Every test fails on an error of the page, on one in its console, and on a request to anywhere but this machine.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import socket
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+import uvicorn
+from playwright.sync_api import sync_playwright
+
+import trunnion
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+from trunnion.studio.answers import examples
+from trunnion.studio.server import Studio
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+QUIET = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+HERE = re.compile(r"(http|ws)://127\.0\.0\.1:|data:|blob:")
+PEAK = 1e-6  # of the peak: how near a torque must be
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "four-bar.yaml").write_text(examples()["durango-fourbar"], encoding="utf-8")
+    bound = socket.socket()
+    bound.bind(("127.0.0.1", 0))
+    own = Studio(folder, "four-bar.yaml", bound.getsockname()[1])
+    server = uvicorn.Server(uvicorn.Config(own.app(), log_level="error", ws="websockets-sansio"))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]}, daemon=True)
+    thread.start()
+    yield own
+    server.should_exit = True
+    thread.join(10)
+    bound.close()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        yield launched
+        launched.close()
+
+
+class User:
+    """Somebody in front of a page; state(name): a signal of the page."""
+
+    def __init__(self, page, studio):
+        self.page, self.studio, self.wrong = page, studio, []
+        page.on("pageerror", lambda error: self.wrong.append(f"page: {error}"))
+        page.on(
+            "console", lambda line: line.type in ("error", "warning") and self.wrong.append(f"console: {line.text}")
+        )
+        page.on("request", lambda asked: HERE.match(asked.url) or self.wrong.append(f"request: {asked.url}"))
+
+    def open(self):
+        self.page.goto(self.studio.address)
+        self.page.wait_for_selector(".sheet svg")
+        self.idle()
+
+    def state(self, words):
+        return self.page.evaluate(f'import("/studio/state.js").then(s => {words})')
+
+    def idle(self):
+        self.page.wait_for_timeout(80)
+        idle = 'import("/studio/state.js").then(s => s.connected.value && s.busy.value === 0)'
+        for _ in range(200):
+            if self.page.evaluate(idle):
+                break
+            self.page.wait_for_timeout(50)
+        else:
+            pytest.fail("the page is never idle")
+        self.page.wait_for_timeout(40)
+
+    def keys(self, *keys):
+        for key in keys:
+            self.page.keyboard.press(key)
+        self.idle()
+
+    def new_sheet(self):
+        self.page.click("summary:has-text('File')")
+        self.page.click("button:has-text('New sheet')")
+        self.idle()
+        self.box = self.page.locator(".sheet").bounding_box()
+        self.page.locator(".sheet > svg").focus()
+
+    def click(self, x, y, shift=False):
+        """Click at a place of the sheet, px."""
+        x, y = self.box["x"] + x, self.box["y"] + y
+        self.page.mouse.move(x - 3, y - 2)
+        self.page.mouse.move(x, y)
+        if shift:
+            self.page.keyboard.down("Shift")
+        self.page.mouse.click(x, y)
+        if shift:
+            self.page.keyboard.up("Shift")
+        self.page.wait_for_timeout(40)
+
+    def handle(self, name):
+        box = self.page.locator(f'.handle[data-name="{name}"]').bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def draw_four_bar(self):
+        """By mouse: three links, the crank driven."""
+        for one, other, *grounded in (
+            ((200, 350), (250, 270), True, False),
+            ((250, 270), (520, 180), False, False),
+            ((520, 180), (480, 350), False, True),
+        ):
+            self.keys("l")
+            self.click(*one, shift=grounded[0])
+            self.click(*other, shift=grounded[1])
+            self.idle()
+            self.keys("Escape")
+        self.keys("d")
+        self.click(200, 350)
+        self.idle()
+        self.keys("v")
+
+
+if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
+
+    @pytest.fixture
+    def user(browser, studio):
+        context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
+        found = User(context.new_page(), studio)
+        found.open()
+        yield found
+        wrong = list(found.wrong)
+        context.close()
+        assert not wrong, wrong
+
+    def efforts(user):
+        return user.state("s.answer.value.scene.drivers[0].effort")
+
+    def analysed(text):
+        return trunnion.analyse(Mechanism(**entries_of(text)[0]), 360)
+
+    def test_a_four_bar_drawn_by_mouse_is_driven_rubbed_saved_and_opened_again(user):
+        user.new_sheet()
+        user.draw_four_bar()
+        assert user.state("s.solved.value"), user.state("JSON.stringify(s.answer.value.findings)")
+        user.keys("f")
+        user.click(520, 180)  # a load
+        user.idle()
+        user.keys("v")
+        text = user.state("s.text.value")
+        user.page.click("role=tab[name=Text]")
+        rubbing = text.rstrip("\n") + "\njoint_defaults: {pin: {radius: 5 mm}, friction: 0.2}\n"
+        user.page.locator("textarea").fill(rubbing)
+        user.page.wait_for_timeout(700)
+        user.idle()
+        assert user.state("s.text.value") == rubbing
+        result = analysed(rubbing)
+        torque = result["drive_effort"].values[0]
+        assert abs(efforts(user)[60] - torque[60]) <= PEAK * np.abs(torque).max()
+        user.page.click("summary:has-text('File')")
+        user.page.click("button:has-text('Save as')")
+        user.page.locator("dialog input").fill("drawn")
+        user.page.click("dialog button:has-text('Save')")
+        user.idle()
+        saved = user.studio.folder / "drawn.yaml"
+        assert saved.read_text("utf-8") == rubbing
+        assert not user.state("s.unsaved.value")
+        user.new_sheet()
+        user.page.click("summary:has-text('File')")
+        user.page.click("button:has-text('Open')")
+        user.page.locator("dialog button", has_text="drawn.yaml").click()
+        user.idle()
+        assert user.state("s.text.value") == rubbing
+
+    @pytest.mark.slow
+    def test_undo_to_the_empty_sheet_and_redo(user):
+        user.new_sheet()
+        user.draw_four_bar()
+        drawn, steps = user.state("s.text.value"), user.state("s.past.value.map(one => one.name)")
+        assert steps == ["Draw link1", "Draw link2", "Draw link3", "Drive A"]
+        for _ in steps:
+            user.keys("Control+z")
+        assert user.state("s.text.value").strip() == ""
+        for _ in steps:
+            user.keys("Control+Shift+z")
+        assert user.state("s.text.value") == drawn
+        assert user.state("s.solved.value")
+
+    @pytest.mark.slow
+    def test_unsaved_work_survives_a_crash(user):
+        user.new_sheet()
+        user.draw_four_bar()
+        drawn = user.state("s.text.value")
+        page = user.page.context.new_page()  # the tab is gone without a word
+        user.page.close(run_before_unload=False)
+        user.page = page
+        user.open()
+        user.page.click("button:has-text('Open it')")
+        user.idle()
+        assert user.state("s.text.value") == drawn
+        assert user.state("s.past.value.length") == 4
+        user.page.reload()  # and once more in the same tab
+        user.page.wait_for_selector(".sheet svg")
+        user.idle()
+        assert user.state("s.text.value") == drawn
+        assert "recovered" in user.page.locator("body").inner_text()
+        user.page.click("text=Discard it")
+        user.idle()
+        assert user.state("s.text.value") == ""
+
+    @pytest.mark.slow
+    def test_a_joint_is_dragged_and_brought_back(user):
+        before, (x, y) = user.state("s.text.value"), user.handle("C")
+        user.page.mouse.move(x, y)
+        user.page.mouse.down()
+        for k in range(1, 16):
+            user.page.mouse.move(x - 2 * k, y - k)
+            user.page.wait_for_timeout(16)
+        user.page.wait_for_timeout(150)
+        assert "BC" in user.page.locator("body").inner_text()
+        user.page.mouse.up()
+        user.idle()
+        there = user.handle("C")
+        assert np.hypot(there[0] - x + 30, there[1] - y + 15) < 6
+        text = user.state("s.text.value")
+        np.testing.assert_allclose(efforts(user), analysed(text)["drive_effort"].values[0], rtol=1e-6)
+        user.keys("Control+z")
+        assert user.state("s.text.value") == before
+
+    @pytest.mark.slow
+    def test_a_plot_moves_the_mechanism(user):
+        user.page.click("role=tab[name=Plots]")
+        box = user.page.locator(".plot").first.bounding_box()
+        where = user.handle("B")
+        user.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 50)
+        user.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
+        user.page.wait_for_timeout(150)
+        assert 100 < user.state("s.index.value") < 300
+        assert np.hypot(*np.subtract(user.handle("B"), where)) > 20
+
+    @pytest.mark.slow
+    def test_a_slider_crank_by_keys_alone(user):
+        user.new_sheet()
+        user.keys("l", "ArrowLeft", "Shift+Enter", "ArrowRight", "ArrowUp", "ArrowUp", "ArrowUp", "Enter")
+        user.keys("Enter", "Shift+ArrowRight", "ArrowDown", "ArrowDown", "ArrowDown", "Enter", "v")
+        user.page.locator(".handle").last.focus()
+        user.keys("g", "Enter", "ArrowRight", "Enter")
+        user.page.locator('.handle[data-name="A"]').focus()
+        user.keys("d", "Enter", "v")
+        assert user.state("s.solved.value"), user.state("JSON.stringify(s.answer.value.findings)")
+        kinds = user.state("s.answer.value.scene.joints.map(one => one.type)")
+        assert sorted(kinds) == ["prismatic", "revolute", "revolute", "revolute"]
+        user.page.locator(".sheet > svg").focus()
+        user.keys(" ")
+        user.page.wait_for_timeout(400)
+        assert user.state("s.index.value") > 3
+        user.keys(" ")
+
+    @pytest.mark.slow
+    def test_what_is_wrong_is_told_where_it_stands(user):
+        field = user.page.locator("#value-joint_defaults-friction-coefficient-0")
+        field.fill("0.1 banana")
+        field.press("Tab")
+        user.idle()
+        assert "banana" in user.page.locator(".wrong").first.inner_text()
+        field.fill("0.2")
+        field.press("Tab")
+        user.idle()
+        assert "coefficient: 0.2" in user.state("s.text.value")
+        assert user.state("s.solved.value")
+
+    @pytest.mark.slow
+    def test_names_are_never_markup(user):
+        evil = "<img src=x onerror=alert(1)>"
+        text = examples()["durango-fourbar"].replace("coupler", f"'{evil}'").replace("name: ", f"name: '{evil}' # ")
+        user.page.click("role=tab[name=Text]")
+        user.page.locator("textarea").fill(text)
+        user.page.wait_for_timeout(700)
+        user.idle()
+        for tab in ("Properties", "Plots", "Findings"):
+            user.page.click(f"role=tab[name={tab}]")
+        assert user.state("s.solved.value")
+        assert user.page.locator("img").count() == 0
+
+    @pytest.mark.slow
+    def test_masses_of_links_do_not_freeze_the_page(user):
+        rows = "".join(f"  l{k}: {{points: {{A: [0, 0], B{k}: [{k}, 0]}}}}\n" for k in range(4000))
+        for links, told in ((rows, "400 at most"), (10 * rows, "300,000 at most")):
+            content = f"trunnion: 1\nlinks:\n  ground: {{}}\n{links}"
+            user.page.evaluate("content => import('/studio/actions.js').then(a => a.typed(content))", content)
+            user.page.wait_for_timeout(1000)
+            user.idle()
+            user.page.locator("[role=tab]", has_text="Findings").click()
+            assert told in user.page.locator("body").inner_text()
+
+    @pytest.mark.slow
+    def test_every_example_opens(user):
+        for name in sorted(examples()):
+            user.page.evaluate("name => import('/studio/actions.js').then(a => a.openExample({ name }))", name)
+            user.idle()
+            errors = user.state("s.answer.value.findings.filter(one => one.severity === 'error').map(one => one.code)")
+            allowed = {"mobility.redundant", "input.drivers", "input.tables"}
+            assert user.state("s.solved.value") or set(errors) <= allowed, (name, errors)
+            assert not user.wrong, (name, user.wrong)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("what", ["CSV", "PNG", "SVG", "GIF", "Report", "Python"])
+    def test_files_are_had(user, what):
+        user.page.click("summary:has-text('Export')")
+        with user.page.expect_download(timeout=60000) as told:
+            user.page.locator(".menu button", has_text=what).click()
+        assert Path(told.value.path()).stat().st_size > 500

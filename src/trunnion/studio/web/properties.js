@@ -126,11 +126,12 @@ function Dimension({ name, value, findings }) {
       await setValue(path, written(text), `slider ${name}`);
     }
     sending.current.busy = false;
+    setPulled(null);
   };
   const slides = start && start.value !== 0;
   return html`<div class="dimension">
     <${Row} row=${{ path, label: name, value: pulled?.text ?? String(value), example: null }} findings=${findings} />
     ${slides && html`<input type="range" aria-label=${`${name}, slider`} min=${Math.min(0, 2 * start.value)} max=${Math.max(0, 2 * start.value)}
-      step=${Math.abs(start.value) / 200} value=${numberOf(pulled?.text ?? value)?.value} onInput=${pull} onChange=${() => setPulled(null)} />`}
+      step=${Math.abs(start.value) / 200} value=${numberOf(pulled?.text ?? value)?.value} onInput=${pull} />`}
   </div>`; // prettier-ignore
 }

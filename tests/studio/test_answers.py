@@ -117,6 +117,15 @@ def test_every_example_opens(example):
     assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
 
 
+def test_a_margin_is_of_positions_that_there_are():
+    text = examples()[FOURBAR].replace("BC: 6.00 m", "BC: 3.00 m")
+    found = ask(ask="model", text=text)
+    status, margin = found["scene"]["status"], found["margin"]
+    assert any(code > 5 for code in status)
+    assert all(one is None for one, code in zip(margin, status, strict=True) if code > 5)
+    assert ask(ask="model", text=text, friction="off")["margin_least"] is None
+
+
 def pytest_generate_tests(metafunc):
     if "example" in metafunc.fixturenames:
         metafunc.parametrize("example", sorted(examples()))

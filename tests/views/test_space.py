@@ -19,10 +19,10 @@ from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
 from trunnion.views.space.bodies import space
 from trunnion.views.space.camera import best, looking
-from trunnion.views.space.figure import scenery
 from trunnion.views.space.paint import facets
 from trunnion.views.space.plots import turned_from_start
 from trunnion.views.space.scene import screw_axis
+from trunnion.views.space.scenery import scenery
 from trunnion.views.space.solids import SYMBOLS, solids
 
 BLANK = ("nowhere", "locked")  # no position can be drawn

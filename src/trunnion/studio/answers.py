@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import entries_of, text_of
 from trunnion.model.rewrite import changed_text
@@ -138,7 +138,7 @@ def _model(asked: Asked) -> dict[str, Any]:
     return head | {
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
-        **_margin(result, bool(rubbing(state.run.system))),
+        **_margin(result, friction and bool(rubbing(state.run.system))),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         "figures": [
             [one.label, one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"]
@@ -159,7 +159,7 @@ def _plain(numbers: Mapping[str, Any]) -> dict[str, float]:
 
 def _margin(result: Any, rubs: bool) -> dict[str, Any]:
     """The locking margin over the cycle, the least and where it is; none where nothing rubs."""
-    margin = result["locking_margin"].values
+    margin = np.where(result["status"].values <= Status.LOCKED, result["locking_margin"].values, np.nan)
     if not rubs or np.all(np.isnan(margin)):
         return {"margin": None, "margin_least": None}
     index = int(np.nanargmin(margin))

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import mimetypes
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from threading import Lock
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -25,7 +27,6 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from trunnion.files import whole
-from trunnion.studio.answers import answer
 
 __all__ = ["Studio"]
 
@@ -33,6 +34,7 @@ COOKIE = "trunnion_studio"
 MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
 MOST_FILES = 500
+ANSWERING = Lock()  # one after another: the second about a text finds what was read for the first
 PLACES = {"studio": ("trunnion.studio", "web"), "web": ("trunnion.views", "web")}
 
 
@@ -60,7 +62,20 @@ class Studio:
             Route("/{place:str}/{name:path}", self._guarded(self._asset)),
             WebSocketRoute("/socket", self._socket),
         ]
-        return Starlette(routes=routes)
+        return Starlette(routes=routes, lifespan=self._warmed)
+
+    @contextlib.asynccontextmanager
+    async def _warmed(self, app: Starlette) -> AsyncIterator[None]:
+        """While it runs. What answers is loaded beside, and looks at the opened model, while the browser opens."""
+        warming = asyncio.get_running_loop().run_in_executor(None, self._look)
+        yield
+        await warming
+
+    def _look(self) -> None:
+        text = ""
+        with contextlib.suppress(ValueError, OSError):
+            text = self._model(self.opened or "").read_text(encoding="utf-8")
+        _answered(json.dumps({"ask": "model", "text": text}))
 
     # ---- who may ask ----------------------------------------------------------------------------------------------
 
@@ -168,7 +183,15 @@ class Studio:
             while True:
                 question = await socket.receive_text()
                 async with turn:
-                    await socket.send_bytes(await run_in_threadpool(answer, question.encode()))
+                    await socket.send_bytes(await run_in_threadpool(_answered, question))
+
+
+def _answered(question: str) -> bytes:
+    """The answer to a question; what it takes is loaded with the first."""
+    from trunnion.studio.answers import answer
+
+    with ANSWERING:
+        return answer(question.encode())
 
 
 def _found(place: str, name: str) -> Traversable:

@@ -18,7 +18,8 @@ from trunnion.views.common.figures import MUTED, new
 from trunnion.views.common.labels import Labels
 from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.camera import best, looking
-from trunnion.views.space.figure import Scenery, name_joints, scenery, sketch
+from trunnion.views.space.figure import name_joints, sketch
+from trunnion.views.space.scenery import Scenery, scenery
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

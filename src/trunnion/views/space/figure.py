@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,61 +17,21 @@ from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.space.bodies import Space, space, without_noise
-from trunnion.views.space.camera import Camera, best, looking
 from trunnion.views.space.paint import JOINT, Strokes, paint
-from trunnion.views.space.solids import Solid, solids
+from trunnion.views.space.scenery import Scenery, scenery
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Scenery", "mechanism", "scenery", "sketch"]
+__all__ = ["mechanism", "sketch"]
 
 GREY = "#9aa3ad"  # of the ground
 REACTION = "#c01f2e"
 HEIGHTS = 3.2, 8.0  # in, of the drawing, which is 7.2 in wide
 LENGTH = 0.3  # of the longest reaction, share of the size of the picture
 FEW = 400  # pieces of a curve
-
-
-@dataclass(frozen=True)
-class Scenery:
-    """A mechanism with its solids and the camera; box: left, below, right, above (m) of all that may be seen."""
-
-    shown: Space
-    solids: list[Solid]
-    camera: Camera
-    box: tuple[float, float, float, float]
-
-    @property
-    def diagonal(self) -> float:
-        """Size of the picture, m."""
-        left, below, right, above = self.box
-        return float(np.hypot(right - left, above - below))
-
-
-def scenery(shown: Space, camera: Camera | None = None) -> Scenery:
-    """Look at a mechanism, from the best side if not told."""
-    camera = camera or looking(*best(shown))
-    found = solids(shown)
-    corners = []
-    picked = np.flatnonzero(shown.drawable)
-    picked = picked[:: max(1, picked.size // 60)]
-    for solid in found:
-        pose = shown.poses[solid.link]
-        points = solid.points if solid.kind != "box" else _corners(solid.points)
-        places = np.einsum("ijn,kj->nki", pose.matrix[:, :, picked], points) + pose.origin[:, picked].T[:, None]
-        seen = camera.seen(places.reshape(-1, 3))[:, :2]
-        corners += [seen.min(axis=0) - solid.radius, seen.max(axis=0) + solid.radius]
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    return Scenery(shown, found, camera, (float(low[0]), float(low[1]), float(high[0]), float(high[1])))
-
-
-def _corners(points: Array) -> Array:
-    middle, *halves = points
-    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], dtype=float)
-    return np.asarray(middle + signs @ np.array(halves), dtype=float)
 
 
 def mechanism(result: xr.Dataset, index: int | None = None) -> Figure:

@@ -13,7 +13,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.views.common.cycle import Array, column, names, series
 from trunnion.views.space.bodies import Space, gathered
 from trunnion.views.space.camera import best, looking
-from trunnion.views.space.figure import scenery
+from trunnion.views.space.scenery import scenery
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,0 +1,97 @@
+"""The studio in a real browser: start to first picture, drags solved and drawn a second, pictures a second while it
+is scrubbed. `python -m benchmarks.studio`; needs Chromium and the extra dev."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[1]
+SECONDS = 3.0
+DRAGGED = {"durango-fourbar": "C", "jansen": "K"}
+
+DRAG = """async ([name, seconds]) => {
+  const state = await import("/studio/state.js");
+  const handle = document.querySelector(`.handle[data-name="${name}"]`);
+  const box = handle.getBoundingClientRect();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  const sent = (kind, dx, target) => target.dispatchEvent(new PointerEvent(kind, {
+    bubbles: true, cancelable: true, pointerId: 1, pointerType: "mouse", isPrimary: true,
+    button: kind === "pointermove" ? -1 : 0, buttons: kind === "pointerup" ? 0 : 1,
+    clientX: x + dx, clientY: y - dx / 2 }));
+  const target = handle;
+  handle.setPointerCapture = () => {};
+  sent("pointerdown", 0, target);
+  let [drawn, last] = [0, state.live.value];
+  const begin = performance.now();
+  await new Promise((done) => {
+    const frame = (now) => {
+      if (state.live.value !== last) { last = state.live.value; drawn += 1; }
+      if (now - begin > seconds * 1000) return done();
+      sent("pointermove", 10 * Math.sin((now - begin) / 300), target);
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  });
+  sent("pointerup", 0, target);
+  return drawn / seconds;
+}"""
+
+SCRUB = """async (seconds) => {
+  const { crank } = await import("/studio/motion.js");
+  let [frames, index] = [0, 0];
+  const begin = performance.now();
+  await new Promise((done) => {
+    const frame = (now) => {
+      if (now - begin > seconds * 1000) return done();
+      crank.go((index += 3) % 360);
+      frames += 1;
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  });
+  return frames / seconds;
+}"""
+
+
+def main() -> None:
+    """Print the figures of both mechanisms."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        for name, joint in DRAGGED.items():
+            begin = time.perf_counter()
+            command = [sys.executable, "-m", "trunnion", "studio", f"examples/{name}.yaml", "--no-open", "--port", "0"]
+            with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+                try:
+                    assert process.stdout is not None
+                    address = process.stdout.readline().split()[-1]
+                    page = browser.new_page(viewport={"width": 1280, "height": 720})
+                    _measure(page, name, joint, address, begin)
+                    page.close()
+                finally:
+                    process.terminate()
+        browser.close()
+
+
+def _measure(page: Page, name: str, joint: str, address: str, begin: float) -> None:
+    page.goto(address)
+    page.wait_for_selector(f'.handle[data-name="{joint}"]')
+    cold = time.perf_counter() - begin
+    page.wait_for_timeout(1500)
+    rate = page.evaluate(DRAG, [joint, SECONDS])
+    page.wait_for_timeout(1000)
+    frames = page.evaluate(SCRUB, SECONDS)
+    page.click("role=tab[name=Plots]")
+    page.wait_for_timeout(500)
+    plots = page.evaluate(SCRUB, SECONDS)
+    print(f"{name}: first picture {cold:.2f} s, {rate:.0f} drags solved and drawn/s, ", end="")
+    print(f"scrubbing {frames:.0f} frames/s, with plots {plots:.0f}")
+
+
+if __name__ == "__main__":
+    main()

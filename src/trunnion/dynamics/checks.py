@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.opened import in_play
+from trunnion.dynamics.opened import in_play, of_several
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
@@ -77,10 +77,27 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         yield Finding("no mass moves with it, so it has no acceleration", f"drivers.{free[0]}", remedy)
     playing = in_play(mechanism)
     yield from _unlike(mechanism, playing)
+    yield from _of_several(mechanism)
     if len(free) < 2 and not playing:
         return
     why = f"with {', '.join(playing)} in play" if playing else f"with {len(free)} free drivers"
     yield from _sticking(mechanism, free, playing, why)
+
+
+def _of_several(mechanism: Mechanism) -> Iterator[Finding]:
+    """What acts in joints that chains of single turns and slides stand in for, which have no such place."""
+    playing, values = ", ".join(in_play(mechanism)), mechanism.parameters()
+    for name in of_several(mechanism):
+        joint, path = mechanism.effective_joints[name], f"joints.{name}"
+        what = f"in a {joint.type} joint of a loop with {playing} in play it is not modelled"
+        rubs = (f"{path}.friction.{key}" for key in joint.friction.parameters) if joint.friction else ()
+        if any(values[one] != 0 for one in rubs):
+            yield Finding(f"friction: {what}", f"{path}.friction", "state friction: 0 for this joint")
+        if joint.losses is not None:
+            yield Finding(what, f"{path}.losses", "remove it")
+        for spring, one in mechanism.springs.items():
+            if one.joint == name:
+                yield Finding(what, f"springs.{spring}", "state it between two points")
 
 
 def _unlike(mechanism: Mechanism, playing: list[str]) -> Iterator[Finding]:

@@ -18,7 +18,6 @@ from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.steady import steady_figures
-from trunnion.dynamics.touching import PinContact
 from trunnion.errors import Finding
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
@@ -115,7 +114,7 @@ def result_of(
 
 def _named_contacts(motion: FreeMotion, impacts: Sequence[Impact]) -> dict[str, list[str]]:
     """The contact of every impact, and the contacts that are pins in holes."""
-    pins = [one.label for one in motion.contacts.each if isinstance(one, PinContact)]
+    pins = [one.label for one in motion.contacts.each if one.bored]
     return {"impacts": [one.label for one in impacts], "contact_pins": pins}
 
 

@@ -89,12 +89,13 @@ def test_the_first_contact_of_a_rattling_pin() -> None:
     assert end - begin == pytest.approx(5.34372e-5, rel=1e-6)
     assert float(result["impact_approach"][0]) == pytest.approx(4.38578315, rel=1e-8)
     assert float(result["impact_depth"][0]) == pytest.approx(7.795222e-5, rel=1e-6)
-    (onset_time, lasts, onset), force = own_equations(3e-4)
+    (onset_time, lasts, onset), force, impulse = own_equations(3e-4)
     assert begin == pytest.approx(onset_time, rel=1e-9)
     assert end - begin == pytest.approx(lasts, rel=1e-6)
     assert float(result["impact_approach"][0]) == pytest.approx(onset, rel=1e-9)
     assert float(result["impact_force"][0]) == pytest.approx(force, rel=1e-7)
     assert float(result["impact_force"][0]) == pytest.approx(45872.2, rel=2e-6)
+    assert float(result["impact_impulse"][0]) == pytest.approx(impulse, rel=1e-8)
     turned_over = float(abs(result["work_drive"]).max())
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * turned_over
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
-from trunnion.algebra.space import Frame, moment_at
+from trunnion.algebra.space import moment_at
 from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run
 from trunnion.solve.space.motion import SpatialWalk
@@ -66,9 +66,7 @@ def hanging_chain(run: Run, walk: Forward, link: str) -> Chain:
     return _counted(walk, link, (ground, link), "PPPRRR", _turning(run, walk, ground, link), centre)
 
 
-def _counted(
-    walk: Forward, name: str, links: tuple[str, str], kinds: str, basis: Array, place: Sequence[Any]
-) -> Chain:
+def _counted(walk: Forward, name: str, links: tuple[str, str], kinds: str, basis: Array, place: Sequence[Any]) -> Chain:
     """A chain whose coordinates are 0 at the start, along and about the rows of `basis`, from a place, m."""
     order = [kinds[:k].count(kind) if kinds != "PPR" or kind == "P" else 2 for k, kind in enumerate(kinds)]
     at = np.array([_number(part) for part in place])
@@ -116,7 +114,9 @@ def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
     """Rows: three axes at right angles at the start, of which first and last keep apart over the cycle."""
     start = _relative(walk, first, second)[0]
     moving = _relative(run.walk(np.linspace(0.0, run.cycle.duration, LOOKS)), first, second)
-    turned = np.array([one @ start.T for one in moving if np.all(np.isfinite(one))])  # as the first link sees it
+    turned = np.array(
+        [one @ start.T for one in (start, *moving) if np.all(np.isfinite(one))]
+    )  # as the first link sees it
     home = np.array(_plain(walk.motions[first].frame)[:3]).T
     best, least = np.eye(3), np.inf
     for axis in _tried(turned):
@@ -146,7 +146,8 @@ def _relative(walk: Forward, first: str, second: str) -> Array:
                   for axis in walk.motions[link].frame[:3]])
         for link in (first, second)
     )  # fmt: skip
-    return np.einsum("art,brt->tab", one, other)  # axis of the first, of the second
+    found: Array = np.einsum("art,brt->tab", one, other)  # axis of the first, of the second
+    return found
 
 
 def _plain(numbers: Any) -> Any:

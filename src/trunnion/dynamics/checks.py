@@ -38,19 +38,34 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
         condition = np.linalg.cond(matrix / scale[:, None] / scale) if np.all(scale > 0) else np.inf
     if condition < SINGULAR:
         return
-    values, joints = motion.values, dict.fromkeys(one.joint for one in motion.contacts.each)
-    light = [
-        link
-        for one in motion.contacts.each
-        for link in (one.body, one.other)
-        if link != motion.system.mechanism.fixed_link
-        and not np.any(values[f"links.{link}.mass"]) and not np.any(values[f"links.{link}.inertia"])
-    ]  # fmt: skip
+    joints = dict.fromkeys(one.joint for one in motion.contacts.each)
+    light = [link for one in motion.contacts.each for link in (one.body, one.other) if not _weighs(motion, link)]
     light = [link for link in light if any(name.startswith(f"{link}_in_play_") for name in motion.names)] or light
+    if not light:  # what turns without inertia
+        weakest = motion.names[int(np.argmax(np.abs(np.linalg.eigh(matrix)[1][:, 0])))]
+        chain = weakest.partition("_in_play_")[0]
+        ends = [motion.system.joints[name][1] for name in motion.names if name.partition("_in_play_")[0] == chain]
+        light = [
+            link
+            for links in ends
+            for link in links
+            if "_in_play_" not in link and not _weighs(motion, link, whole=True)
+        ]
     names = ", ".join(dict.fromkeys(light)) or "some link"
-    what = f"{names} has no mass and is held by nothing while the pins of {', '.join(joints)} are in play"
+    what = (
+        f"{names} has no mass, or no inertia, where nothing holds it while the pins of {', '.join(joints)} are in play"
+    )
     remedy = "state its mass and inertia, or let fewer of its joints be in play"
     raise MechanismError(Finding(what, f"links.{light[0]}" if light else "links", remedy))
+
+
+def _weighs(motion: FreeMotion, link: str, whole: bool = False) -> bool:
+    """Whether a link has a mass or an inertia, or inertia about every axis; the ground needs none."""
+    path, values = f"links.{link}", motion.values
+    axes = [f"{path}.inertia.{axis}{axis}" for axis in "xyz"] if len(motion.system.axes) > 2 else [f"{path}.inertia"]
+    turning = [bool(np.any(values.get(axis, 0.0))) for axis in axes]
+    enough = all(turning) if whole else any(turning) or bool(np.any(values[f"{path}.mass"]))
+    return enough or link == motion.system.mechanism.fixed_link
 
 
 def _inert(mechanism: Mechanism) -> Iterator[bool]:

@@ -1,9 +1,11 @@
 """A mechanism whose joints in play are taken out: its links are held by contacts, and more coordinates are free.
 
-A pin in play takes no freedom away. Without its joint the linkage has two coordinates more, which are coordinates of
-joints that remain: in the loop of the joint, chosen so that the modules become as small as can be. A link that no joint
-holds any more has the place of its mass centre and its angle for coordinates, by joints to the ground that carry
-nothing. In space joints of several freedoms in the loop become chains of single ones (`dynamics.chains`). So motion in time needs nothing new for play: the offset of a pin in its hole follows from the coordinates.
+A pin in play takes no freedom away. Without its joint the linkage has more coordinates, two in the plane and five in
+space, or four where the pin slides. They are coordinates of joints that remain, in the loop of the joint, chosen so that
+the modules become as small as can be. A link that no joint holds any more has the place of its mass centre and its turn
+for coordinates, by joints to the ground that carry nothing. In space a driver cannot move all freedoms of a ball or a
+cylinder: such joints in the loop become chains of single turns and slides (`dynamics.chains`). So motion in time needs
+nothing new for play: the offset of a pin in its hole follows from the coordinates.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.nested import flat
 from trunnion.dynamics.chains import Chain, chain_of_joint, hanging_chain
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row
@@ -69,6 +72,9 @@ def opened(run: Run) -> Opened:
     velocities of the linkage without play."""
     mechanism, cut = run.system.mechanism, in_play(run.system.mechanism)
     walk, spatial = _start(run), mechanism.space == "spatial"
+    if not all(np.isfinite(number) for motion in walk.motions.values() for number in flat(motion.frame)):
+        what = "the mechanism without play has no position at its start, from which the motion is to begin"
+        raise MechanismError(Finding(what, "drivers", "begin at another coordinate: initial: {coordinate: …}"))
     data = {key: part for key, part in mechanism.data().items() if key in KEPT}
     several = of_several(mechanism)
     _leave_out(data, mechanism, [*cut, *several])
@@ -135,7 +141,7 @@ def _coordinate(walk: Forward, joint: str) -> tuple[float, float]:
 
 def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
-    part = {link: {link} for link in mechanism.links}
+    part = {link: {link} for link in data["links"]}
     for joint in data["joints"].values():
         one, other = (part[link] for link in joint["links"])
         if one is not other:

@@ -26,9 +26,9 @@ from trunnion.dynamics.shown import Touches, as_stated
 from trunnion.dynamics.shown_space import JointsInSpace
 from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
-from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.touching import Onset
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism

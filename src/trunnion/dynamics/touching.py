@@ -73,8 +73,8 @@ class Contact(ABC):
     """One place where two bodies of a joint in play may touch.
 
     joint: of the file; label: its own name; body: the link of the pin or slider; other: the link of the hole or guide;
-    stiffness: N/mⁿ; factor: χ of its law; law, parameters: of friction, None without; clearance: m. bored: whether it is
-    a pin in a round hole.
+    stiffness: N/mⁿ; factor: χ of its law; law, parameters: of friction, None without; clearance: m. bored: whether it
+    is a pin in a round hole.
     """
 
     bored: ClassVar[bool] = False

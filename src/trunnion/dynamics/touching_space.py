@@ -2,8 +2,8 @@
 
 The pin's axis may shift and tilt in its hole, whose ends lie half its length before and behind its middle. At each end
 the pin touches the wall where the centre of the hole's end is farther from the pin's axis than the clearance,
-|c| > ρ = R − r. The force acts there at right angles to the pin's axis, and at the wall there is friction along the slip
-of the surfaces, around the axis and along it. Two such forces carry a force across and a moment, their couple. The pin
+|c| > ρ = R − r. The force acts there at right angles to the pin's axis, and at the wall there is friction along the
+slip of the surfaces, around the axis and along it. Two such forces carry a force across and a moment, their couple. The pin
 of a revolute joint also has shoulders: one of them touches where the pin has come along the hole's axis by half the end
 float. A shoulder pushes along that axis, without friction: nothing states on which radius it would act.
 """
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import NoReturn, cast
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.namespace import namespace
 from trunnion.algebra.nested import each
-from trunnion.algebra.space import NULL, Frame, moment_at, rotated
+from trunnion.algebra.space import ORIGIN, Frame, moment_at
 from trunnion.algebra.vector import Vector3, cross, dot, length, minus, plus, scaled
 from trunnion.dynamics.touching import CENTRED, Contact, ContactState
 from trunnion.solve.forward import Forward
@@ -29,8 +29,8 @@ class SpatialContact(Contact):
     """A contact of a pin in a hole in space. axle: the pin's frame on its link, z its axis; hole: of the hole, at the
     middle or an end, on its own link."""
 
-    axle: Frame = Frame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), NULL)
-    hole: Frame = Frame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), NULL)
+    axle: Frame = ORIGIN
+    hole: Frame = ORIGIN
 
     def accelerations(self, walk: Forward) -> NoReturn:
         """Impacts of rigid bodies are of planar joints: the model's checks refuse others."""

@@ -25,7 +25,9 @@ def contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) -
     """Whether a joint can be in play, and whether its contact states what its law needs."""
     where, pair = f"joints.{name}.contact", PAIRS[joint.type]
     spatial = mechanism.space == "spatial"
-    kinds = [kind for kind, one in PAIRS.items() if (one.bored if spatial else one.planar and (one.pivot or one.guided))]
+    kinds = [
+        kind for kind, one in PAIRS.items() if (one.bored if spatial else one.planar and (one.pivot or one.guided))
+    ]
     if joint.type not in kinds:
         what = f"the contact of a {joint.type} joint of a {mechanism.space} mechanism is not modelled"
         yield Finding(what, where, f"remove it; joints of the types {' and '.join(kinds)} can be in play there")

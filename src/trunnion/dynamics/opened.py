@@ -1,11 +1,11 @@
 """A mechanism whose joints in play are taken out: its links are held by contacts, and more coordinates are free.
 
 A pin in play takes no freedom away. Without its joint the linkage has more coordinates, two in the plane and five in
-space, or four where the pin slides. They are coordinates of joints that remain, in the loop of the joint, chosen so that
-the modules become as small as can be. A link that no joint holds any more has the place of its mass centre and its turn
-for coordinates, by joints to the ground that carry nothing. In space a driver cannot move all freedoms of a ball or a
-cylinder: such joints in the loop become chains of single turns and slides (`dynamics.chains`). So motion in time needs
-nothing new for play: the offset of a pin in its hole follows from the coordinates.
+space, or four where the pin slides. They are coordinates of joints that remain, in the loop of the joint, chosen so
+that the modules become as small as can be. A link that no joint holds any more has the place of its mass centre and
+its turn for coordinates, by joints to the ground that carry nothing. In space a driver cannot move all freedoms of a
+ball or a cylinder: such joints in the loop become chains of single turns and slides (`dynamics.chains`). So motion in
+time needs nothing new for play: the offset of a pin in its hole follows from the coordinates.
 """
 
 from __future__ import annotations

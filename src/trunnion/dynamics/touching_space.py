@@ -3,9 +3,9 @@
 The pin's axis may shift and tilt in its hole, whose ends lie half its length before and behind its middle. At each end
 the pin touches the wall where the centre of the hole's end is farther from the pin's axis than the clearance,
 |c| > ρ = R − r. The force acts there at right angles to the pin's axis, and at the wall there is friction along the
-slip of the surfaces, around the axis and along it. Two such forces carry a force across and a moment, their couple. The pin
-of a revolute joint also has shoulders: one of them touches where the pin has come along the hole's axis by half the end
-float. A shoulder pushes along that axis, without friction: nothing states on which radius it would act.
+slip of the surfaces, around the axis and along it. Two such forces carry a force across and a moment, their couple. The
+pin of a revolute joint also has shoulders: one of them touches where the pin has come along the hole's axis by half the
+end float. A shoulder pushes along that axis, without friction: nothing states on which radius it would act.
 """
 
 from __future__ import annotations

@@ -262,6 +262,15 @@ def test_soft_surfaces_are_told() -> None:
     assert "simulate.soft" not in codes
 
 
+def test_slow_onsets_are_told_where_they_lose_something() -> None:
+    """At 0.05 rad/s every contact begins slower than the law is followed; the first at 0.42 mm/s."""
+    slow = trunnion.simulate(rattling(drivers={"O": {"speed": 0.05}}), duration=12.0, steps=2)
+    (told,) = [one for one in slow.trunnion.findings if one.code == "simulate.slow_onsets"]
+    assert told.figures["count"] == told.figures["of"] == slow.sizes["impact"] > 2
+    assert told.figures["share"] == pytest.approx(1.0)
+    assert float(slow["impact_approach"].max()) == pytest.approx(4.38578315 * 0.05 / SPEED, rel=1e-6)
+
+
 def test_a_drive_that_hardly_moves() -> None:
     """The mass matrix keeps its digits where weights are all that is large."""
     slow = rattling({}, gravity=[0, -9.81]).data()

@@ -190,6 +190,7 @@ def test_a_rod_without_inertia_about_its_line() -> None:
     assert [finding.where for finding in raised.value.findings] == ["links.rod"]
 
 
+@pytest.mark.slow
 def test_other_loops_stay_determined() -> None:
     """Four parallel pins in space, none of which in play, are refused beside a pin that is."""
     data = rattling_in_space().data()
@@ -203,4 +204,4 @@ def test_other_loops_stay_determined() -> None:
     data["assembly"] = {"Q": [0.17, 0, 0], "D": "60 deg"}
     with pytest.raises(MechanismError) as raised:
         trunnion.simulate(Mechanism(**data), 1e-3)
-    assert {one.code for one in raised.value.findings} <= {"mobility.redundant", "mobility.undetermined"}
+    assert [one.what.partition(" constrain")[0] for one in raised.value.findings] == ["O, B, C, D"]

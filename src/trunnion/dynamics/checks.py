@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,9 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import Run
 
-__all__ = ["refuse", "refuse_massless"]
+__all__ = ["refuse", "refuse_massless", "refuse_undetermined"]
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,19 @@ def refuse(mechanism: Mechanism) -> None:
     """MechanismError with what keeps a mechanism from being let move."""
     if findings := list(_findings(mechanism)):
         raise MechanismError(findings)
+
+
+def refuse_undetermined(run: Run, playing: Sequence[str] = ()) -> None:
+    """MechanismError where the joints of a mechanism in space do not determine its motion or its reactions. playing:
+    joints in play, without which it is."""
+    found = run.determinacy
+    redundant = [joint for part in found.parts if part.redundant for joint in part.joints] if found else []
+    if redundant and playing:
+        of = f"{', '.join(redundant)} constrain each other more than once also while {', '.join(playing)} is in play"
+        what = f"{of}: statics does not determine their reactions"
+        raise MechanismError(Finding(what, "joints", "use a joint with more freedoms there (cylindrical, spherical)"))
+    if found is not None:
+        found.refuse()
 
 
 SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none

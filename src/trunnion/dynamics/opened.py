@@ -72,7 +72,7 @@ def opened(run: Run) -> Opened:
     velocities of the linkage without play."""
     mechanism, cut = run.system.mechanism, in_play(run.system.mechanism)
     walk, spatial = _start(run), mechanism.space == "spatial"
-    if not all(np.isfinite(number) for motion in walk.motions.values() for number in flat(motion.frame)):
+    if not all(np.all(np.isfinite(number)) for motion in walk.motions.values() for number in flat(motion[:2])):
         what = "the mechanism without play has no position at its start, from which the motion is to begin"
         raise MechanismError(Finding(what, "drivers", "begin at another coordinate: initial: {coordinate: …}"))
     data = {key: part for key, part in mechanism.data().items() if key in KEPT}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
-from trunnion.dynamics.checks import refuse, refuse_massless
+from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
@@ -88,7 +88,7 @@ def simulated(
     run = prepare(mechanism)
     playing = in_play(mechanism)
     if not playing:
-        _refuse_undetermined(run)
+        refuse_undetermined(run)
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance)
     _check_step(impact_step, duration, mechanism)
@@ -112,7 +112,7 @@ def _with_play(
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
     rigid, loose = is_rigid(run.system.mechanism), prepare(bare.mechanism)
-    _refuse_undetermined(loose)
+    refuse_undetermined(loose, in_play(run.system.mechanism))
     motion = (ClosedMotion if rigid else FreeMotion).of(loose, contacts)
     row = initial_row(motion)
     refuse_massless(motion, row)
@@ -130,12 +130,6 @@ def _with_play(
     time = np.linspace(0.0, duration, steps + 1)
     books = Filling(motion, solution, time, bare).books()
     return result_of(motion, solution, books, run, integration.finished())
-
-
-def _refuse_undetermined(run: Run) -> None:
-    """MechanismError where the joints of a mechanism in space do not determine its motion or its reactions."""
-    if run.determinacy is not None:
-        run.determinacy.refuse()
 
 
 def _run(integration: Integration, row: Array) -> Solution:

@@ -65,6 +65,66 @@ def tilting(contact: dict[str, Any] | None = None, clearance: float = 1e-4, **mo
     return Mechanism(**{**data, **more})
 
 
+SOFT = {"restitution": 0.5, "stiffness": 1e8}
+LOOSE = {"radius": 0.01, "clearance": 1e-4, "length": 0.04, "end_float": 2e-4}
+
+
+def cardan() -> Mechanism:
+    """A shaft at 100 rad/s drives another, 30° askew to it, by a cross; the bearing of that has play."""
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    along, across = [c, s, 0], [-s, c, 0]
+    heavy = {"mass": 0.5, "inertia": {"xx": 1e-4, "yy": 4e-4, "zz": 4e-4}, "centre": [0.1, 0, 0]}
+    bearing = {"axis": [1, 0, 0], "x": [0, 1, 0]}
+    cross = {"at": [0, 0, 0], "axis": [0, 1, 0], "x": [0, 0, 1]}
+    other = {"at": [0, 0, 0], "axis": [0, 0, 1], "x": [1, 0, 0]}
+    pin = {key: one for key, one in LOOSE.items() if key != "end_float"}
+    return Mechanism(
+        space="spatial",
+        gravity=[0, 0, -9.81],
+        links={
+            "ground": {"points": {"A": {"at": [0, 0, 0], **bearing},
+                                  "C": {"at": [0.2 * part for part in along], "axis": along, "x": across}}},
+            "first": {"points": {"A": {"at": [0, 0, 0], **bearing}, "B": cross}},
+            "second": {"points": {"B": other, "C": {"at": [0.2, 0, 0], **bearing}},
+                       **heavy},
+        },
+        joints={
+            "A": {"type": "revolute", "links": ["ground", "first"]},
+            "B": {"type": "universal", "links": ["first", "second"]},
+            "C": {"type": "cylindrical", "links": ["second", "ground"], "pin": pin,
+                  "contact": SOFT},
+        },
+        drivers={"A": {"speed": 100}},
+    )  # fmt: skip
+
+
+def on_a_plate() -> Mechanism:
+    """A four-bar whose coupler slides on a plate, with both its pins in play."""
+
+    def on(x: float) -> dict[str, Any]:
+        return {"at": [x, 0, 0], **UPRIGHT}
+
+    heavy = {"mass": 0.3, "inertia": {"xx": 1e-4, "yy": 2e-4, "zz": 3e-4}}
+    return Mechanism(
+        space="spatial",
+        links={
+            "ground": {"points": {"A": on(0), "D": on(0.1), "E": on(0.02)}},
+            "crank": {"points": {"A": on(0), "B": on(0.03)}},
+            "coupler": {"points": {"B": on(0), "C": on(0.09), "E": on(0.04)}, "centre": [0.05, 0.01, 0.002], **heavy},
+            "rocker": {"points": {"D": on(0), "C": on(0.07)}, "centre": [0.03, 0, 0], **heavy},
+        },
+        joints={
+            "A": {"type": "revolute", "links": ["ground", "crank"]},
+            "B": {"type": "revolute", "links": ["crank", "coupler"], "pin": LOOSE, "contact": SOFT},
+            "C": {"type": "revolute", "links": ["rocker", "coupler"], "pin": LOOSE, "contact": SOFT},
+            "D": {"type": "revolute", "links": ["ground", "rocker"]},
+            "E": {"type": "planar", "links": ["ground", "coupler"]},
+        },
+        drivers={"A": {"speed": 20, "start": "60 deg"}},
+        assembly={"D": "100 deg"},
+    )
+
+
 # ---- a shaft in its hole, and nothing else ------------------------------------------------------------------------
 
 MASS, CENTRE, TENSOR = 0.8, np.array([1e-3, 0.012, 0.0]), np.array([[4e-4, 2e-5, 0], [2e-5, 1e-4, 0], [0, 0, 3.5e-4]])

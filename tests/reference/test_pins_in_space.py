@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import trunnion
 from playing import rattling
-from playing_space import CENTRE, FLOAT, MASS, WIDTH, dropped, own_shaft, rattling_in_space, tilting
+from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
 from trunnion.algebra.nested import flat
 from trunnion.dynamics.chains import chain_of_joint
 from trunnion.dynamics.compiled_rates import compiled_rates
@@ -114,15 +114,52 @@ def test_every_module_is_a_driver_and_compiled() -> None:
         assert np.allclose(seen, wanted, rtol=1e-9, atol=1e-15)
 
 
-def test_it_begins_with_pins_in_the_middle_and_velocities_without_play() -> None:
-    motion, row = _opened(tilting())
-    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * 4)
+@pytest.mark.parametrize(
+    "mechanism", [tilting(), cardan(), on_a_plate(), dropped()], ids=["ball", "cross", "plate", "free"]
+)
+def test_it_begins_with_pins_in_the_middle_and_velocities_without_play(mechanism: Mechanism) -> None:
+    """Whatever joints the chains stand in for."""
+    motion, row = _opened(mechanism)
+    each = motion.contacts.each
+    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(each))
     seen = Walks(motion).look(at)
-    assert np.allclose(seen.gap[:, 0], [1e-4, 1e-4, 0.5e-4, 0.5e-4], rtol=1e-9)
-    walk, whole = motion.walk(at, np.zeros_like(at.q)), prepare(tilting()).walk(np.zeros(1))
-    for link in ("rod", "slider"):
-        for part, wanted in zip(flat(walk.motions[link].twist), flat(whole.motions[link].twist), strict=True):
-            assert np.allclose(part, wanted, atol=1e-11)
+    assert np.allclose(seen.gap[:, 0], [one.clearance for one in each], rtol=1e-9)
+    assert np.allclose(seen.rate[:, 0], 0.0, atol=1e-10)
+    walk, whole = motion.walk(at, np.zeros_like(at.q)), prepare(mechanism).walk(np.zeros(1))
+    for link in mechanism.links:
+        for part, wanted in zip(flat(walk.motions[link][:2]), flat(whole.motions[link][:2]), strict=True):
+            assert np.allclose(part, wanted, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_cross_beside_a_bearing_with_play() -> None:
+    """tan θ₂ = tan θ₁/cos β of a Cardan joint (β = 30°, θ from where the driving fork lies across both shafts), but for
+    how far the play lets the shaft lean."""
+    result = trunnion.simulate(cardan(), 0.02, 100)
+    first = result["joint_rotation"].sel(joint="A").values
+    second = -result["joint_rotation"].sel(joint="C").values  # of the hole against the pin
+    wanted = np.unwrap(np.arctan2(np.sin(first) / np.cos(np.pi / 6), np.cos(first)))
+    assert np.allclose(second - second[0], wanted, atol=2e-3)
+    assert float(np.max(np.abs(second - second[0] - first))) > 0.05
+    assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
+
+
+@pytest.mark.slow
+def test_a_coupler_that_slides_on_a_plate() -> None:
+    """It stays on the plate, which carries what tilts it; the account of the energy holds."""
+    result = trunnion.simulate(on_a_plate(), 0.01, 50)
+    assert np.allclose(result["point_position"].sel(point="coupler.C", axis="z"), 0.0, atol=1e-15)
+    assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
+    force = sum(
+        sign * result["reaction_force"].sel(joint=joint).values for joint, sign in (("B", 1), ("C", 1), ("E", 1))
+    )
+    turn, change, w = (result[name].sel(link="coupler").values for name in
+                       ("link_rotation", "link_angular_acceleration", "link_angular_velocity"))  # fmt: skip
+    angle = 2 * np.arctan2(turn[3], turn[0])
+    arm = np.array([0.05 * np.cos(angle) - 0.01 * np.sin(angle), 0.05 * np.sin(angle) + 0.01 * np.cos(angle)])
+    centre = result["point_acceleration"].sel(point="coupler.B").values[:2] - w[2] ** 2 * arm
+    centre = centre + change[2] * np.array([-arm[1], arm[0]])
+    assert np.allclose(force[:2], 0.3 * centre, atol=1e-7 * float(np.max(np.abs(force))))
 
 
 def test_the_turns_of_a_ball_keep_clear_of_where_they_cannot_turn() -> None:

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import trunnion
 from playing import rattling
 from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
 from trunnion.algebra.nested import flat
-from trunnion.dynamics.chains import chain_of_joint
+from trunnion.dynamics import chains
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Layout, Walks
@@ -165,9 +166,18 @@ def test_a_coupler_that_slides_on_a_plate() -> None:
 def test_the_turns_of_a_ball_keep_clear_of_where_they_cannot_turn() -> None:
     """The crank turns round under its ball: the first axis is its own, so that the third stays at right angles."""
     run = prepare(tilting())
-    chain = chain_of_joint(run, run.walk(np.zeros(1)), "P")
+    chain = chains.chain_of_joint(run, run.walk(np.zeros(1)), "P")
     axis = np.abs(chain.points[0]["P_in_play_1"]["axis"])
     assert axis[2] > 0.99
+
+
+def test_a_link_that_turns_every_way_has_no_three_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = prepare(tilting())
+    every = np.concatenate([[np.eye(3)], Rotation.random(4000, rng=1).as_matrix()])
+    monkeypatch.setattr(chains, "_relative", lambda *_: every)
+    with pytest.raises(MechanismError) as raised:
+        chains.chain_of_joint(run, run.walk(np.zeros(1)), "P")
+    assert [finding.where for finding in raised.value.findings] == ["links.rod"]
 
 
 # ---- bad input ------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import moment_at
+from trunnion.errors import Finding, MechanismError
 from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run
 from trunnion.solve.space.motion import SpatialWalk
@@ -26,6 +27,7 @@ __all__ = ["Chain", "chain_of_joint", "hanging_chain"]
 Array = NDArray[np.float64]
 
 LOOKS = 73  # poses of the cycle at which axes of three turns are tried
+MEETING = 0.99  # cosine of the angle of first and third axis: nearer they are as good as one
 ANGLES = 24  # of the third axis about the first, and directions of the first beside those of the motion
 
 
@@ -128,6 +130,11 @@ def _turning(run: Run, walk: Forward, first: str, second: str) -> Array:
             near = float(np.max(np.abs(axis @ turned @ last)))
             if near < least - 1e-9:
                 best, least = np.array([axis, np.cross(last, axis), last]), near
+    if least > MEETING:
+        what = f"{second} turns so far against {first} that no three axes of its turns keep apart over the cycle"
+        raise MechanismError(
+            Finding(what, f"links.{second}", "let fewer joints of this link be in play, or it turn less")
+        )
     found: Array = best @ home.T
     return found
 

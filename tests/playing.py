@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 
 from trunnion.joints.contact import hertz_stiffness
 from trunnion.model.mechanism import Mechanism
@@ -65,7 +65,7 @@ def loose_slider(stiffness: str = "5 MN/m", **contact: Any) -> Mechanism:
     return rattling({}, joints=joints, links=links, gravity=[0, -9.81], drivers={"O": {"speed": 30}})
 
 
-def own_equations(duration: float) -> tuple[Any, float]:
+def own_equations(duration: float) -> tuple[Any, float, float]:
     """Rod angle and slider of `rattling` with the contact of Lankarani and Nikravesh, written here by Lagrange's
     equations of the two free coordinates; the first contact alone."""
     r, length, mass, inertia, slider = 0.05, 0.12, 0.21, 2.5e-4, 0.14
@@ -111,4 +111,4 @@ def own_equations(duration: float) -> tuple[Any, float]:
         c, u = offset(time, y)
         size = float(np.hypot(*c))
         forces.append(stiffness * max(size - clearance, 0) ** 1.5 * (1 + factor * float(c @ u) / size / onset))
-    return (t0, times[-1] - t0, onset), max(forces)
+    return (t0, times[-1] - t0, onset), max(forces), float(simpson(forces, x=times))

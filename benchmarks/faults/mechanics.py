@@ -410,6 +410,20 @@ _CONTACT = (
         ("tests/reference/test_contacts.py", "-k", "reaction"),
     ),
     Fault(
+        "whole-stiffness-at-each-end-of-a-pin",
+        "dynamics/stated_contacts.py",
+        'half = 0.5 * common["stiffness"]',
+        'half = common["stiffness"]',
+        ("tests/reference/test_pins_in_space.py", "-k", "long_pin"),
+    ),
+    Fault(
+        "slip-of-a-pin-in-space-at-its-axis",
+        "dynamics/touching_space.py",
+        "place = plus(end.place, scaled(self.wall, normal))",
+        "place = end.place",
+        ("tests/reference/test_pins_in_space.py", "-k", "let_go and 0.007"),
+    ),
+    Fault(
         "mass-matrix-of-the-other-sign",
         "dynamics/compiled_rates.py",
         "share = matrix[i][k] / matrix[k][k]",

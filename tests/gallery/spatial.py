@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
+import trunnion
 from gallery.entry import STEPS, Entry, Outcome
 
 Row = tuple[str, float, float, float]  # pair R or C, twist in degrees, distance, constant slide
@@ -153,6 +155,44 @@ def bennett_tangents(one: Outcome) -> float:
     return float(np.prod([np.tan(at(one, "joint_rotation", name, 60) / 2) for name in "AB"]))
 
 
+# ---- tilting-gudgeon-pin: when its first end strikes ----------------------------------------------------------------
+
+
+def strikes(one: Outcome) -> float:
+    """s."""
+    return float(trunnion.simulate(one.mechanism, 3e-4, 1)["impact_begin"][0])
+
+
+def strikes_by_hand() -> float:
+    """The rod turns about the ball that the crank moves, by Euler's equations, and the piston goes on as it went, until
+    the pin is at the wall of one end of its hole."""
+    r, length, w, begin, mass = 0.05, 0.12, 100 * np.pi, np.pi / 3, 0.21
+    centre, own = np.array([length / 2, 0, 3e-3]), np.diag([2e-5, 2.5e-4, 2.5e-4])
+    tensor = own + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    angle = -np.arcsin(r * np.sin(begin) / length)
+    turn = -r * w * np.cos(begin) / (length * np.cos(angle))
+    place = r * np.cos(begin) + length * np.cos(angle)
+    speed = -r * w * np.sin(begin) - length * turn * np.sin(angle)
+
+    def crank(t: float) -> Any:
+        return r * np.array([np.cos(begin + w * t), np.sin(begin + w * t), 0.0])
+
+    def gap(t: float, y: Any) -> float:
+        rod = np.reshape(y[:9], (3, 3))
+        ends = np.array([[place + speed * t, 0.0, side] for side in (-0.015, 0.015)])
+        return float(1e-4 - np.max(np.linalg.norm(np.cross(crank(t) + length * rod[:, 0] - ends, rod[:, 2]), axis=1)))
+
+    def rate(t: float, y: Any) -> Any:
+        rod, spin = np.reshape(y[:9], (3, 3)), y[9:]
+        moment = mass * np.cross(centre, rod.T @ (w * w * crank(t))) - np.cross(spin, tensor @ spin)
+        return np.concatenate([np.cross(rod, spin).ravel(), np.linalg.solve(tensor, moment)])
+
+    gap.terminal = True  # type: ignore[attr-defined]
+    start = [*Rotation.from_euler("z", angle).as_matrix().ravel(), 0.0, 0.0, turn]
+    found = solve_ivp(rate, (0, 1e-2), start, events=gap, rtol=1e-12, atol=1e-14, max_step=1e-4)
+    return float(found.t_events[0][0])
+
+
 ENTRIES = {
     "universal-joint": Entry(
         says="Greatest speed of the output over that of the input",
@@ -244,6 +284,14 @@ ENTRIES = {
         expected=lambda: rocker_on_the_sphere(np.pi / 2),
         source="spherical trigonometry",
         tolerance=1e-12,
+    ),
+    "tilting-gudgeon-pin": Entry(
+        says="When the first end of the gudgeon pin strikes the wall of its hole",
+        unit="s",
+        found=strikes,
+        expected=strikes_by_hand,
+        source="Euler's equations of the rod about the ball on the crank, integrated on their own (SciPy)",
+        tolerance=1e-8,
     ),
     "bennett": Entry(
         says="tan(θ/2) of the crank times that of the coupler, the same at every position",

@@ -18,7 +18,7 @@ from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.touching import contacts_of
+from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.errors import MechanismError
 from trunnion.joints.contact import CONTACT_LAWS, hertz_stiffness, loss_factor, restitution_of
 from trunnion.model.mechanism import Mechanism
@@ -89,12 +89,13 @@ def test_the_first_contact_of_a_rattling_pin() -> None:
     assert end - begin == pytest.approx(5.34372e-5, rel=1e-6)
     assert float(result["impact_approach"][0]) == pytest.approx(4.38578315, rel=1e-8)
     assert float(result["impact_depth"][0]) == pytest.approx(7.795222e-5, rel=1e-6)
-    (onset_time, lasts, onset), force = own_equations(3e-4)
+    (onset_time, lasts, onset), force, impulse = own_equations(3e-4)
     assert begin == pytest.approx(onset_time, rel=1e-9)
     assert end - begin == pytest.approx(lasts, rel=1e-6)
     assert float(result["impact_approach"][0]) == pytest.approx(onset, rel=1e-9)
     assert float(result["impact_force"][0]) == pytest.approx(force, rel=1e-7)
     assert float(result["impact_force"][0]) == pytest.approx(45872.2, rel=2e-6)
+    assert float(result["impact_impulse"][0]) == pytest.approx(impulse, rel=1e-8)
     turned_over = float(abs(result["work_drive"]).max())
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * turned_over
 
@@ -259,6 +260,15 @@ def test_soft_surfaces_are_told() -> None:
     assert "simulate.soft" in codes
     codes = {one.code for one in trunnion.simulate(rattling(), duration=3e-4, steps=3).trunnion.findings}
     assert "simulate.soft" not in codes
+
+
+def test_slow_onsets_are_told_where_they_lose_something() -> None:
+    """At 0.05 rad/s every contact begins slower than the law is followed; the first at 0.42 mm/s."""
+    slow = trunnion.simulate(rattling(drivers={"O": {"speed": 0.05}}), duration=12.0, steps=2)
+    (told,) = [one for one in slow.trunnion.findings if one.code == "simulate.slow_onsets"]
+    assert told.figures["count"] == told.figures["of"] == slow.sizes["impact"] > 2
+    assert told.figures["share"] == pytest.approx(1.0)
+    assert float(slow["impact_approach"].max()) == pytest.approx(4.38578315 * 0.05 / SPEED, rel=1e-6)
 
 
 def test_a_drive_that_hardly_moves() -> None:

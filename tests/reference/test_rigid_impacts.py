@@ -16,7 +16,7 @@ from trunnion.dynamics.closed import ClosedMotion, rates_of
 from trunnion.dynamics.opened import opened
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row
-from trunnion.dynamics.touching import contacts_of
+from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of

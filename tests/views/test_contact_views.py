@@ -11,6 +11,7 @@ import xarray as xr
 
 import trunnion
 from playing import loose_slider, rattling
+from playing_space import rattling_in_space
 from trunnion.errors import MechanismError
 from trunnion.results.tables import columns
 from trunnion.views.motion.figure import figure
@@ -29,6 +30,18 @@ def test_the_path_of_the_pin_lies_in_its_hole() -> None:
     assert np.hypot(*wall.get_data()) == pytest.approx(np.full(361, 500.0))  # µm
     assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.3)
     assert "45.8" in axes.get_title()
+
+
+def test_each_end_of_a_pin_in_space_has_its_hole() -> None:
+    result = trunnion.simulate(rattling_in_space(), duration=3e-4, steps=100)
+    panels = figure(result, "orbit").axes
+    assert [axes.get_title().partition(":")[0] for axes in panels] == ["Q.end_1", "Q.end_2"]
+    for axes in panels:
+        path = next(line for line in axes.lines if len(line.get_xdata()) == 101)
+        assert np.nanmax(np.hypot(*path.get_data())) == pytest.approx(500 + 77.9, abs=0.5)
+    named = [name for name, *_ in columns(result) if "offset" in name]
+    assert named[:3] == [f"Q.end_1.contact_offset.{axis}" for axis in "xyz"]
+    assert len(named) == 3 * 4
 
 
 def test_gaps_and_forces_over_time() -> None:

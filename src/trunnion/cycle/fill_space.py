@@ -15,7 +15,7 @@ from trunnion.solve.space.contacts import bearing_middle
 from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import System, Values
 
-__all__ = ["absent", "fill_forces", "fill_motion", "labels", "unwrap"]
+__all__ = ["absent", "fill_forces", "fill_joint", "fill_motion", "labels", "unwrap"]
 
 Arrays = dict[str, NDArray[np.float64]]
 
@@ -50,10 +50,10 @@ def fill_motion(arrays: fill.Into, back: Backward, window: slice) -> None:
             fill.put(arrays[name], i, numbers, window)
     fill.fill_points(arrays, walk, window)
     for i, joint in enumerate(walk.system.joints):
-        _fill_joint(arrays, walk, i, joint, window)
+        fill_joint(arrays, walk, i, joint, window)
 
 
-def _fill_joint(arrays: fill.Into, walk: SpatialWalk, i: int, joint: str, window: slice) -> None:
+def fill_joint(arrays: fill.Into, walk: SpatialWalk, i: int, joint: str, window: slice) -> None:
     """Rotation and slide of one joint with their derivatives; of balls and crosses the angle between their elements."""
     pair = walk.pair(joint)
     if pair.one_axis or pair.angle:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.opened import in_play
+from trunnion.dynamics.opened import in_play, of_several
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import Run
 
-__all__ = ["refuse", "refuse_massless"]
+__all__ = ["refuse", "refuse_massless", "refuse_undetermined"]
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,19 @@ def refuse(mechanism: Mechanism) -> None:
     """MechanismError with what keeps a mechanism from being let move."""
     if findings := list(_findings(mechanism)):
         raise MechanismError(findings)
+
+
+def refuse_undetermined(run: Run, playing: Sequence[str] = ()) -> None:
+    """MechanismError where the joints of a mechanism in space do not determine its motion or its reactions. playing:
+    joints in play, without which it is."""
+    found = run.determinacy
+    redundant = [joint for part in found.parts if part.redundant for joint in part.joints] if found else []
+    if redundant and playing:
+        of = f"{', '.join(redundant)} constrain each other more than once also while {', '.join(playing)} is in play"
+        what = f"{of}: statics does not determine their reactions"
+        raise MechanismError(Finding(what, "joints", "use a joint with more freedoms there (cylindrical, spherical)"))
+    if found is not None:
+        found.refuse()
 
 
 SINGULAR = 1e12  # condition of a mass matrix, coordinates by what is typical of each, that is none
@@ -38,19 +52,34 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
         condition = np.linalg.cond(matrix / scale[:, None] / scale) if np.all(scale > 0) else np.inf
     if condition < SINGULAR:
         return
-    values, joints = motion.values, dict.fromkeys(one.joint for one in motion.contacts.each)
-    light = [
-        link
-        for one in motion.contacts.each
-        for link in (one.body, one.other)
-        if link != motion.system.mechanism.fixed_link
-        and not np.any(values[f"links.{link}.mass"]) and not np.any(values[f"links.{link}.inertia"])
-    ]  # fmt: skip
+    joints = dict.fromkeys(one.joint for one in motion.contacts.each)
+    light = [link for one in motion.contacts.each for link in (one.body, one.other) if not _weighs(motion, link)]
     light = [link for link in light if any(name.startswith(f"{link}_in_play_") for name in motion.names)] or light
+    if not light:  # what turns without inertia
+        weakest = motion.names[int(np.argmax(np.abs(np.linalg.eigh(matrix)[1][:, 0])))]
+        chain = weakest.partition("_in_play_")[0]
+        ends = [motion.system.joints[name][1] for name in motion.names if name.partition("_in_play_")[0] == chain]
+        light = [
+            link
+            for links in ends
+            for link in links
+            if "_in_play_" not in link and not _weighs(motion, link, whole=True)
+        ]
     names = ", ".join(dict.fromkeys(light)) or "some link"
-    what = f"{names} has no mass and is held by nothing while the pins of {', '.join(joints)} are in play"
+    what = (
+        f"{names} has no mass, or no inertia, where nothing holds it while the pins of {', '.join(joints)} are in play"
+    )
     remedy = "state its mass and inertia, or let fewer of its joints be in play"
     raise MechanismError(Finding(what, f"links.{light[0]}" if light else "links", remedy))
+
+
+def _weighs(motion: FreeMotion, link: str, whole: bool = False) -> bool:
+    """Whether a link has a mass or an inertia, or inertia about every axis; the ground needs none."""
+    path, values = f"links.{link}", motion.values
+    axes = [f"{path}.inertia.{axis}{axis}" for axis in "xyz"] if len(motion.system.axes) > 2 else [f"{path}.inertia"]
+    turning = [bool(np.any(values.get(axis, 0.0))) for axis in axes]
+    enough = all(turning) if whole else any(turning) or bool(np.any(values[f"{path}.mass"]))
+    return enough or link == motion.system.mechanism.fixed_link
 
 
 def _inert(mechanism: Mechanism) -> Iterator[bool]:
@@ -77,10 +106,27 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         yield Finding("no mass moves with it, so it has no acceleration", f"drivers.{free[0]}", remedy)
     playing = in_play(mechanism)
     yield from _unlike(mechanism, playing)
+    yield from _of_several(mechanism)
     if len(free) < 2 and not playing:
         return
     why = f"with {', '.join(playing)} in play" if playing else f"with {len(free)} free drivers"
     yield from _sticking(mechanism, free, playing, why)
+
+
+def _of_several(mechanism: Mechanism) -> Iterator[Finding]:
+    """What acts in joints that chains of single turns and slides stand in for, which have no such place."""
+    playing, values = ", ".join(in_play(mechanism)), mechanism.parameters()
+    for name in of_several(mechanism):
+        joint, path = mechanism.effective_joints[name], f"joints.{name}"
+        what = f"in a {joint.type} joint of a loop with {playing} in play it is not modelled"
+        rubs = (f"{path}.friction.{key}" for key in joint.friction.parameters) if joint.friction else ()
+        if any(values[one] != 0 for one in rubs):
+            yield Finding(f"friction: {what}", f"{path}.friction", "state friction: 0 for this joint")
+        if joint.losses is not None:
+            yield Finding(what, f"{path}.losses", "remove it")
+        for spring, one in mechanism.springs.items():
+            if one.joint == name:
+                yield Finding(what, f"springs.{spring}", "state it between two points")
 
 
 def _unlike(mechanism: Mechanism, playing: list[str]) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -19,22 +20,26 @@ from trunnion.dynamics.integrate import Event, Integration, Stretch
 from trunnion.dynamics.rates import Seeing, Seen
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Onset
+from trunnion.joints.contact import elastic_force
 
-__all__ = ["ContactMotion", "Impact", "OpenContact"]
+__all__ = ["ContactMotion", "Impact", "OpenContact", "step_nodes"]
 
 Array = NDArray[np.float64]
 Rate = Callable[[float, Array], Array]
 Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
 CLOSELY = 33  # times about a largest force
+GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
 LOOKS = 12  # times within a step at which gaps are looked at
 FINE = 40  # halvings towards the beginning of a step, where a gap that has just changed its sign is next to nothing
+NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
 MOST_CONTACTS = 100_000
 
 
 class Impact(NamedTuple):
     """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
-    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s."""
+    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s,
+    and what the contact law has lost, J."""
 
     label: str
     begin: float
@@ -45,11 +50,12 @@ class Impact(NamedTuple):
     depth: float
     wear: float
     impulse: float
+    loss: float = 0.0
 
 
 @dataclass
 class OpenContact:
-    """A contact that lasts: its onset, and what it has come to so far. last: forces at the last looks."""
+    """A contact that lasts: its onset, and what it has come to so far."""
 
     begin: float
     approach: float
@@ -58,6 +64,7 @@ class OpenContact:
     wear: float = 0.0
     impulse: float = 0.0
     separation: float = 0.0
+    loss: float = 0.0
 
 
 class Crossing(NamedTuple):
@@ -104,7 +111,7 @@ class ContactMotion(Integration):
             times = before + (after - before) * np.arange(1, LOOKS + 1) / LOOKS
             crossing = self._first(dense, before, times)
             end = after if crossing is None else crossing.time
-            self._measured(dense, np.append(times[times < end], end), before)
+            self._measured(dense, before, end)
             self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
             self._follow(end, found, sense, now)
@@ -179,7 +186,9 @@ class ContactMotion(Integration):
             onsets[k] = None
             one = self._open.pop(k)
             self.impacts.append(
-                Impact(label, one.begin, time, one.approach, rate, one.force, one.depth, one.wear, one.impulse)
+                Impact(
+                    label, one.begin, time, one.approach, rate, one.force, one.depth, one.wear, one.impulse, one.loss
+                )
             )
             self.solution.events.append(Event(time, "lift-off", label, rate, "m/s"))
         self.onsets = tuple(onsets)
@@ -187,35 +196,65 @@ class ContactMotion(Integration):
 
     # ---- what a contact comes to ------------------------------------------------------------------------------
 
-    def _measured(self, dense: Dense, times: Array, begin: float) -> None:
-        """Peaks and wear of the contacts that last, from the looks of a step."""
+    def _measured(self, dense: Dense, begin: float, end: float) -> None:
+        """Peaks, impulse, wear and loss of the contacts that last, of a step: by Gauss and Legendre's rule on its dense
+        output, between places where a slip turns round."""
         if not self._open:
             return
-        times = np.append(begin, times)
+        times, weights = step_nodes(begin, end)
         seen = self._look(dense, times)
         for k, one in self._open.items():
-            one.impulse += float(np.trapezoid(seen.normal[k], times))
-            one.wear += float(np.trapezoid(np.abs(seen.normal[k] * seen.slip[k]), times))
-            one.force = max(one.force, self._largest(dense, times, seen.normal[k], k, 1))
-            one.depth = max(one.depth, self._largest(dense, times, -seen.gap[k], k, -1))
+            contact = self.motion.contacts.each[k]
+            normal, slip = seen.normal[k], seen.slip[k]
+            elastic = elastic_force(-seen.gap[k], contact.stiffness, contact.exponent)
+            one.impulse += float(weights @ normal)
+            one.loss += float(weights @ ((elastic - normal) * seen.rate[k]))
+            turns = np.flatnonzero(slip[1:] * slip[:-1] < 0.0)
+            if len(turns):
+                places = [self._turn(dense, k, times[i], times[i + 1]) for i in turns]
+                one.wear += self._rubbed(dense, k, [begin, *places, end])
+            else:
+                one.wear += float(weights @ np.abs(normal * slip))
+            one.force = self._largest(dense, times, seen.normal[k], k, 1, one.force)
+            one.depth = self._largest(dense, times, -seen.gap[k], k, -1, one.depth)
 
-    def _largest(self, dense: Dense, times: Array, seen: Array, k: int, what: int) -> float:
-        """The largest normal force (what: 1) or penetration (−1) of a contact within a step: looked at closely where it
-        is inside."""
+    def _turn(self, dense: Dense, k: int, low: float, high: float) -> float:
+        """When the slip of a contact turns round."""
+        return float(brentq(lambda time: float(self._look(dense, np.array([time])).slip[k, 0]), low, high))
+
+    def _rubbed(self, dense: Dense, k: int, ends: list[float]) -> float:
+        """Wear index of a contact, J, over parts of a step."""
+        found = 0.0
+        for begin, end in pairwise(ends):
+            times, weights = step_nodes(begin, end)
+            seen = self._look(dense, times)
+            found += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
+        return found
+
+    def _largest(self, dense: Dense, times: Array, seen: Array, k: int, what: int, known: float) -> float:
+        """The largest normal force (what: 1) or penetration (−1) of a contact, from before and within a step: looked at
+        closely where it may be the largest."""
         top = int(np.argmax(seen))
-        if not 0 < top < len(times) - 1:
-            return float(seen[top])
-        close = self._look(dense, np.linspace(times[top - 1], times[top + 1], CLOSELY))
-        return _peak(close.normal[k] if what > 0 else -close.gap[k])
+        if seen[top] > (1.0 - NEARLY) * known:
+            low, high = times[max(top - 1, 0)], times[min(top + 1, len(times) - 1)]
+            close = self._look(dense, np.linspace(low, high, CLOSELY))
+            known = max(known, _peak(close.normal[k] if what > 0 else -close.gap[k]))
+        return known
 
     def finished(self) -> list[Impact]:
         """All contacts, those that last at the end with an end that is not known."""
         last = [
             Impact(self.motion.contacts.labels[k], one.begin, np.nan, one.approach, np.nan, one.force, one.depth,
-                   one.wear, one.impulse)
+                   one.wear, one.impulse, one.loss)
             for k, one in self._open.items()
         ]  # fmt: skip
         return sorted([*self.impacts, *last], key=lambda one: one.begin)
+
+
+def step_nodes(begin: float, end: float) -> tuple[Array, Array]:
+    """Times of a step, its ends and the nodes of Gauss and Legendre's rule, s, and their weights, 0 at the ends."""
+    nodes, weights = 0.5 * (end - begin) * GAUSS
+    return np.concatenate([[begin], 0.5 * (begin + end) + nodes, [end]]), np.concatenate([[0.0], weights, [0.0]])
 
 
 def _peak(values: Array) -> float:

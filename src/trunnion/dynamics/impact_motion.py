@@ -18,7 +18,7 @@ from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.closed import rates_of
-from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact
+from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact, step_nodes
 from trunnion.dynamics.impact_law import OPEN, Struck
 from trunnion.dynamics.impact_steps import SteppedMotion
 from trunnion.dynamics.state import Accelerated
@@ -86,17 +86,17 @@ class ImpactMotion(SteppedMotion):
                 found[self.count + k] = onset.sense * state.slip if onset.sense else left
         return found
 
-    def _measured(self, dense: Dense, times: Array, begin: float) -> None:
-        """Forces, impulse and wear of the contacts that are closed."""
+    def _measured(self, dense: Dense, begin: float, end: float) -> None:
+        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step."""
         if not self._open:
             return
-        times = np.append(begin, times)
+        times, weights = step_nodes(begin, end)
         pushes = self._pushes(dense, times)
         for k, one in self._open.items():
             state, push = pushes[k]
             one.force = np.fmax(one.force, float(np.max(push.normal)))
-            one.impulse += float(np.trapezoid(push.normal, times))
-            one.wear += float(np.trapezoid(np.abs(push.normal * state.slip), times))
+            one.impulse += float(weights @ push.normal)
+            one.wear += float(weights @ np.abs(push.normal * state.slip))
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""

@@ -1,9 +1,11 @@
 """A mechanism whose joints in play are taken out: its links are held by contacts, and more coordinates are free.
 
-A pin in play takes no freedom away. Without its joint the linkage has two coordinates more, which are coordinates of
-joints that remain: in the loop of the joint, chosen so that the modules become as small as can be. A link that no joint
-holds any more has the place of its mass centre and its angle for coordinates, by joints to the ground that carry
-nothing. So motion in time needs nothing new for play: the offset of a pin in its hole follows from the coordinates.
+A pin in play takes no freedom away. Without its joint the linkage has more coordinates, two in the plane and five in
+space, or four where the pin slides. They are coordinates of joints that remain, in the loop of the joint, chosen so
+that the modules become as small as can be. A link that no joint holds any more has the place of its mass centre and
+its turn for coordinates, by joints to the ground that carry nothing. In space a driver cannot move all freedoms of a
+ball or a cylinder: such joints in the loop become chains of single turns and slides (`dynamics.chains`). So motion in
+time needs nothing new for play: the offset of a pin in its hole follows from the coordinates.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.nested import flat
+from trunnion.dynamics.chains import Chain, chain_of_joint, hanging_chain
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
@@ -26,9 +30,9 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Driver
 from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run
-from trunnion.structure.decompose import decompose
+from trunnion.structure.decompose import decompose, mobility_by_formula, passive
 
-__all__ = ["Opened", "in_play", "is_rigid", "opened"]
+__all__ = ["Opened", "in_play", "is_rigid", "of_several", "opened"]
 
 Array = NDArray[np.float64]
 
@@ -45,10 +49,12 @@ SHARE = (
 
 @dataclass(frozen=True)
 class Opened:
-    """mechanism: without the joints in play, with more free drivers; run: of the mechanism as it is stated."""
+    """mechanism: without the joints in play, with more free drivers; run: of the mechanism as it is stated; parts: the
+    single turns and slides that stand in for a joint of several freedoms, by joint."""
 
     mechanism: Mechanism
     run: Run
+    parts: Mapping[str, tuple[str, ...]]
 
 
 def in_play(mechanism: Mechanism) -> list[str]:
@@ -65,21 +71,43 @@ def opened(run: Run) -> Opened:
     """A prepared mechanism without its joints in play. It begins with every pin in the middle of its hole, with the
     velocities of the linkage without play."""
     mechanism, cut = run.system.mechanism, in_play(run.system.mechanism)
-    walk = _start(run)
+    walk, spatial = _start(run), mechanism.space == "spatial"
+    if not all(np.all(np.isfinite(number)) for motion in walk.motions.values() for number in flat(motion[:2])):
+        what = "the mechanism without play has no position at its start, from which the motion is to begin"
+        raise MechanismError(Finding(what, "drivers", "begin at another coordinate: initial: {coordinate: …}"))
     data = {key: part for key, part in mechanism.data().items() if key in KEPT}
-    data["joints"] = {name: one for name, one in data["joints"].items() if name not in cut}
-    data["assembly"] = {name: one for name, one in data.get("assembly", {}).items() if name not in cut}
-    data["errors"] = {
-        name: one for name, one in data.get("errors", {}).items() if not _of(mechanism.path_of(name), cut)
-    }
-    held, coordinates = _loose(data, mechanism), dict[str, tuple[float, float]]()
-    for link in held:
-        coordinates.update(_hang(data, mechanism.fixed_link, link, walk))
+    several = of_several(mechanism)
+    _leave_out(data, mechanism, [*cut, *several])
+    coordinates, parts = dict[str, tuple[float, float]](), dict[str, tuple[str, ...]]()
+    for joint in several:
+        chain = chain_of_joint(run, walk, joint)
+        _put(data, mechanism.effective_joints[joint].links, chain)
+        coordinates.update(chain.coordinates)
+        parts[joint] = tuple(chain.joints)
+    single = list(coordinates)
+    for link in _loose(data, mechanism):
+        if spatial:
+            chain = hanging_chain(run, walk, link)
+            _put(data, (mechanism.fixed_link, link), chain)
+            coordinates.update(chain.coordinates)
+        else:
+            coordinates.update(_hang(data, mechanism.fixed_link, link, walk))
     base = Mechanism(**data)
-    wanted = 2 * len(cut) - len(coordinates)
-    coordinates.update((name, _coordinate(walk, name)) for name in _chosen(base, list(coordinates), wanted, cut, run))
-    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, coordinates)}
-    return Opened(Mechanism(**data), run)
+    hung = [name for name in coordinates if name not in single]
+    wanted = mobility_by_formula(base) - len(passive(base)) - len(base.drivers) - len(hung)
+    chosen = _chosen(base, hung, max(wanted, 0), cut, run)
+    found = {name: coordinates.get(name) or _coordinate(walk, name) for name in (*hung, *chosen)}
+    data["drivers"] = {**data.get("drivers", {}), **_drivers(run, base, found)}
+    return Opened(Mechanism(**data), run, parts)
+
+
+def _leave_out(data: dict[str, Any], mechanism: Mechanism, without: Sequence[str]) -> None:
+    """Take joints out of what a file says."""
+    data["joints"] = {name: one for name, one in data["joints"].items() if name not in without}
+    data["assembly"] = {name: one for name, one in data.get("assembly", {}).items() if name not in without}
+    errors = data.get("errors", {}).items()
+    data["errors"] = {name: one for name, one in errors if not _of(mechanism.path_of(name), without)}
+    data["links"] = {name: {**one, "points": dict(one["points"])} for name, one in data["links"].items()}
 
 
 def _of(path: str, joints: Sequence[str]) -> bool:
@@ -113,7 +141,7 @@ def _coordinate(walk: Forward, joint: str) -> tuple[float, float]:
 
 def _loose(data: Mapping[str, Any], mechanism: Mechanism) -> list[str]:
     """One link of every part of the mechanism that no joint connects with the ground any more: the heaviest."""
-    part = {link: {link} for link in mechanism.links}
+    part = {link: {link} for link in data["links"]}
     for joint in data["joints"].values():
         one, other = (part[link] for link in joint["links"])
         if one is not other:
@@ -133,7 +161,7 @@ def _hang(data: dict[str, Any], ground: str, link: str, walk: Forward) -> dict[s
     along, across, turn = names = [f"{link}_in_play_{part}" for part in PARTS]
     carriers = [f"{along}_carrier", f"{across}_carrier"]
     centre = tuple(_number(part) for part in walk.system.centre(walk.values, link))
-    links = data["links"] = {name: {**one, "points": dict(one["points"])} for name, one in data["links"].items()}
+    links = data["links"]
     x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
     links[ground]["points"][along] = x
     links[carriers[0]] = {"points": {along: x, across: y}}
@@ -149,6 +177,26 @@ def _hang(data: dict[str, Any], ground: str, link: str, walk: Forward) -> dict[s
         across: (_number(at.place[1]), _number(at.velocity[1])),
         turn: (float(angle), _number(twist.w)),
     }
+
+
+# ---- chains in space ------------------------------------------------------------------------------------------
+
+
+def of_several(mechanism: Mechanism) -> list[str]:
+    """Joints in loops with those in play that have more freedoms than a driver can move: chains stand in for them."""
+    cut = in_play(mechanism)
+    if mechanism.space != "spatial" or not cut:
+        return []
+    nearby, joints = _loop(mechanism, cut), mechanism.effective_joints
+    return [name for name in joints if name in nearby and PAIRS[joints[name].type].count > 1]
+
+
+def _put(data: dict[str, Any], links: tuple[str, str], chain: Chain) -> None:
+    """Put a chain between two links."""
+    for link, points in zip(links, chain.points, strict=True):
+        data["links"][link]["points"].update(points)
+    data["links"].update(chain.links)
+    data["joints"].update(chain.joints)
 
 
 # ---- coordinates ----------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.steady import steady_figures
-from trunnion.dynamics.touching import PinContact
+from trunnion.dynamics.touching import SLOWEST
 from trunnion.errors import Finding
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
@@ -115,7 +115,7 @@ def result_of(
 
 def _named_contacts(motion: FreeMotion, impacts: Sequence[Impact]) -> dict[str, list[str]]:
     """The contact of every impact, and the contacts that are pins in holes."""
-    pins = [one.label for one in motion.contacts.each if isinstance(one, PinContact)]
+    pins = [one.label for one in motion.contacts.each if one.bored]
     return {"impacts": [one.label for one in impacts], "contact_pins": pins}
 
 
@@ -184,6 +184,7 @@ def _turned_over(motion: FreeMotion, solution: Solution) -> float:
 
 
 DIFFERS = 0.01  # of a restitution: a difference that is worth a note
+FEW = 2  # contacts that begin slowly, of which nothing is said
 ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
@@ -229,8 +230,15 @@ def _findings(motion: FreeMotion, solution: Solution, run: Run, impacts: Sequenc
 
 
 def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
-    """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in."""
+    """What the laws of the contacts return, where that is not what was stated; how deep soft surfaces sink in; what is
+    lost in contacts that begin so slowly that their law is not followed."""
     for one in motion.contacts.each:
+        own = [impact for impact in impacts if impact.label == one.label]
+        slow = [impact for impact in own if impact.approach < SLOWEST]
+        lost, whole = (sum(impact.loss for impact in some) for some in (slow, own))
+        if len(slow) > FEW and lost > DIFFERS * whole:
+            yield finding_for("simulate.slow_onsets", f"joints.{one.joint}.contact", contact=one.label, count=len(slow),
+                              of=len(own), slowest=SLOWEST, share=lost / whole)  # fmt: skip
         depth = max((impact.depth for impact in impacts if impact.label == one.label), default=0.0)
         if depth > one.clearance:
             yield finding_for("simulate.soft", f"joints.{one.joint}.contact", contact=one.label, depth=depth,

@@ -60,9 +60,9 @@ class Touches(NamedTuple):
     place: Array
 
     @classmethod
-    def empty(cls, contacts: int, times: int) -> Touches:
+    def empty(cls, contacts: int, axes: int, times: int) -> Touches:
         """Nothing known."""
-        flat, deep = (contacts, times), (contacts, 2, times)
+        flat, deep = (contacts, times), (contacts, axes, times)
         return cls(*(np.full(flat, np.nan) for _ in range(6)), *(np.full(deep, np.nan) for _ in range(3)))
 
     def fill(
@@ -73,7 +73,7 @@ class Touches(NamedTuple):
             self.gap[k, lanes], self.normal[k, lanes] = state.gap, push.normal
             self.friction[k, lanes], self.slip[k, lanes] = push.friction, state.slip
             self.touching[k, lanes], self.stored[k, lanes] = float(onsets[k] is not None), push.stored
-            for axis in (0, 1):
+            for axis in range(self.offset.shape[1]):
                 self.offset[k, axis, lanes], self.place[k, axis, lanes] = state.offset[axis], state.place[axis]
                 self.force[k, axis, lanes] = -push.normal * state.normal[axis] + push.friction * state.tangent[axis]
 
@@ -92,14 +92,18 @@ class Touches(NamedTuple):
 
 
 def as_stated(
-    run: Run, contacts: Contacts, touches: Touches, arrays: Mapping[str, Array], labels: Mapping[str, Sequence[str]]
-) -> tuple[dict[str, Array], dict[str, list[str]]]:
-    """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play."""
+    run: Run, contacts: Contacts, touches: Touches, arrays: Mapping[str, Array], labels: Mapping[str, Sequence[str]],
+    filled: dict[str, Array] | None,
+) -> tuple[dict[str, Array], dict[str, list[str]]]:  # fmt: skip
+    """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play.
+
+    filled: arrays as stated that have the rows of these joints; None in the plane, where they are filled here.
+    """
     system = run.system
     wanted = fill_of(system).labels(system)
     known = results.variables(system.mechanism.space)
     count = arrays["status"].shape[-1]
-    found = results.allocate(wanted, count)
+    found = results.allocate(wanted, count) if filled is None else filled
     for name, array in arrays.items():
         if name not in found or results.SAME_AS.get(name) in found:
             continue
@@ -111,7 +115,8 @@ def as_stated(
             continue
         to, of = (np.ix_(*([pair[side] for pair in some] for some in places)) for side in (0, 1))
         into[to] = array[of]
-    _fill_joints(run, contacts, touches, found, wanted)
+    if filled is None:
+        _fill_joints(run, contacts, touches, found, wanted)
     return found, wanted
 
 

@@ -11,23 +11,25 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
-from trunnion.dynamics.checks import refuse, refuse_massless
+from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
-from trunnion.dynamics.opened import in_play, is_rigid, opened
+from trunnion.dynamics.opened import Opened, in_play, is_rigid, opened
 from trunnion.dynamics.rates import Seeing, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
 from trunnion.dynamics.shown import Touches, as_stated
+from trunnion.dynamics.shown_space import JointsInSpace
 from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
-from trunnion.dynamics.touching import Onset, contacts_of
+from trunnion.dynamics.touching import Onset
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results import variables as results
@@ -84,12 +86,13 @@ def simulated(
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
     run = prepare(mechanism)
-    if run.determinacy is not None:
-        run.determinacy.refuse()
+    playing = in_play(mechanism)
+    if not playing:
+        refuse_undetermined(run)
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance)
     _check_step(impact_step, duration, mechanism)
-    if in_play(mechanism):
+    if playing:
         return _with_play(run, duration, steps, tolerance, progress, impact_step)
     motion = FreeMotion.of(run)
     known = places(motion)
@@ -108,8 +111,9 @@ def _with_play(
     """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
-    rigid = is_rigid(run.system.mechanism)
-    motion = (ClosedMotion if rigid else FreeMotion).of(prepare(bare.mechanism), contacts)
+    rigid, loose = is_rigid(run.system.mechanism), prepare(bare.mechanism)
+    refuse_undetermined(loose, in_play(run.system.mechanism))
+    motion = (ClosedMotion if rigid else FreeMotion).of(loose, contacts)
     row = initial_row(motion)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
@@ -124,7 +128,7 @@ def _with_play(
         integration = ContactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
     solution = _run(integration, row)
     time = np.linspace(0.0, duration, steps + 1)
-    books = Filling(motion, solution, time, run).books()
+    books = Filling(motion, solution, time, bare).books()
     return result_of(motion, solution, books, run, integration.finished())
 
 
@@ -191,7 +195,7 @@ class Filling:
     motion: FreeMotion
     solution: Solution
     time: Array
-    stated: Run | None = None
+    stated: Opened | None = None
 
     def books(self) -> Books:
         """Every variable, over the rows up to where the motion ends; NaN after it."""
@@ -202,7 +206,10 @@ class Filling:
         rows, which = self.solution.at(self.time)
         layout = self.solution.layout
         seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
-        touches = Touches.empty(len(motion.contacts.each), len(self.time))
+        touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(self.time))
+        joints = None
+        if self.stated is not None and system.mechanism.space == "spatial":
+            joints = JointsInSpace(self.stated, motion.contacts, len(self.time))
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
@@ -211,7 +218,10 @@ class Filling:
             window = slice(int(lanes[0]), int(lanes[-1]) + 1)
             fill_chunk(arrays, back, at.time, window)
             energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
-            touches.fill(lanes, motion.contacts.pushes(back.walk, onsets), onsets)
+            touched = motion.contacts.pushes(back.walk, onsets)
+            touches.fill(lanes, touched, onsets)
+            if joints is not None:
+                joints.fill(back, touched, window)
         whole = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
             if array.flags.writeable and array.dtype == np.float64:
@@ -219,7 +229,10 @@ class Filling:
         fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
         resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
         if self.stated is not None:
-            arrays, labels = as_stated(self.stated, motion.contacts, touches, arrays, labels)
+            if joints is not None:
+                joints.unwrap(self.time)
+            filled = None if joints is None else joints.arrays
+            arrays, labels = as_stated(self.stated.run, motion.contacts, touches, arrays, labels, filled)
             energies = np.vstack([energies, touches.stored.sum(axis=0)])
         return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting, touches)
 

@@ -10,25 +10,22 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.joints.contact import elastic_force, hertz_stiffness, normal_force
-from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
-from trunnion.joints.pairs import PAIRS
+from trunnion.joints.contact import elastic_force, normal_force
+from trunnion.joints.friction import FrictionLaw
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import LoadAction
-from trunnion.solve.run import Run
-from trunnion.solve.shifts import play_of
 
-__all__ = ["Closed", "Contact", "ContactState", "Contacts", "Onset", "PinContact", "Push", "contacts_of"]
+__all__ = ["CENTRED", "Closed", "Contact", "ContactState", "Contacts", "Onset", "PinContact", "Push"]
 
 Array = NDArray[np.float64]
-Vector = tuple[Number, Number]
+Vector = tuple[Number, ...]
 
 SLOWEST = 1e-3  # m/s: a slower onset is taken to be as fast as this, else mere pressing would lose any amount
 FIRST = 1e-3  # of the clearance: about how deep the first step of a contact goes
@@ -76,9 +73,11 @@ class Contact(ABC):
     """One place where two bodies of a joint in play may touch.
 
     joint: of the file; label: its own name; body: the link of the pin or slider; other: the link of the hole or guide;
-    stiffness: N/mⁿ; factor: χ of its law; law, parameters: of friction, None without; clearance: m.
+    stiffness: N/mⁿ; factor: χ of its law; law, parameters: of friction, None without; clearance: m. bored: whether it
+    is a pin in a round hole.
     """
 
+    bored: ClassVar[bool] = False
     joint: str
     label: str
     body: str
@@ -140,6 +139,7 @@ class Contact(ABC):
 class PinContact(Contact):
     """A pin in a hole. pin, hole: local places of their centres, m; wall: radius of the hole, m."""
 
+    bored = True
     pin: tuple[float, float] = (0.0, 0.0)
     hole: tuple[float, float] = (0.0, 0.0)
     wall: float = 0.0
@@ -277,58 +277,3 @@ class Contacts:
             if onset is not None:
                 state = one.state(walk)
                 yield one.label, one.action(walk, state, one.push(state, onset))
-
-
-def contacts_of(run: Run, joints: Sequence[str]) -> Contacts:
-    """The contacts of joints in play of a mechanism as it is stated."""
-    return Contacts(tuple(one for joint in joints for one in _of_joint(run, joint)))
-
-
-def _of_joint(run: Run, name: str) -> Iterator[Contact]:
-    system, values = run.system, run.values
-    stated = system.mechanism.effective_joints[name]
-    contact, play = stated.contact, play_of("planar", stated.type, values, name)
-    assert contact is not None  # the model's checks
-    assert play is not None
-    clearance, holes = _number(play.radii[0]), system.holes(values)
-    first, second = stated.links
-    known = {key: _number(values[path]) for key in ("restitution", "exponent", "stiffness")
-             if (path := f"joints.{name}.contact.{key}") in values}  # fmt: skip
-    restitution = known.get("restitution", 1.0)
-    law = FRICTION_LAWS[stated.friction.law or "coulomb"] if stated.friction else None
-    friction = {key: _number(values[f"joints.{name}.friction.{key}"]) for key in law.parameters} if law else {}
-    guided = PAIRS[stated.type].guided
-    radius = 0.0 if guided else _number(values.get(f"joints.{name}.pin.radius", 0.0))
-    if contact.of.rigid:
-        stiffness = 0.0
-    else:
-        stiffness = known["stiffness"] if "stiffness" in known else _hertz(values, name, radius, radius + clearance)
-    common: dict[str, Any] = {
-        "joint": name, "clearance": clearance, "stiffness": stiffness, "exponent": known.get("exponent", 1.0),
-        "factor": contact.of.factor(restitution), "restitution": restitution, "law": law, "parameters": friction,
-    }  # fmt: skip
-    places: list[Any] = [tuple(_number(part) for part in holes[link, name]) for link in (first, second)]
-    if not guided:
-        pin, hole = places[0][:2], places[1][:2]
-        wall = radius + clearance
-        yield PinContact(label=name, body=first, other=second, pin=pin, hole=hole, wall=wall, **common)
-        return
-    length = _number(values[f"joints.{name}.guide.length"])
-    height = _number(values.get(f"joints.{name}.guide.height", 0.0))
-    x, y, c, s = places[1]
-    for number, (end, side) in enumerate(((-1, 1.0), (1, 1.0), (-1, -1.0), (1, -1.0)), 1):
-        along, across = 0.5 * end * length, 0.5 * side * height
-        corner = x + along * c - across * s, y + along * s + across * c
-        yield EdgeContact(
-            label=f"{name}.{number}", body=second, other=first, corner=corner, line=places[0], side=side,
-            distance=0.5 * height + clearance, **common,
-        )  # fmt: skip
-
-
-def _hertz(values: Mapping[str, Any], name: str, pin: float, hole: float) -> float:
-    keys = ("modulus", "hole_modulus", "poisson_ratio", "hole_poisson_ratio")
-    return hertz_stiffness(pin, hole, *(_number(values[f"joints.{name}.contact.{key}"]) for key in keys))
-
-
-def _number(value: object) -> float:
-    return float(np.ravel(primal(value))[0])

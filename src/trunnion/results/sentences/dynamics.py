@@ -59,6 +59,12 @@ DYNAMICS: dict[str, Sentence] = {
         "{contact}: the surfaces sink {depth:~m} into each other, more than the clearance of {clearance:~m}",
         "check the stiffness of the contact; a contact law holds for small penetrations",
     ),
+    "simulate.slow_onsets": Sentence(
+        NOTE,
+        "{contact}: {count:.0f} of {of:.0f} contacts begin slower than {slowest:~m/s} and are treated as beginning at "
+        "that speed; {share:.2%} of what the contact law loses is lost in them",
+        "compare with another restitution: the law is one of impacts, and tells little of slow pressing",
+    ),
     "simulate.restitution": Sentence(
         NOTE,
         "{joint}: with a stated restitution of {stated:.3g} the contact law {law} returns {returned:.3g}",

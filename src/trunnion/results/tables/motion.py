@@ -38,7 +38,7 @@ def times(result: xr.Dataset) -> list[Column]:
     if "contact" in result.dims:
         for k, contact in enumerate(result["contact"].values):
             found += [column(result, name, f"{contact}.{name}", (k,)) for name in CONTACT]
-            for axis, name in enumerate("xy"):
+            for axis, name in enumerate(result["axis"].values):
                 found.append(column(result, "contact_offset", f"{contact}.contact_offset.{name}", (k, axis)))
         found += [column(result, name, name, ()) for name in ("work_contact", "contact_energy")]
     return [*found, *(column(result, name, name, ()) for name in ENERGY)]

@@ -76,7 +76,7 @@ def orbit(result: xr.Dataset) -> Figure:
 
 
 def _hole(axes: Any, result: xr.Dataset, k: int) -> None:
-    x, y = result["contact_offset"].values[k]
+    x, y = result["contact_offset"].values[k][:2]
     gap, force = result["contact_gap"].values[k], result["contact_normal_force"].values[k]
     size = np.hypot(x, y)
     clearance = float(np.nanmedian(gap + size))

@@ -1,0 +1,254 @@
+"""Pins in play in space against the plane, own equations of a free shaft, and reactions without play."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import trunnion
+from playing import rattling
+from playing_space import CENTRE, FLOAT, MASS, WIDTH, cardan, dropped, on_a_plate, own_shaft, rattling_in_space, tilting
+from trunnion.algebra.nested import flat
+from trunnion.dynamics import chains
+from trunnion.dynamics.compiled_rates import compiled_rates
+from trunnion.dynamics.opened import in_play, opened
+from trunnion.dynamics.rates import Layout, Walks
+from trunnion.dynamics.start import initial_row
+from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.stated_contacts import contacts_of
+from trunnion.errors import MechanismError
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.run import prepare
+
+Array = NDArray[np.float64]
+
+
+def test_a_long_pin_is_a_pin_in_the_plane() -> None:
+    """Both ends touch as the planar pin does, each with half its stiffness, force and impulse."""
+    space, plane = (trunnion.simulate(one, 3e-4, 100) for one in (rattling_in_space(), rattling()))
+    assert list(space["contact"].values) == ["Q.end_1", "Q.end_2", "Q.shoulder_1", "Q.shoulder_2"]
+    for name, share in (("begin", 1), ("end", 1), ("approach", 1), ("separation", 1), ("depth", 1), ("force", 0.5),
+                        ("impulse", 0.5), ("wear", 0.5)):  # fmt: skip
+        assert np.allclose(space[f"impact_{name}"], share * float(plane[f"impact_{name}"][0]), rtol=1e-9)
+    force = space["reaction_force"].sel(joint="Q", axis=["x", "y"])
+    assert np.allclose(force, plane["reaction_force"].sel(joint="Q"), rtol=1e-8, atol=1e-4)
+    assert float(abs(space["reaction_moment"].sel(joint="Q")).max()) < 1e-9 * 45872
+    assert np.allclose(space["joint_rotation"].sel(joint="Q"), plane["joint_rotation"].sel(joint="Q"), atol=1e-12)
+    assert float(abs(space["energy_residual"]).max()) < 1e-8 * float(abs(space["work_drive"]).max())
+
+
+@pytest.mark.parametrize("duration", [7e-3, pytest.param(0.02, marks=pytest.mark.slow)])
+def test_a_shaft_that_is_let_go_in_its_hole(duration: float) -> None:
+    """It tilts, so that one end touches first, slips with friction and comes against a shoulder: by own equations of
+    Newton and Euler. Its momentum changes by weight and contact forces alone."""
+    result = trunnion.simulate(dropped(), duration, 50)
+    own = own_shaft(result["time"].values)
+    turn = own.rotation.reshape(3, 3, -1)
+    place = own.place - np.einsum("abt,b->at", turn, CENTRE)
+    assert np.allclose(result["point_position"].sel(point="shaft.A"), place, rtol=0, atol=1e-8 * WIDTH)
+    begun = [(time, k) for time, k, begins in own.changes if begins]
+    labels = [f"A.{part}_{number}" for part in ("end", "shoulder") for number in (1, 2)]
+    assert result.attrs["impacts"] == str([labels[k] for _, k in begun]).replace("'", '"')
+    assert np.allclose(result["impact_begin"], [time for time, _ in begun], rtol=1e-8)
+    assert labels[begun[0][1]] == "A.end_1"
+    assert {"A.end_2"} <= {labels[k] for _, k in begun}
+    assert ("A.shoulder_2" in {labels[k] for _, k in begun}) == (duration > 0.01)
+    w, change = (result[f"link_angular_{name}"].sel(link="shaft").values for name in ("velocity", "acceleration"))
+    arm = np.einsum("abt,b->at", turn, CENTRE)
+    centre = (result["point_acceleration"].sel(point="shaft.A").values + np.cross(change, arm, axis=0)
+              + np.cross(w, np.cross(w, arm, axis=0), axis=0))  # fmt: skip
+    push = -result["reaction_force"].sel(joint="A").values  # on the ground, its second link
+    scale = float(np.max(np.abs(push)))
+    assert np.allclose(MASS * centre, push + MASS * np.array([[0.0], [3.0], [-9.81]]), rtol=0, atol=1e-8 * scale)
+    lost = float(result["work_contact"].max())
+    assert float(abs(result["energy_residual"]).max()) < 1e-8 * lost
+    assert float(result["contact_gap"].sel(contact="A.shoulder_1").max()) < 2 * FLOAT + 1e-4
+
+
+@pytest.mark.slow
+def test_less_clearance_gives_force_and_moment_without_play() -> None:
+    """The moment is the couple of the forces at the two ends. What both differ by falls with the clearance."""
+    positions = np.array([50, 60])  # degrees from the start, long after it
+    ideal = trunnion.analyse(tilting({}), steps=360)
+    misses = []
+    for clearance in (1e-3, 1e-4):
+        found = trunnion.simulate(tilting(clearance=clearance), 2 * np.pi / 20 / 6, 60)
+        assert float(abs(found["energy_residual"]).max()) < 1e-8 * float(abs(found["work_loads"]).max())
+        misses.append([
+            float(np.max(np.abs(found[name].sel(joint="Q").values[:, positions]
+                                - ideal[name].sel(joint="Q").values[:, positions])))
+            for name in ("reaction_force", "reaction_moment")
+        ])  # fmt: skip
+    assert np.all(np.array(misses[1]) < 0.2 * np.array(misses[0]))
+    assert misses[1][0] < 2e-3 * 500
+    assert misses[1][1] < 0.05 * 0.5
+
+
+# ---- how it is opened -----------------------------------------------------------------------------------------------
+
+
+def _opened(mechanism: Mechanism) -> tuple[FreeMotion, Array]:
+    run = prepare(mechanism)
+    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
+    return motion, initial_row(motion)
+
+
+def test_every_module_is_a_driver_and_compiled() -> None:
+    """A ball and a cylinder become single turns and slides. Machine code has the rates of the walks."""
+    motion, row = _opened(tilting())
+    assert all(len(module.links) == 1 for module in motion.system.plan.modules)
+    assert len(motion.names) == 5
+    pytest.importorskip("llvmlite")
+    compiled = compiled_rates(motion)
+    assert compiled is not None
+    rng = np.random.default_rng(4)
+    state = row + 1e-4 * rng.standard_normal(len(row))
+    at = Layout.of(motion).moment(np.array([1e-4]), state[:, None])._replace(onsets=(0.5, None, None, 0.2))
+    one, other = compiled(at), Walks(motion)(at)
+    assert np.allclose(one.second, other.second, rtol=1e-9)
+    assert np.allclose(one.works, other.works, rtol=1e-9)
+    for seen, wanted in zip(compiled.look(at), Walks(motion).look(at), strict=True):
+        assert np.allclose(seen, wanted, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "mechanism", [tilting(), cardan(), on_a_plate(), dropped()], ids=["ball", "cross", "plate", "free"]
+)
+def test_it_begins_with_pins_in_the_middle_and_velocities_without_play(mechanism: Mechanism) -> None:
+    """Whatever joints the chains stand in for."""
+    motion, row = _opened(mechanism)
+    each = motion.contacts.each
+    at = Layout.of(motion).moment(np.zeros(1), row[:, None])._replace(onsets=(None,) * len(each))
+    seen = Walks(motion).look(at)
+    assert np.allclose(seen.gap[:, 0], [one.clearance for one in each], rtol=1e-9)
+    assert np.allclose(seen.rate[:, 0], 0.0, atol=1e-10)
+    walk, whole = motion.walk(at, np.zeros_like(at.q)), prepare(mechanism).walk(np.zeros(1))
+    for link in mechanism.links:
+        for part, wanted in zip(flat(walk.motions[link][:2]), flat(whole.motions[link][:2]), strict=True):
+            assert np.allclose(part, wanted, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_cross_beside_a_bearing_with_play() -> None:
+    """tan θ₂ = tan θ₁/cos β of a Cardan joint (β = 30°, θ from where the driving fork lies across both shafts), but for
+    how far the play lets the shaft lean."""
+    result = trunnion.simulate(cardan(), 0.02, 100)
+    first = result["joint_rotation"].sel(joint="A").values
+    second = -result["joint_rotation"].sel(joint="C").values  # of the hole against the pin
+    wanted = np.unwrap(np.arctan2(np.sin(first) / np.cos(np.pi / 6), np.cos(first)))
+    assert np.allclose(second - second[0], wanted, atol=2e-3)
+    assert float(np.max(np.abs(second - second[0] - first))) > 0.05
+    assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
+
+
+@pytest.mark.slow
+def test_a_coupler_that_slides_on_a_plate() -> None:
+    """It stays on the plate, which carries what tilts it; the account of the energy holds."""
+    result = trunnion.simulate(on_a_plate(), 0.01, 50)
+    assert np.allclose(result["point_position"].sel(point="coupler.C", axis="z"), 0.0, atol=1e-15)
+    assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
+    force = sum(
+        sign * result["reaction_force"].sel(joint=joint).values for joint, sign in (("B", 1), ("C", 1), ("E", 1))
+    )
+    turn, change, w = (result[name].sel(link="coupler").values for name in
+                       ("link_rotation", "link_angular_acceleration", "link_angular_velocity"))  # fmt: skip
+    angle = 2 * np.arctan2(turn[3], turn[0])
+    arm = np.array([0.05 * np.cos(angle) - 0.01 * np.sin(angle), 0.05 * np.sin(angle) + 0.01 * np.cos(angle)])
+    centre = result["point_acceleration"].sel(point="coupler.B").values[:2] - w[2] ** 2 * arm
+    centre = centre + change[2] * np.array([-arm[1], arm[0]])
+    assert np.allclose(force[:2], 0.3 * centre, atol=1e-7 * float(np.max(np.abs(force))))
+
+
+def test_the_turns_of_a_ball_keep_clear_of_where_they_cannot_turn() -> None:
+    """The crank turns round under its ball: the first axis is its own, so that the third stays at right angles."""
+    run = prepare(tilting())
+    chain = chains.chain_of_joint(run, run.walk(np.zeros(1)), "P")
+    axis = np.abs(chain.points[0]["P_in_play_1"]["axis"])
+    assert axis[2] > 0.99
+
+
+def test_a_link_that_turns_every_way_has_no_three_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = prepare(tilting())
+    every = np.concatenate([[np.eye(3)], Rotation.random(4000, rng=1).as_matrix()])
+    monkeypatch.setattr(chains, "_relative", lambda *_: every)
+    with pytest.raises(MechanismError) as raised:
+        chains.chain_of_joint(run, run.walk(np.zeros(1)), "P")
+    assert [finding.where for finding in raised.value.findings] == ["links.rod"]
+
+
+# ---- bad input ------------------------------------------------------------------------------------------------------
+
+PIN = {"radius": "9.5 mm", "hole_radius": "10 mm", "length": 1, "end_float": "1 mm"}
+STIFF = {"restitution": 0.5, "stiffness": 1e9}
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"pin": {**PIN, "length": 0}}, "joints.Q.pin.length"),
+        ({"pin": {key: one for key, one in PIN.items() if key != "length"}}, "joints.Q.contact"),
+        ({"pin": {key: one for key, one in PIN.items() if key != "end_float"}}, "joints.Q.contact"),
+        ({"pin": {**PIN, "end_float": 0}}, "joints.Q.pin.end_float"),
+        ({"pin": {**PIN, "hole_radius": "9.5 mm"}}, "joints.Q.contact"),
+        ({"pin": {key: one for key, one in PIN.items() if "radius" not in key}, "contact": STIFF}, "joints.Q.contact"),
+        ({"contact": {"law": "rigid", "restitution": 0.5}}, "joints.Q.contact.law"),
+        ({"type": "spherical", "pin": {"radius": 0.01, "clearance": 1e-4}, "contact": STIFF}, "joints.Q.contact"),
+    ],
+)
+def test_pins_that_cannot_be_in_play(change: dict[str, Any], where: str) -> None:
+    data = rattling_in_space().data()
+    data["joints"]["Q"].update(change)
+    with pytest.raises(MechanismError) as raised:
+        Mechanism(**data)
+    assert where in [finding.where for finding in raised.value.findings]
+
+
+def test_what_acts_in_a_joint_of_several_freedoms_is_refused() -> None:
+    data = tilting().data()
+    data["joints"]["S"] |= {"pin": {"radius": 0.02, "length": 0.05}, "losses": {"viscous": 3}}
+    data["joints"]["S"]["friction"] = {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.1, "transition_speed": 1}
+    with pytest.raises(MechanismError) as raised:
+        trunnion.simulate(Mechanism(**data), 1e-3)
+    assert [finding.where for finding in raised.value.findings] == ["joints.S.friction", "joints.S.losses"]
+
+
+def test_a_link_without_mass_between_pins_in_play() -> None:
+    data = dropped().data()
+    data["links"]["shaft"] = {"points": data["links"]["shaft"]["points"]}
+    with pytest.raises(MechanismError) as raised:
+        trunnion.simulate(Mechanism(**data), 1e-3)
+    assert [finding.where for finding in raised.value.findings] == ["links.shaft"]
+
+
+def test_a_rod_without_inertia_about_its_line() -> None:
+    """Between two balls it is free to spin, which nothing would resist."""
+    data = tilting().data()
+    data["joints"]["Q"] = {"type": "spherical", "links": ["rod", "slider"]}
+    pin = {"radius": 0.01, "clearance": 1e-4, "length": 0.03}
+    contact = {"restitution": 0.3, "stiffness": 1e7, "exponent": 1}
+    data["joints"]["S"] = {**data["joints"]["S"], "pin": pin, "contact": contact}
+    data["links"]["rod"] |= {"inertia": {"xx": 0, "yy": 1e-4, "zz": 1e-4}, "centre": [0.06, 0, 0]}
+    with pytest.raises(MechanismError) as raised:
+        trunnion.simulate(Mechanism(**data), 1e-3)
+    assert [finding.where for finding in raised.value.findings] == ["links.rod"]
+
+
+@pytest.mark.slow
+def test_other_loops_stay_determined() -> None:
+    """Four parallel pins in space, none of which in play, are refused beside a pin that is."""
+    data = rattling_in_space().data()
+    on = {"axis": [0, 0, 1], "x": [1, 0, 0]}
+    data["links"]["frame"]["points"] |= {"D": {"at": [0.1, 0, 0], **on}}
+    data["links"]["crank"]["points"] |= {"B": {"at": [0, 0.03, 0], **on}}
+    data["links"]["coupler"] = {"points": {"B": {"at": [0, 0, 0], **on}, "C": {"at": [0.09, 0, 0], **on}}, "mass": 0.1}
+    data["links"]["rocker"] = {"points": {"C": {"at": [0.07, 0, 0], **on}, "D": {"at": [0, 0, 0], **on}}, "mass": 0.1}
+    for name, links in (("B", ["crank", "coupler"]), ("C", ["coupler", "rocker"]), ("D", ["frame", "rocker"])):
+        data["joints"][name] = {"type": "revolute", "links": links}
+    data["assembly"] = {"Q": [0.17, 0, 0], "D": "60 deg"}
+    with pytest.raises(MechanismError) as raised:
+        trunnion.simulate(Mechanism(**data), 1e-3)
+    assert [one.what.partition(" constrain")[0] for one in raised.value.findings] == ["O, B, C, D"]

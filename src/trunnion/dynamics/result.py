@@ -16,8 +16,8 @@ from trunnion.dynamics.motor import switched
 from trunnion.dynamics.rates import WORKS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
+from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.steady import steady_figures
 from trunnion.dynamics.touching import PinContact
 from trunnion.errors import Finding
 from trunnion.joints.contact import restitution_of
@@ -32,7 +32,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOTION", "Books", "result_of"]
+__all__ = ["MOTION", "Books", "motion_findings", "result_of"]
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def result_of(
     residual, turned_over = _energy(books)
     turned_over = max(turned_over, _turned_over(motion, solution))
     findings = [
-        *_findings(motion, solution, run, impacts),
+        *motion_findings(motion, solution, run, impacts),
         *_unbalanced(books, residual, turned_over, solution.stepped),
     ]
     attributes = encoded(
@@ -199,7 +199,10 @@ def _unbalanced(books: Books, residual: Array, turned_over: float, stepped: bool
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _findings(motion: FreeMotion, solution: Solution, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
+def motion_findings(
+    motion: FreeMotion, solution: Solution, run: Run, impacts: Sequence[Impact] = ()
+) -> Iterator[Finding]:
+    """What is to be known of a motion: how it rests, locks or ends."""
     system = motion.system
     yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
     centred = [one.joint for one in motion.run.seats]

@@ -11,7 +11,6 @@ import trunnion
 from timed import LINEAR, mass_on_a_belt, slider_crank, wheel
 from trunnion.dynamics.steady_cycle import UnsteadyError
 
-
 AWAY = [*range(1, 60), *range(61, 120)]
 
 

@@ -32,6 +32,16 @@ def events(result: Any, kind: str) -> list[float]:
 # ---- a flywheel: closed forms of THEORY 8 -----------------------------------------------------------------------
 
 
+def test_a_run_down_is_told_from_where_the_motor_is_switched_off() -> None:
+    """From 127.5 rad/s at 0.6 N m: J ω/T = 10.625 s and J ω²/(2 T) after the switch; the start adds nothing."""
+    switched = wheel({**LINEAR, "off_from": 0.5}, initial={"speed": 127.5})
+    told = {one.name: one.value for one in simulate(switched, 12.0, 2, 1e-11).trunnion.summary}
+    assert told["A.run_down"] == pytest.approx(10.625, rel=1e-9)
+    assert told["A.run_down_way"] == pytest.approx(127.5 * 10.625 / 2, rel=1e-9)
+    stalled = simulate(wheel({**LINEAR, "stall_effort": 0.3}, initial={"speed": 10}), 5.0, 2)
+    assert "A.run_down" not in {one.name for one in stalled.trunnion.summary}
+
+
 def test_a_direct_current_motor_starts_a_flywheel() -> None:
     """ω = 127.5 (1 − e^(−t/1.875))."""
     result = simulate(wheel(LINEAR), 5.0, 5, 1e-12)

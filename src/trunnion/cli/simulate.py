@@ -56,8 +56,8 @@ def simulate(
         str | None,
         typer.Option(
             "--kind",
-            help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit; of a "
-            "steady cycle those of `trunnion plot`.",
+            help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
+            "spectrum; of a steady cycle those of `trunnion plot`.",
             show_default=False,
         ),
     ] = None,

@@ -13,9 +13,11 @@ from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import Event, Solution
 from trunnion.dynamics.motor import switched
+from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import WORKS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
+from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
 from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import PinContact
@@ -101,14 +103,19 @@ def result_of(
     def build() -> xr.Dataset:
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
         found = described(books.arrays, known) | described(_own(motion, run, solution, books, residual), MOTION)
-        labels = dict(books.labels)
+        labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
+        coordinates = {"time": books.time}
         if stated is not None and books.touches is not None:
             labels["contact"] = list(motion.contacts.labels)
             found |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
                 impact_arrays(impacts), IMPACT
             )
-        time = described({"time": books.time}, {"time": Variable(("time",), "s", "time from the start")})
-        return dataset_of("motion", found, labels, attributes, time)
+            rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
+            if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
+                along["frequency"] = FREQUENCY
+                coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
+                found |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
+        return dataset_of("motion", found, labels, attributes, described(coordinates, along))
 
     return Result(attributes, build)
 

@@ -159,7 +159,7 @@ def test_bad_pictures_of_the_ways(run: Run, tmp_path: Path) -> None:
 def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
     run: Run, tmp_path: Path, verb: str, hint: str, told: str
 ) -> None:
-    path = model(tmp_path, lambda text: text.replace("C: [3.9, 2.5]", hint))
+    path = model(tmp_path, lambda text: text.replace("C: [7.6, 2.1]", hint))
     line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if hint in one)
     out = {"plot": ["--out", "plots"], "report": ["--out", "r.html"]}.get(verb, [])
     done = run(verb, path, *out)
@@ -171,7 +171,7 @@ def test_a_wrong_name_of_an_assembly_is_found_in_its_line(
 
 @pytest.mark.parametrize("verb", ["check", "analyse"])
 def test_a_name_and_a_place_are_doubted_in_their_line(run: Run, tmp_path: Path, verb: str) -> None:
-    path = model(tmp_path, lambda text: text.replace("{C: [3.9, 2.5]}", "\n  C: [3.9, 2.5]\n  rocker: way-2"))
+    path = model(tmp_path, lambda text: text.replace("{C: [7.6, 2.1]}", "\n  C: [7.6, 2.1]\n  rocker: way-2"))
     line = next(i for i, one in enumerate(path.read_text("utf-8").splitlines(), 1) if "way-2" in one)
     done = run(verb, path)
     assert done.code == 0

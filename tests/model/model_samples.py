@@ -37,7 +37,7 @@ drivers:
 loads:
   work: {link: coupler, at: C, force: [0, -1 kN]}
 assembly:
-  C: [3.9, 2.5]
+  C: [7.6, 2.1]
 measures:
   tip: {point: coupler.C, axis: x}
 """

@@ -217,6 +217,15 @@ def test_a_name_beats_a_place_and_says_so(model: Any, link: str, pin: str) -> No
         assert f"means {by_place.name}; the name is used" in said.what or way.name == by_place.name
 
 
+@pytest.mark.parametrize(("away", "doubted"), [(0.9, False), (1.1, True)])
+def test_a_hint_that_is_far_from_its_point_is_doubted(away: float, doubted: bool) -> None:
+    data = four_bar()
+    start = at_start(build(data), "rocker", "C")
+    data["assembly"] = {"C": list(start + np.array([0.0, away]))}  # the longest link is of 1 m
+    far = [one for one in trunnion.check(build(data), 12).findings if one.code == "assembly.far_hint"]
+    assert [one.where for one in far] == ["assembly.C"] * doubted
+
+
 @pytest.mark.parametrize("extension", ["yaml", "json"])
 def test_a_name_survives_writing_and_new_values(tmp_path: Any, extension: str) -> None:
     data = named(four_bar(), rocker="way-2")

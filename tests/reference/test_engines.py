@@ -82,8 +82,14 @@ def test_the_angle_of_a_point_is_exact_to_the_last_places() -> None:
 @pytest.mark.parametrize("name", ["sin", "cos", "exp"])
 def test_beyond_its_range_a_function_is_no_number(name: str) -> None:
     reach = EXP_RANGE if name == "exp" else SINE_RANGE
-    (found,) = compiled(lambda x: (getattr(np, name)(x),), np.array([1.01, -1.01, np.inf, np.nan, 0.5]) * reach)
-    assert np.isnan(found).tolist() == [True, True, True, True, False]
+    (found,) = compiled(lambda x: (getattr(np, name)(x),), np.array([1.01, -1.01, np.inf, np.nan, 0.5] * 2) * reach)
+    assert np.isnan(found).tolist() == [True, True, True, True, False] * 2
+
+
+def test_fewer_positions_than_a_vector_holds_are_refused() -> None:
+    """They would be written before the beginning of the row."""
+    with pytest.raises(ValueError, match="3 positions, where a vector holds 4"):
+        compiled(lambda x: (np.sin(x),), np.zeros(3), width=4)
 
 
 @pytest.mark.parametrize("name", ["sqrt", "abs", "floor", "tanh", "sign", "isfinite", "negative", "square"])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
@@ -24,6 +25,7 @@ from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
 from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
+from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
 from trunnion.solve.loads import Stated, stated_walk
@@ -57,6 +59,7 @@ JUMP, STEADY = (
     2e-3,
 )  # of the largest effort: what drops by more is a jump, what changes by less is steady beside it
 TIMES = "times the friction"  # what a locking margin is
+FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
 
 DURANGO = (
@@ -106,12 +109,30 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
     return [
         *run.once("notes", lambda: model_notes(run.system.mechanism, run.system)),
         *run.chosen.findings,
+        *run.once("far hints", lambda: list(_far_hints(run))),
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
         *_missed_peaks(run.system, at),
         *_beside_jumps(run, at),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
     ], near
+
+
+def _far_hints(run: Run) -> Iterator[Finding]:
+    """Hints of places that are far from where their points are at the start: they choose an assembly by chance."""
+    size = float(np.ravel(primal(run.system.size(run.values)))[0])
+    walk = run.walk(np.zeros(1))
+    for name, hint in run.system.mechanism.assembly.items():
+        if not isinstance(hint, tuple):
+            continue
+        link, _, point = name.rpartition(".")
+        link = link or run.system.joints[name][1][1]
+        place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
+        stated = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
+        distance = float(np.linalg.norm(np.subtract(place, stated)))
+        if distance > FAR * size:
+            words = ", ".join(quantity(part, "m") for part in place)
+            yield finding_for("assembly.far_hint", f"assembly.{name}", point=name, distance=distance, place=words)
 
 
 def effort_units(system: System) -> list[str]:

@@ -61,7 +61,7 @@ class MachineCode:
             if code is None:
                 code = _compiled(program.text)
                 _keep(self.path, code)
-        self._link(program.inputs, program.rows, code)
+        self._link(program.inputs, program.rows, program.width, code)
 
     @classmethod
     def known(cls, key: str, folder: Path | None = None) -> MachineCode | None:
@@ -69,23 +69,23 @@ class MachineCode:
         told = _read(_alias(key, _folder(folder)))
         if told is None:
             return None
-        name, inputs, rows = json.loads(told)
+        name, inputs, rows, width = json.loads(told)
         path = _folder(folder) / name
         code = _read(path)
         if code is None:
             return None
         found = cls.__new__(cls)
         found.path, found.compiled = path, False
-        found._link(tuple(tuple(names) for names in inputs), rows, code)
+        found._link(tuple(tuple(names) for names in inputs), rows, width, code)
         return found
 
     def keep_as(self, key: str) -> None:
         """Keep it under a key that is known before the program is."""
-        told = json.dumps([self.path.name, self.inputs, self.rows])
+        told = json.dumps([self.path.name, self.inputs, self.rows, self.width])
         _keep(_alias(key, self.path.parent), told.encode())
 
-    def _link(self, inputs: tuple[tuple[str, ...], ...], rows: int, code: bytes) -> None:
-        self.inputs, self.rows = inputs, rows
+    def _link(self, inputs: tuple[tuple[str, ...], ...], rows: int, width: int, code: bytes) -> None:
+        self.inputs, self.rows, self.width = inputs, rows, width
         with COMPILING:
             self._engine = _linked(code)
         kinds = [*[ctypes.c_int64] * 5, *[ctypes.c_void_p] * 6]
@@ -113,6 +113,8 @@ class MachineCode:
         positions: tuple[int, int],
     ) -> Callable[[], None]:
         """`run` with these arrays, for being called often: what they hold may change in between."""
+        if positions[1] - positions[0] < self.width:  # it would write before the beginning of the row
+            raise ValueError(f"{positions[1] - positions[0]} positions, where a vector holds {self.width}")
         stride = outputs[0].shape[-1]
         table = np.empty(max(1, self.rows * (positions[1] - positions[0])))
         arrays = [[inputs[name] for name in names] for names in self.inputs]

@@ -27,11 +27,13 @@ Value = Any  # of llvmlite, which has no types
 
 @dataclass(frozen=True)
 class Program:
-    """The text of a module; names of the inputs, given and by sample, position and both; rows of the table it needs."""
+    """The text of a module; names of the inputs, given and by sample, position and both; rows of the table it needs;
+    width: positions at a time, and so the fewest in a row."""
 
     text: str
     inputs: tuple[tuple[str, ...], ...]
     rows: int
+    width: int
 
 
 def program(graph: Graph, outputs: Sequence[int], width: int) -> Program:
@@ -69,7 +71,7 @@ class _Writer:
             self._fill_table(ahead, wide)
         self._samples(once, each, plain, wide)
         self.b.ret_void()
-        return Program(str(self.module), names, len(self.tabled))
+        return Program(str(self.module), names, len(self.tabled), self.width)
 
     def _spread(self, plain: dict[int, Value], readers: Iterable[int]) -> dict[int, Value]:
         """Plain numbers in all lanes, those that some nodes read or that are outputs."""

@@ -83,6 +83,11 @@ STRUCTURE: dict[str, Sentence] = {
         "check the lengths, or give a better assembly hint; so many constraints are consistent with special "
         "dimensions only: remove a driver or free a joint",
     ),
+    "assembly.far_hint": Sentence(
+        WARNING,
+        "the hint for {point} is {distance:~m} from where {point} is at the start",
+        "check the hint or the lengths; at the start it is at {place}",
+    ),
     "assembly.told_twice": Sentence(
         NOTE, "the assembly mode of the links {links} is stated by name and by the place of {places}", "one is enough"
     ),

@@ -12,7 +12,7 @@ from trunnion.dynamics.course import Courses
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.repeated import Repeated, motion_law
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.steady_cycle import SteadyCycle, refuse_unsteady, steady_cycle
+from trunnion.dynamics.steady_cycle import INDIFFERENT, SteadyCycle, refuse_unsteady, steady_cycle
 from trunnion.errors import Finding, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
@@ -23,8 +23,7 @@ from trunnion.solve.run import prepare
 
 __all__ = ["steady"]
 
-DIFFERS = 1e-6  # of the largest effort: a cycle that is not the one that was found
-INDIFFERENT = 1e-6  # what is left of a difference beyond all of it, but for rounding
+DIFFERS = 1e-3  # of the largest effort: a cycle that is not the one that was found
 
 
 @np.errstate(all="ignore")
@@ -49,7 +48,7 @@ def steady(
     attributes = encoded({
         **cycle.attrs,
         "findings": finding_rows(findings),
-        "summary": figure_rows([*_figures(found, each), *summary_of(cycle)]),
+        "summary": figure_rows([*_figures(found, each, missing), *summary_of(cycle)]),
         "steady": 1,
     })  # fmt: skip
     return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))
@@ -66,7 +65,7 @@ def _missing(found: SteadyCycle, at: Positions) -> float:
     return float(np.nanmax(np.abs(at.arrays["drive_effort"] - given)[:, told], initial=0.0)) / max(largest, 1e-300)
 
 
-def _figures(found: SteadyCycle, each: Sequence[Repeated]) -> list[Figure]:
+def _figures(found: SteadyCycle, each: Sequence[Repeated], missing: float) -> list[Figure]:
     """What is said of a steady cycle before what is said of any cycle."""
     name, one = found.motion.names[found.first], each[found.first]
     course = Courses.of_solution(found.motion, found.solution, found.first)
@@ -80,6 +79,7 @@ def _figures(found: SteadyCycle, each: Sequence[Repeated]) -> list[Figure]:
         Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", (most - least) / mean, "1"),
         Figure("decay", "what is left of a difference after a cycle", found.factor, "1"),
         Figure("repeats", "by how much the end misses the begin", found.residual, "1", "of the state"),
+        Figure("efforts_differ", "efforts of cycle and motors, difference", missing, "1", "of the largest"),
     ]
 
 

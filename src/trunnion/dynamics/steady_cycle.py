@@ -30,7 +30,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
 
-__all__ = ["SteadyCycle", "UnsteadyError", "refuse_unsteady", "steady_cycle"]
+__all__ = ["INDIFFERENT", "SteadyCycle", "UnsteadyError", "refuse_unsteady", "steady_cycle"]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +44,7 @@ ROUNDS = 15  # of Newton's method
 HALVED = (1.0, 0.5, 0.25, 0.125)  # of its step, until the next with the same derivatives is shorter [Deuflhard]
 FAR = 20.0  # times the speed at the end of the run-up: the steady speed is not looked for beyond
 NUDGE = 1e-4  # of the state, by which ∂P/∂x is taken
+INDIFFERENT = 1e-6  # what is left of a difference beyond all of it, but for rounding
 BACKWARD = 1e-9  # of a turn, by which one that goes round and round may seem to go back
 
 
@@ -121,6 +122,7 @@ def steady_cycle(
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}", "leave --steady out"))
     known = places(motion)
     rates = rates_of(motion, known)
+    unstable = None  # one that no run-up comes to, unless it begins there
     for longer in LONGER:
         end = longer * duration
         solution = integration_of(motion, known, end, tolerance, progress, rates).run(initial_row(motion))
@@ -130,8 +132,12 @@ def steady_cycle(
         if not course.runs[0]:
             continue
         section = Section.of(motion, known, rates, max(FINER * tolerance, FINEST), solution, course, first)
-        if found := section.repeated():
+        found = section.repeated()
+        if found is not None and found.factor <= 1.0 + INDIFFERENT:
             return found
+        unstable = found or unstable
+    if unstable is not None:
+        return unstable
     raise UnsteadyError(_why(motion, solution, course, first))
 
 

@@ -24,3 +24,16 @@ def test_a_duration_that_is_none_is_refused(program: Run, time: str) -> None:
 def test_a_duration_is_a_number_of_seconds_or_has_a_unit(program: Run, tmp_path: Path, time: str) -> None:
     assert program("simulate", PRESS, f"--time={time}", "--steps", 2, "--out", "m.csv").code == 0
     assert float((tmp_path / "m.csv").read_text().splitlines()[-1].split(",")[0]) == pytest.approx(0.004)
+
+
+def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> None:
+    assert program("simulate", PRESS, "--steady", "--steps", 36, "--out", "c.csv", "--report", "c.html").code == 0
+    assert len((tmp_path / "c.csv").read_text().splitlines()) == 37
+    assert program("simulate", PRESS, "--steady", "--kind", "phase", "--out", "c.png").code == 2
+
+
+def test_no_steady_cycle_is_a_finding_with_its_cause(program: Run) -> None:
+    code, _, err = program("simulate", PRESS, "--steady", "--set", "breakdown_effort=1Nm", "--time=1s")
+    assert code == 1
+    assert "there is no steady cycle" in err
+    assert "O does not start" in err

@@ -133,3 +133,27 @@ def test_only_numpy_has_them() -> None:
     mechanism = stated(wheel(LINEAR), tolerances={"links.wheel.inertia": 0.001}, measures={"start": MEASURE})
     with pytest.raises(MechanismError):
         trunnion.tolerance(mechanism, methods=("monte-carlo",), samples=4, engine="compiled")
+
+
+def test_tolerances_are_allocated_to_a_limit_of_the_starting_time() -> None:
+    """Two tolerances of equal cost per share of what they do to the start: B₁/t₁ + B₂/t₂ with s₁ t₁ + s₂ t₂ = limit.
+
+    Lagrange: t_i = limit √(B_i/s_i)/Σ √(B_j s_j), with the derivatives of the closed form.
+    """
+    start = starting_time(0.05)
+    mechanism = stated(
+        wheel(LINEAR),
+        tolerances={"links.wheel.inertia": 0.001, "loads.drag.resisting_torque": 0.05},
+        measures={"start": {**MEASURE, "limit": 0.1}},
+        costs={name: {"model": "power", "B": cost, "k": 1, "unit": unit}
+               for name, cost, unit in (("links.wheel.inertia", 1e-3, "kg m^2"),
+                                        ("loads.drag.resisting_torque", 0.05, "N m"))},
+    )  # fmt: skip
+    found = trunnion.allocate(mechanism, samples=100, jobs=1)
+    widths = dict(zip(found["parameter"].values, found["parameter_upper"].values, strict=True))
+    slope = (starting_time(0.0505) - starting_time(0.0495)) / 0.001
+    assert float(found["nominal"].item()) == pytest.approx(start, rel=1e-7)
+    drag = np.abs(np.ravel(found["sensitivity"])[list(found["parameter"].values).index("loads.drag.resisting_torque")])
+    costs, slopes = np.array([1e-3, 0.05]), np.array([abs(slope), drag])
+    wanted = 0.1 * np.sqrt(costs / slopes) / np.sum(np.sqrt(costs * slopes))
+    assert [widths["links.wheel.inertia"], widths["loads.drag.resisting_torque"]] == pytest.approx(wanted, rel=1e-3)

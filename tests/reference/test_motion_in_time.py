@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
 from trunnion import analyse, read, simulate
+from trunnion.joints.motors import control_at_rest, control_error
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
 
@@ -30,6 +31,16 @@ def events(result: Any, kind: str) -> list[float]:
 
 
 # ---- a flywheel: closed forms of THEORY 8 -----------------------------------------------------------------------
+
+
+def test_a_run_down_is_told_from_where_the_motor_is_switched_off() -> None:
+    """From 127.5 rad/s at 0.6 N m: J ω/T = 10.625 s and J ω²/(2 T) after the switch; the start adds nothing."""
+    switched = wheel({**LINEAR, "off_from": 0.5}, initial={"speed": 127.5})
+    told = {one.name: one.value for one in simulate(switched, 12.0, 2, 1e-11).trunnion.summary}
+    assert told["A.run_down"] == pytest.approx(10.625, rel=1e-9)
+    assert told["A.run_down_way"] == pytest.approx(127.5 * 10.625 / 2, rel=1e-9)
+    stalled = simulate(wheel({**LINEAR, "stall_effort": 0.3}, initial={"speed": 10}), 5.0, 2)
+    assert "A.run_down" not in {one.name for one in stalled.trunnion.summary}
 
 
 def test_a_direct_current_motor_starts_a_flywheel() -> None:
@@ -342,8 +353,40 @@ def test_a_gear_that_cannot_be_driven_back_holds_its_load() -> None:
 
 
 def test_a_controller_does_not_wind_up_at_rest() -> None:
-    """While the limit holds it at rest its integral stays where the limit is reached."""
+    """While the limit holds it at rest its integral stays where the limit holds it."""
     motor = {"kind": "speed-control", "target": 10, "proportional": 0.02, "integral": 0.05, "limit": 0.5}
     result = simulate(wheel(motor, drag=0.6), 20.0, 4)
     assert np.all(result["drive_rate"].values == 0.0)  # 0.5 N m never get over 0.6
     assert result["drive_effort"].values[0, -1] == pytest.approx(0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("gain", [20.0, 200.0])
+def test_a_controller_does_not_wind_up_while_its_limit_holds(gain: float) -> None:
+    """It starts at its limit, ω = (5 − 0.6)/0.05 t, and there the integral grows as fast as the speed makes up for it.
+
+    From where the limit lets go the integral is known, so that what follows is an initial value problem of its own.
+    """
+    motor = {"kind": "speed-control", "target": 100, "proportional": 0.5, "integral": gain, "limit": 5}
+    result = simulate(wheel(motor), 2.0, 2000)
+    time, speed = result["time"].values, result["drive_rate"].values[0]
+    wanted = 0.5 * (100 - speed)
+    held = wanted > 5
+    assert speed[held] == pytest.approx(88 * time[held], rel=1e-8)
+    assert result["drive_effort"].values[0][held][1:] == pytest.approx(5.0, rel=1e-12)
+    assert np.max(speed) < 104  # with the integral of the whole start it would be twice as fast
+    assert speed[-1] == pytest.approx(100, rel=1e-3)
+
+
+@pytest.mark.parametrize("target", [10.0, -10.0])
+@pytest.mark.parametrize(("proportional", "begin"), [(0.0, 0.0), (0.02, 0.0), (0.02, 40.0), (0.02, -20.0)])
+def test_the_integral_of_a_controller_at_rest(target: float, proportional: float, begin: float) -> None:
+    """In closed form what its rate integrates to: up to the limit, held there, held beyond, and back from below."""
+    begin *= np.sign(target)
+    parameters = {"target": target, "proportional": proportional, "integral": 0.05, "limit": 0.5}
+
+    def rate(time: float, y: np.ndarray) -> np.ndarray:
+        return control_error(0.0 * y, np.asarray(time), parameters, y)
+
+    time = np.array([0.0, 0.3, 0.6, 0.602, 0.61, 1.002, 1.01, 3.01])
+    found = solve_ivp(rate, (0, 4), [begin], t_eval=time, rtol=1e-10, atol=1e-12, max_step=1e-3)
+    assert control_at_rest(time, parameters, np.array(begin)) == pytest.approx(found.y[0], abs=1e-7)

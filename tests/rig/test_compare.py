@@ -435,6 +435,7 @@ def test_conditions_may_have_other_positions():
         ("maximum:effort:A", ("channels.torque.measures", "no number of a single position")),
         ("efficiency:cycle", ("channels.torque.measures", "no number of a single position")),
         ("stroke:D", ("channels.torque.measures", "no number of a single position")),
+        ("starting_time:A", ("channels.torque.measures",)),
         ("rotation:D", ("channels.torque", "is in N m, and rotation:D is in rad")),
     ],
 )

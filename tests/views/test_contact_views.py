@@ -12,6 +12,7 @@ import xarray as xr
 import trunnion
 from playing import loose_slider, rattling
 from playing_space import rattling_in_space
+from trunnion.dynamics.spectrum import spectrum
 from trunnion.errors import MechanismError
 from trunnion.results.tables import columns
 from trunnion.views.motion.figure import figure
@@ -54,7 +55,7 @@ def test_gaps_and_forces_over_time() -> None:
 
 def test_a_motion_without_play_has_no_such_figures() -> None:
     result = trunnion.simulate(trunnion.read("examples/flywheel-press.yaml"), duration=1e-3, steps=1)
-    for kind in ("orbit", "gaps", "contacts"):
+    for kind in ("orbit", "gaps", "contacts", "spectrum"):
         with pytest.raises(MechanismError) as raised:
             figure(result, kind)
         assert [finding.where for finding in raised.value.findings] == [f"--kind {kind}"]
@@ -91,3 +92,39 @@ def test_a_table_of_no_impacts(tmp_path: Path) -> None:
     result = trunnion.simulate(rattling(), duration=1e-4, steps=4)
     trunnion.save(result, tmp_path / "none.impacts.csv")
     assert (tmp_path / "none.impacts.csv").read_text().splitlines()[0].startswith("contact,begin,end")
+
+
+def test_the_spectrum_of_harmonics_is_theirs() -> None:
+    """Hann's window: a constant, and amplitudes on frequencies, each with half of it beside; Parseval's equation."""
+    count, step = 400, 1e-3
+    time = step * np.arange(count)
+    forces = 7.0 + 3.0 * np.cos(2 * np.pi * 50 * time + 0.4) + 0.5 * np.sin(2 * np.pi * 180 * time)
+    frequency, amplitude = spectrum(time, forces)
+    assert frequency[[1, -1]] == pytest.approx([2.5, 500])
+    at = {place: k for k, place in enumerate(np.round(frequency, 6))}
+    assert amplitude[[at[0.0], at[50.0], at[180.0]]] == pytest.approx([7.0, 3.0, 0.5], rel=1e-12)
+    assert amplitude[[at[47.5], at[52.5]]] == pytest.approx([1.5, 1.5], rel=1e-12)
+    assert amplitude[at[100.0]] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("last", [700, 701])
+def test_the_spectrum_holds_the_square_of_the_force(last: int) -> None:
+    """Parseval: Σ (w F)²/(Σw)² N is the sum of the squares of the two-sided amplitudes, for even and odd numbers."""
+    time, force = rattled()["time"].values[:last], rattled()["contact_normal_force"].values[:, :last]
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(last) / last)
+    _, amplitude = spectrum(time, force)
+    ends = amplitude[0, 0] ** 2 + (amplitude[0, -1] ** 2 if last % 2 == 0 else 0.0)
+    inner = np.sum(amplitude[0, 1 : -1 if last % 2 == 0 else None] ** 2) / 2
+    assert ends + inner == pytest.approx(last * np.sum((window * force[0]) ** 2) / np.sum(window) ** 2, rel=1e-12)
+    assert rattled()["contact_force_amplitude"].shape == (1, rattled().sizes["frequency"])
+
+
+def test_the_spectrum_as_table_and_figure() -> None:
+    table = {name: (unit, values(slice(None))) for name, unit, values in columns(rattled(), "spectrum")}
+    assert [unit for unit, _ in table.values()] == ["Hz", "N"]
+    assert table["frequency"][1][1] == pytest.approx(1 / (701 * 1e-6))
+    (axes,) = figure(rattled(), "spectrum").axes
+    assert axes.get_ylabel() == "amplitude [kN]"
+    assert "more --steps" not in axes.get_title()
+    coarse = trunnion.simulate(rattling(), duration=7e-4, steps=20)
+    assert "more --steps" in figure(coarse, "spectrum").axes[0].get_title()

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from trunnion.cli.model import lines_of, stated
+from trunnion.cli.model import exit_status, lines_of, placed, stated
 from trunnion.cli.options import (
     File,
     FrictionLaw,
@@ -20,7 +20,7 @@ from trunnion.cli.options import (
     seconds,
 )
 from trunnion.cli.result import Shown, check_files
-from trunnion.cli.terminal import bar
+from trunnion.cli.terminal import bar, say
 
 __all__ = ["simulate"]
 
@@ -45,16 +45,22 @@ def simulate(
             show_default=False,
         ),
     ] = None,
+    steady: Annotated[
+        bool,
+        typer.Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle."),
+    ] = False,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
     kind: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--kind",
-            help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit.",
+            help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
+            "spectrum; of a steady cycle those of `trunnion plot`.",
+            show_default=False,
         ),
-    ] = "sheet",
+    ] = None,
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,
@@ -65,8 +71,9 @@ def simulate(
     The motion of drivers that are free or have a motor, with friction, stick and slip, forces, energy and events.
     """
     from trunnion.dynamics.simulate import simulated
+    from trunnion.dynamics.steady_cycle import UnsteadyError
 
-    check_files(out or [], report, of="motion", kind=kind if out else None)
+    check_files(out or [], report, of="cycle" if steady else "motion", kind=kind if out else None)
     duration, step = seconds(time, "--time", "2s"), seconds(impact_step, "--impact-step", "1us")
     mechanism = stated(file, set_, table, friction)
     with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
@@ -75,5 +82,9 @@ def simulate(
             if progress:
                 progress(int(reached * MILLISECOND))
 
-        result = simulated(mechanism, duration, steps, tolerance, told, step)
+        try:
+            result = simulated(mechanism, duration, steps, tolerance, told, step, steady)
+        except UnsteadyError as none:
+            say(placed(none.findings, file, ["drivers"]))
+            raise typer.Exit(exit_status(none.findings)) from None
     Shown(result, file, ["drivers"], out or [], report, units_row, drawn={"kind": kind}, units=units).finish()

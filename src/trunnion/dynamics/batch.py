@@ -15,8 +15,8 @@ from trunnion.algebra.dual import primal
 from trunnion.dynamics.course import FIGURES, Courses
 from trunnion.dynamics.lanes import picked_drive
 from trunnion.dynamics.motor import Drive, drives
+from trunnion.dynamics.prepared import CYCLES, integration_of
 from trunnion.dynamics.sampled import picked, sampled_tables, tabulates
-from trunnion.dynamics.simulate import CYCLES, integration_of
 from trunnion.dynamics.start import initial_row, nominal_motion, places
 from trunnion.dynamics.starts import ENDED, LEFT, Starts
 from trunnion.dynamics.state import FreeMotion

@@ -13,11 +13,13 @@ from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.integrate import Event, Solution
 from trunnion.dynamics.motor import switched
+from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import WORKS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
+from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
+from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.steady import steady_figures
 from trunnion.dynamics.touching import SLOWEST
 from trunnion.errors import Finding
 from trunnion.joints.contact import restitution_of
@@ -32,7 +34,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOTION", "Books", "result_of"]
+__all__ = ["MOTION", "Books", "motion_findings", "result_of"]
 
 Array = NDArray[np.float64]
 
@@ -78,7 +80,7 @@ def result_of(
     residual, turned_over = _energy(books)
     turned_over = max(turned_over, _turned_over(motion, solution))
     findings = [
-        *_findings(motion, solution, run, impacts),
+        *motion_findings(motion, solution, run, impacts),
         *_unbalanced(books, residual, turned_over, solution.stepped),
     ]
     attributes = encoded(
@@ -101,14 +103,19 @@ def result_of(
     def build() -> xr.Dataset:
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
         found = described(books.arrays, known) | described(_own(motion, run, solution, books, residual), MOTION)
-        labels = dict(books.labels)
+        labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
+        coordinates = {"time": books.time}
         if stated is not None and books.touches is not None:
             labels["contact"] = list(motion.contacts.labels)
             found |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
                 impact_arrays(impacts), IMPACT
             )
-        time = described({"time": books.time}, {"time": Variable(("time",), "s", "time from the start")})
-        return dataset_of("motion", found, labels, attributes, time)
+            rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
+            if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
+                along["frequency"] = FREQUENCY
+                coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
+                found |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
+        return dataset_of("motion", found, labels, attributes, described(coordinates, along))
 
     return Result(attributes, build)
 
@@ -200,7 +207,10 @@ def _unbalanced(books: Books, residual: Array, turned_over: float, stepped: bool
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
-def _findings(motion: FreeMotion, solution: Solution, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
+def motion_findings(
+    motion: FreeMotion, solution: Solution, run: Run, impacts: Sequence[Impact] = ()
+) -> Iterator[Finding]:
+    """What is to be known of a motion: how it rests, locks or ends."""
     system = motion.system
     yield from (one for one in motion.run.chosen.findings if one.code != "assembly.change_point")
     centred = [one.joint for one in motion.run.seats]

@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.variables import fill_of
-from trunnion.cycle.written import fill_chunk
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
-from trunnion.dynamics.energy import kinetic_energy, potential_energy
+from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
-from trunnion.dynamics.integrate import INSIDE, Integration, Solution, Stretch
-from trunnion.dynamics.opened import Opened, in_play, is_rigid, opened
+from trunnion.dynamics.integrate import Integration, Solution
+from trunnion.dynamics.opened import in_play, is_rigid, opened
+from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
 from trunnion.dynamics.rates import Seeing, Walks
-from trunnion.dynamics.rest import Rest
-from trunnion.dynamics.result import Books, result_of
-from trunnion.dynamics.shown import Touches, as_stated
-from trunnion.dynamics.shown_space import JointsInSpace
-from trunnion.dynamics.start import Places, initial_row, load_times, places
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.result import result_of
+from trunnion.dynamics.start import initial_row, load_times, places
+from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
-from trunnion.dynamics.tables import tabulated
-from trunnion.dynamics.tabulated import TabulatedRates
-from trunnion.dynamics.touching import Onset
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.dynamics.steady import steady as steady_result
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
-from trunnion.results import variables as results
-from trunnion.solve.backward import Backward
-from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run, prepare
 
 if TYPE_CHECKING:
@@ -42,14 +32,11 @@ if TYPE_CHECKING:
 
     from trunnion.results.result import Result
 
-__all__ = ["CYCLES", "integration_of", "simulate", "simulated"]
+__all__ = ["simulate", "simulated"]
 
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
-TABLED = 1e-12  # as `integrate.INSIDE`, of tables, which know on which side they are asked
-FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
-CYCLES = 10  # of the nominal motion: the duration if none is stated
 
 
 @np.errstate(all="ignore")
@@ -60,18 +47,21 @@ def simulate(
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
     impact_step: float | None = None,
+    steady: bool = False,
 ) -> xr.Dataset:
     """Motion in time of a mechanism whose drivers are free: coordinates, forces, energy and events.
 
     duration: s, ten cycles of the stated motion if not given; steps: equal intervals at whose ends the result stands;
     tolerance: relative, of every step of the integration; progress: called with the time that is reached, s;
-    impact_step: s, of Moreau's time stepping of joints in play between rigid bodies, from event to event if not given.
-    Returns a Dataset with the names and units of `analyse` over `time`, with works, energies and events beside them.
+    impact_step: s, of Moreau's time stepping of joints in play between rigid bodies, from event to event if not given;
+    steady: instead of the motion from its start the cycle that it comes to repeat, see `dynamics.steady_cycle`.
+    Returns a Dataset with the names and units of `analyse` over `time`, with works, energies and events beside them; of
+    a steady cycle that of `analyse`, over as many positions as steps, equally spaced in time.
     Method: the free coordinates accelerate so that the effort the modules demand is what the motors give
     (`dynamics.state`); integrated from event to event (`dynamics.integrate`).
     Raises MechanismError if no driver is free, or if the motion cannot be found for what the joints are.
     """
-    return simulated(mechanism, duration, steps, tolerance, progress, impact_step).dataset
+    return simulated(mechanism, duration, steps, tolerance, progress, impact_step, steady).dataset
 
 
 @np.errstate(all="ignore")
@@ -82,6 +72,7 @@ def simulated(
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
     impact_step: float | None = None,
+    steady: bool = False,
 ) -> Result:
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
@@ -92,6 +83,8 @@ def simulated(
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance)
     _check_step(impact_step, duration, mechanism)
+    if steady:
+        return steady_result(mechanism, duration, steps, tolerance, progress)
     if playing:
         return _with_play(run, duration, steps, tolerance, progress, impact_step)
     motion = FreeMotion.of(run)
@@ -141,19 +134,6 @@ def _run(integration: Integration, row: Array) -> Solution:
         return integration.solution
 
 
-def integration_of(
-    motion: FreeMotion, known: Places, duration: float, tolerance: float,
-    progress: Callable[[float], None] | None = None,
-) -> Integration:  # fmt: skip
-    """What integrates a motion: from tables where it has them, else by walks."""
-    tables, walks = tabulated(motion, known), Walks(motion)
-    rates = (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
-    return Integration(
-        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
-        INSIDE if tables is None else TABLED, load_times(motion, duration),
-    )  # fmt: skip
-
-
 def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:
     """MechanismError for a start outside the range of the one free driver."""
     if not limits[0] <= row[0] <= limits[1]:
@@ -186,82 +166,3 @@ def _check_numbers(duration: float, steps: int, tolerance: float) -> None:
         found.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))
     if found:
         raise MechanismError(found)
-
-
-@dataclass(frozen=True)
-class Filling:
-    """The variables of a result at the times of its rows, from the state by walks, as `analyse` has them."""
-
-    motion: FreeMotion
-    solution: Solution
-    time: Array
-    stated: Opened | None = None
-
-    def books(self) -> Books:
-        """Every variable, over the rows up to where the motion ends; NaN after it."""
-        motion, system = self.motion, self.motion.system
-        fill = fill_of(system)
-        labels = fill.labels(system)
-        arrays = results.allocate(labels, len(self.time), fill.absent(system))
-        rows, which = self.solution.at(self.time)
-        layout = self.solution.layout
-        seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
-        touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(self.time))
-        joints = None
-        if self.stated is not None and system.mechanism.space == "spatial":
-            joints = JointsInSpace(self.stated, motion.contacts, len(self.time))
-        arrays["status"][...] = Status.NOT_CONVERGED
-        for lanes, stretch in self._alike(which):
-            at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
-            second, back, onsets = self._solved(at._replace(onsets=stretch.onsets), stretch)
-            seconds[:, lanes] = second
-            window = slice(int(lanes[0]), int(lanes[-1]) + 1)
-            fill_chunk(arrays, back, at.time, window)
-            energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
-            touched = motion.contacts.pushes(back.walk, onsets)
-            touches.fill(lanes, touched, onsets)
-            if joints is not None:
-                joints.fill(back, touched, window)
-        whole = layout.moment(self.time, rows)
-        for array in arrays.values():  # there is no motion any more
-            if array.flags.writeable and array.dtype == np.float64:
-                array[..., which < 0] = np.nan
-        fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
-        resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
-        if self.stated is not None:
-            if joints is not None:
-                joints.unwrap(self.time)
-            filled = None if joints is None else joints.arrays
-            arrays, labels = as_stated(self.stated.run, motion.contacts, touches, arrays, labels, filled)
-            energies = np.vstack([energies, touches.stored.sum(axis=0)])
-        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting, touches)
-
-    def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
-        """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
-        found: list[tuple[NDArray[np.intp], Stretch]] = []
-        stretches = self.solution.stretches
-
-        def key(k: int) -> object:
-            one = stretches[k]
-            return one.sense, one.resting, one.now, one.onsets, None if one.snapshot is None else id(one.snapshot)
-
-        begin = 0
-        for i in range(1, len(which) + 1):
-            same = i < len(which) and i - begin < CHUNK and which[i] >= 0 and key(which[i]) == key(which[begin])
-            if which[begin] >= 0 and not same:
-                found.append((np.arange(begin, i), stretches[which[begin]]))
-            if not same:
-                begin = i
-            if begin < len(which) and which[begin] < 0:
-                break
-        return found
-
-    def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
-        """Accelerations and the walk; at rest with the share of the friction that holds it."""
-        self.motion.begin(stretch.snapshot)
-        if not stretch.resting:
-            found = self.motion.accelerate(at)
-            return found.second, found.back, found.onsets
-        share = Rest(self.motion, self.solution.layout).shares(at)
-        zero = np.zeros_like(at.q)
-        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share)), ()

@@ -1,34 +1,90 @@
-"""What is said of a motion that goes round and round: how long it takes to start, and how evenly it then runs."""
+"""The steady cycle of a motion in time as a cycle: what `analyse` says, at the speed that the motors give."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+
 import numpy as np
 
-from trunnion.dynamics.course import STARTED, Courses
-from trunnion.dynamics.integrate import Solution
+from trunnion.cycle import summary
+from trunnion.cycle.positions import Positions, positions
+from trunnion.dynamics.course import Courses
+from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.repeated import Repeated, motion_law
 from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.steady_cycle import INDIFFERENT, SteadyCycle, refuse_unsteady, steady_cycle
+from trunnion.errors import Finding, Status
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
 from trunnion.results.figure import Figure
+from trunnion.results.result import Result
+from trunnion.results.sentences import finding_for
+from trunnion.solve.run import prepare
 
-__all__ = ["steady_figures"]
+__all__ = ["steady"]
+
+DIFFERS = 1e-3  # of the largest effort: a cycle that is not the one that was found
 
 
-def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
-    """Mean speed, starting time and coefficient of fluctuation of a free coordinate, see `course.FIGURES`.
+@np.errstate(all="ignore")
+def steady(
+    mechanism: Mechanism, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None = None
+) -> Result:
+    """The steady cycle of a mechanism as `analyse` gives a cycle: with the speed that varies as it was found.
 
-    None of a slide, of less than three turns, or where it does not run steadily.
+    Positions are equally spaced in time. Raises MechanismError where a cycle cannot be asked for, UnsteadyError where
+    there is none.
     """
-    name = motion.names[i]
-    if not motion.system.turns(name) or not solution.stretches:
-        return []
-    figures = {key: float(value[0]) for key, value in Courses.of_solution(motion, solution, i).figures().items()}
-    steady, started = figures["steady_speed"], figures["starting_time"]
-    if not np.isfinite(steady):
-        return []
-    start = Figure(f"{name}.starting_time", f"starting time of {name}", started, "s", f"to {STARTED:.0%} of that speed")
+    refuse_unsteady(mechanism)
+    motion = FreeMotion.of(prepare(mechanism))
+    found = steady_cycle(motion, duration, tolerance, progress)
+    each = Repeated.of(motion, found.solution)
+    moving = mechanism.with_motions({name: motion_law(one) for name, one in zip(motion.names, each, strict=True)})
+    run = prepare(moving)
+    at = positions(run, steps, engine="numpy")
+    cycle = summary.result_of(run, at)
+    missing = _missing(found, at)
+    findings = [*findings_of(cycle), *_findings(found, missing)]
+    attributes = encoded({
+        **cycle.attrs,
+        "findings": finding_rows(findings),
+        "summary": figure_rows([*_figures(found, each, missing), *summary_of(cycle)]),
+        "steady": 1,
+    })  # fmt: skip
+    return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))
+
+
+def _missing(found: SteadyCycle, at: Positions) -> float:
+    """By how much the efforts that the cycle takes differ from those of the motors, of the largest.
+
+    Where a joint is at rest for a moment its friction may act either way: such positions tell nothing.
+    """
+    given = Filling(found.motion, found.solution, at.time).books().arrays["drive_effort"]
+    told = at.arrays["status"] == Status.SOLVED
+    largest = float(np.max(np.abs(given)))
+    return float(np.nanmax(np.abs(at.arrays["drive_effort"] - given)[:, told], initial=0.0)) / max(largest, 1e-300)
+
+
+def _figures(found: SteadyCycle, each: Sequence[Repeated], missing: float) -> list[Figure]:
+    """What is said of a steady cycle before what is said of any cycle."""
+    name, one = found.motion.names[found.first], each[found.first]
+    course = Courses.of_solution(found.motion, found.solution, found.first)
+    speed, mean = course.numbers[2], abs(one.advance) / one.period
+    most, least = float(course.largest(np.abs(speed))[0]), -float(course.largest(-np.abs(speed))[0])
     return [
-        Figure(f"{name}.speed_mean", f"speed of {name}", steady, "rad/s", "mean of the last turn"),
-        *([start] if np.isfinite(started) else []),
-        Figure(
-            f"{name}.fluctuation", f"coefficient of fluctuation of {name}", figures["fluctuation"], "1", "last turn"
-        ),
+        Figure("cycle_time", "time of the cycle", one.period, "s"),
+        Figure(f"{name}.speed_mean", f"speed of {name}", mean, "rad/s", "mean"),
+        Figure(f"{name}.speed_max", f"speed of {name}", most, "rad/s", "largest"),
+        Figure(f"{name}.speed_min", f"speed of {name}", least, "rad/s", "smallest"),
+        Figure(f"{name}.fluctuation", f"coefficient of fluctuation of {name}", (most - least) / mean, "1"),
+        Figure("decay", "what is left of a difference after a cycle", found.factor, "1"),
+        Figure("repeats", "by how much the end misses the begin", found.residual, "1", "of the state"),
+        Figure("efforts_differ", "efforts of cycle and motors, difference", missing, "1", "of the largest"),
     ]
+
+
+def _findings(found: SteadyCycle, missing: float) -> Iterator[Finding]:
+    if found.factor > 1.0 + INDIFFERENT:
+        yield finding_for("simulate.unstable", f"drivers.{found.motion.names[found.first]}", factor=found.factor)
+    if not missing <= DIFFERS:
+        yield finding_for("simulate.cycle_differs", share=missing)

@@ -13,7 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MOTORS", "MotorKind", "constant", "induction", "linear", "speed_control", "table", "transmitted"]
+__all__ = [
+    "MOTORS",
+    "MotorKind",
+    "constant",
+    "control_at_rest",
+    "control_error",
+    "induction",
+    "linear",
+    "speed_control",
+    "table",
+    "transmitted",
+]
 
 Array = NDArray[np.float64]
 # What a motor states, by key, SI; `points` and the like are arrays.
@@ -85,24 +96,36 @@ def _wanted(speed: Array, parameters: Parameters, integral: Array) -> Array:
     return found
 
 
+# of the limit: by how much what is wanted may exceed it before the integral is held. At the limit itself it would be
+# held and let go in turn, endlessly often, where the speed rises as fast as the integral makes up for.
+BEYOND = 0.01
+
+
 def control_error(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
-    """Rate of the controller's integral: ω* − ω, and 0 while the limit holds and the error would drive it farther."""
-    error = parameters["target"] - speed
+    """Rate of the controller's integral: ω* − ω; less of it, down to 0, while what is wanted goes beyond the limit by
+    up to BEYOND of it and the error would drive it farther."""
+    error, limit = parameters["target"] - speed, parameters["limit"]
     wanted = _wanted(speed, parameters, integral)
-    held = (np.abs(wanted) >= parameters["limit"]) & (wanted * error > 0)
-    return np.where(held, 0.0, error)
+    left = np.clip(1.0 - (np.abs(wanted) / limit - 1.0) / BEYOND, 0.0, 1.0)
+    found: Array = np.where(wanted * error > 0, left * error, error)
+    return found
 
 
 def control_at_rest(since: Array, parameters: Parameters, integral: Array) -> Array:
-    """The controller's integral after a time at speed 0: it grows evenly up to where the limit holds it."""
+    """The controller's integral after a time at speed 0: it grows evenly up to where the limit begins to hold it, from
+    there by e^(−K_i |ω*| t/(BEYOND limit)) to where it is held."""
     error, gain = float(parameters["target"]), float(parameters["integral"])
-    found: Array = integral + error * since
     if gain == 0.0 or error == 0.0:
-        return found
-    most = (np.sign(error) * parameters["limit"] - parameters["proportional"] * error) / gain
-    pick, other = (np.minimum, np.maximum) if error > 0 else (np.maximum, np.minimum)
-    held: Array = pick(found, other(most, integral))
-    return held
+        grown: Array = integral + error * since
+        return grown
+    limit, sense = parameters["limit"], np.sign(error)
+    begin, end = ((sense * share * limit - parameters["proportional"] * error) / gain for share in (1.0, 1.0 + BEYOND))
+    after = np.maximum(since - np.maximum((begin - integral) / error, 0.0), 0.0)  # from where it begins to be held
+    here = np.where((integral - begin) * sense > 0.0, integral, begin)
+    held = end + (here - end) * np.exp(-gain * abs(error) / (BEYOND * limit) * after)
+    evenly = np.where(after > 0.0, held, integral + error * since)
+    found: Array = np.where((integral - end) * sense >= 0.0, integral, evenly)
+    return found
 
 
 MOTORS: dict[str, MotorKind] = {

@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.motion import MotionLaw
 from trunnion.model.assign import assign
 from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
@@ -380,6 +381,13 @@ class Mechanism(Numbers):
         for holder in (*data.get("joints", {}).values(), *data.get("loop", [])):
             holder.pop("seat", None)
         return Mechanism(**kept(self, {**data, "joint_defaults": {**data.get("joint_defaults", {}), "seat": seat}}))
+
+    def with_motions(self, laws: Mapping[str, MotionLaw]) -> Mechanism:
+        """The mechanism whose drivers move as they were found to, by driver; its file and its digest stay the same."""
+        drivers = {name: one.moving(laws[name]) if name in laws else one for name, one in self.drivers.items()}
+        found = self.model_copy(update={"drivers": drivers})
+        found.__dict__.pop("worked_out", None)
+        return found
 
     def plot(self) -> Figure:
         """The mechanism at its start as a matplotlib Figure, without loads and friction: bodies, joints, point curves.

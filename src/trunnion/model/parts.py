@@ -14,6 +14,7 @@ from pydantic import (
     Discriminator,
     Field,
     GetJsonSchemaHandler,
+    PrivateAttr,
     SerializerFunctionWrapHandler,
     Tag,
     model_serializer,
@@ -238,6 +239,7 @@ class Driver(Part):
     free: bool = False
     motor: Motor | None = None
     initial: Initial | None = None
+    _found_law: MotionLaw | None = PrivateAttr(None)
 
     @property
     def found(self) -> bool:
@@ -247,7 +249,13 @@ class Driver(Part):
     @property
     def motion(self) -> MotionLaw:
         """The law."""
-        return MOTION_LAWS[self.law]
+        return self._found_law or MOTION_LAWS[self.law]
+
+    def moving(self, law: MotionLaw) -> Driver:
+        """The driver as it was found to move, in place of the law that it states."""
+        found = self.model_copy()
+        found._found_law = law
+        return found
 
     @property
     def options(self) -> Mapping[str, bool | str]:

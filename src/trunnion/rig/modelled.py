@@ -74,6 +74,8 @@ def told_at(measure: Measure) -> str:
     """What a measure of the model states that no sensor follows; empty if it is of every position."""
     if measure.everywhere:
         return ""
+    if measure.in_time:
+        return ": it is of a motion in time; measured starts are fitted by trunnion.simulate and scipy.optimize"
     return f": the model gives it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
 
 

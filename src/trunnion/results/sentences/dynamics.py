@@ -43,6 +43,28 @@ DYNAMICS: dict[str, Sentence] = {
         "there are {count:.0f} events up to {time:~s}: the motion is not followed farther",
         "ask for a shorter time",
     ),
+    "simulate.not_round": Sentence(
+        ERROR,
+        "there is no steady cycle: {driver} makes {turns:.3g} turns in {time:~s} and does not go round at the end",
+        "look at the motion from its start, without --steady; give it more --time if it still starts",
+    ),
+    "simulate.not_repeating": Sentence(
+        ERROR,
+        "there is no steady cycle: the speed of {driver}, {speed:~rad/s} after {time:~s}, changes by {change:~rad/s} a "
+        "turn, and no speed is found that comes back",
+        "check that its losses grow with the speed or that its motor's effort falls; or give it more --time",
+    ),
+    "simulate.unstable": Sentence(
+        WARNING,
+        "the steady cycle is not stable: a difference from it grows by the factor {factor:.4g} with every cycle",
+        "look at the motion from its start, without --steady: it leaves this cycle",
+    ),
+    "simulate.cycle_differs": Sentence(
+        ERROR,
+        "the cycle takes efforts that differ from those of the motors by up to {share:.2g} of the largest: it is not "
+        "the motion that was found",
+        "look at the motion from its start, without --steady",
+    ),
     "simulate.stopped": Sentence(WARNING, "stopped at {time:~s}: the motion until then is kept"),
     "simulate.locks": Sentence(
         WARNING,

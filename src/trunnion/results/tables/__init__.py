@@ -33,7 +33,12 @@ _OF_TOLERANCES = {name: _whole(flat) for name, flat in tolerances.TABLES.items()
 # the kinds of results: of each its tables by name, the one that a file holds first if its name says nothing else
 KINDS: dict[str, Tables] = {
     "cycle": {"positions": cycle.positions},
-    "motion": {"times": motion.times, "events": _whole(motion.events), "impacts": _whole(motion.impacts)},
+    "motion": {
+        "times": motion.times,
+        "events": _whole(motion.events),
+        "impacts": _whole(motion.impacts),
+        "spectrum": _whole(motion.spectrum),
+    },
     "sweep": {"points": _whole(_swept)},
     "play": {"positions": studies.played},
     "assembly": {"positions": studies.fitted},

@@ -14,7 +14,7 @@ from trunnion.results.tables.column import Column, column
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["events", "impacts", "times"]
+__all__ = ["events", "impacts", "spectrum", "times"]
 
 CONTACT = ("contact_gap", "contact_normal_force", "contact_friction_force", "contact_slip", "contact_touching")
 IMPACT = (
@@ -51,6 +51,14 @@ def impacts(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:
     for name, unit in IMPACT:
         values = result[f"impact_{name}"].values if labels else np.empty(0)
         yield name, unit, values
+
+
+def spectrum(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:
+    """Amplitude of every contact force by frequency."""
+    known = "frequency" in result.dims
+    yield "frequency", "Hz", result["frequency"].values if known else np.empty(0)
+    for k, contact in enumerate(result["contact"].values if known else ()):
+        yield f"{contact}.contact_force_amplitude", "N", result["contact_force_amplitude"].values[k]
 
 
 def events(result: xr.Dataset) -> Iterator[tuple[str, str, Any]]:

@@ -423,6 +423,11 @@ def figure(
     return whole_figure if index is None or kind not in OVER_DRIVE else mark(whole_figure, result, index)
 
 
+def check_kind(kind: str) -> None:
+    """MechanismError if there is no such kind of figure."""
+    check_kinds([kind])
+
+
 def check_kinds(kinds: Sequence[str]) -> None:
     """MechanismError if there is no such kind of figure."""
     unknown = [name for name in kinds if name not in PLOTS]

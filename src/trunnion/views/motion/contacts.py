@@ -8,9 +8,9 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import prefixed
+from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import Abscissa, names
-from trunnion.views.common.figures import MUTED, PALETTE, along, curve, dress, new, style_of
+from trunnion.views.common.figures import MUTED, PALETTE, along, curve, dress, legend, new, style_of
 from trunnion.views.common.lettering import plain
 
 if TYPE_CHECKING:
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["OF_CONTACTS", "OF_IMPACTS", "forces", "gaps", "in_play", "orbit"]
+__all__ = ["OF_CONTACTS", "OF_IMPACTS", "forces", "gaps", "in_play", "orbit", "spectrum"]
 
-OF_CONTACTS = ("contacts", "gaps", "orbit")  # kinds of figures that need a joint in play
+OF_CONTACTS = ("contacts", "gaps", "orbit", "spectrum")  # kinds of figures that need a joint in play
 OF_IMPACTS = ("impact", "lift-off", "closes")  # events that figures do not mark
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
 MOST_SPOKES = 240  # forces drawn around a hole
+DEEPEST = 1e-4  # of the largest amplitude: the lowest that is drawn
+RESOLVED = 4.0  # rows in a contact whose force is resolved
 SIDE = 4.6  # of the figure of a hole, inches
 
 
@@ -39,6 +41,10 @@ def refuse(result: xr.Dataset, kind: str) -> None:
         raise MechanismError(Finding("no joint of this motion is in play", f"--kind {kind}", remedy))
     if kind == "orbit" and not _pins(result):
         raise MechanismError(Finding("no pin of this motion is in play", "--kind orbit", "use --kind gaps for guides"))
+
+    if kind == "spectrum" and "frequency" not in result.dims:
+        what = "no contact forces over time: bodies are rigid, or there are too few rows"
+        raise MechanismError(Finding(what, "--kind spectrum", "state a contact law, or give more --steps"))
 
 
 def forces(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
@@ -57,6 +63,35 @@ def gaps(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
     along(axes, over, f"gap [{label}]")
     for k, contact in enumerate(names(result, "contact")):
         curve(axes, over, values[k] * factor, contact, close=False, **style_of(k))
+
+
+def spectrum(result: xr.Dataset) -> Figure:
+    """Amplitude of the contact forces over frequency, both logarithmic."""
+    made = new("Spectrum of the contact forces", result, height=4.3)
+    axes, frequency = made.subplots(), result["frequency"].values[1:]
+    amplitude = result["contact_force_amplitude"].values[:, 1:]
+    largest = float(np.max(amplitude, initial=0.0))
+    factor, label = prefixed(largest, "N")
+    dress(axes, "frequency [Hz]", f"amplitude [{label}]")
+    for k, contact in enumerate(names(result, "contact")):
+        axes.plot(frequency, amplitude[k] * factor, label=plain(contact), linewidth=1.2, **style_of(k))
+    axes.set_xscale("log")
+    if largest > 0:
+        axes.set_yscale("log")
+        axes.set_ylim(DEEPEST * largest * factor, 2 * largest * factor)
+    axes.set_title(f"Hann's window, {quantity(float(frequency[0]), 'Hz')} apart{_aliased(result)}", fontsize=9,
+                   color=MUTED)  # fmt: skip
+    legend(axes)
+    return made
+
+
+def _aliased(result: xr.Dataset) -> str:
+    """A warning where contacts are shorter than a few rows."""
+    lasts, step = result["impact_end"].values - result["impact_begin"].values, float(np.diff(result["time"][:2])[0])
+    shortest = float(np.nanmin(lasts, initial=np.inf))
+    if shortest >= RESOLVED * step:
+        return ""
+    return f"; contacts last {quantity(shortest, 's')} and rows are {quantity(step, 's')} apart: give more --steps"
 
 
 def _pins(result: xr.Dataset) -> list[int]:

@@ -27,13 +27,13 @@ MOST_MARKED = 12  # events drawn; of more, marks would hide the curves
 
 
 def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
-    """One figure: of KINDS, or `sheet` with all over time."""
+    """One figure: of KINDS or OWN, or `sheet` with all over time."""
     check_kind(kind)
     if kind == "sheet":
         return sheet(result)
     contacts.refuse(result, kind)
-    if kind == "orbit":
-        return contacts.orbit(result)
+    if kind in OWN:
+        return OWN[kind](result)
     title, draw = KINDS[kind]
     made = new(title, result, height=4.3)
     _panel(made.subplots(), shown(result), draw)
@@ -42,15 +42,16 @@ def figure(result: xr.Dataset, kind: str = "sheet") -> Figure:
 
 def check_kind(kind: str) -> None:
     """MechanismError if there is no such kind of figure."""
-    if kind not in ("sheet", *KINDS):
-        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use sheet, {', '.join(KINDS)}"))
+    known = ("sheet", *KINDS, *OWN)
+    if kind not in known:
+        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use {', '.join(known)}"))
 
 
 def sheet(result: xr.Dataset) -> Figure:
     """Everything over time, one panel under the other."""
     motion = shown(result)
     idle = () if np.any(motion.rows["drive_effort"].values) else ("effort",)  # nothing drives it
-    left_out = ("phase", "orbit", *idle, *(() if contacts.in_play(result) else contacts.OF_CONTACTS))
+    left_out = ("phase", *idle, *(() if contacts.in_play(result) else contacts.OF_CONTACTS))
     over_time = {kind: one for kind, one in KINDS.items() if kind not in left_out}
     made = new("Motion in time", result, height=1.0 + PANEL * len(over_time))
     panels = made.subplots(len(over_time), 1, squeeze=False)[:, 0]
@@ -143,6 +144,7 @@ KINDS: dict[str, tuple[str, Callable[[Axes, Any, Abscissa], None]]] = {
     "energy": ("Energy account", _energy),
     "contacts": ("Contact forces", contacts.forces),
     "gaps": ("Gaps", contacts.gaps),
-    "orbit": ("Pin in its hole", contacts.forces),
     "phase": ("Speed over coordinate", _phase),
 }
+# kinds of figures with axes of their own
+OWN: dict[str, Callable[[Any], Figure]] = {"orbit": contacts.orbit, "spectrum": contacts.spectrum}

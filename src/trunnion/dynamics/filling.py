@@ -1,0 +1,107 @@
+"""The variables of a motion in time at the times of its rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.cycle.variables import fill_of
+from trunnion.cycle.written import fill_chunk
+from trunnion.dynamics.energy import kinetic_energy, potential_energy
+from trunnion.dynamics.integrate import Solution, Stretch
+from trunnion.dynamics.opened import Opened
+from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.result import Books
+from trunnion.dynamics.shown import Touches, as_stated
+from trunnion.dynamics.shown_space import JointsInSpace
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Onset
+from trunnion.errors import Status
+from trunnion.results import variables as results
+from trunnion.solve.backward import Backward
+from trunnion.solve.memory import CHUNK
+
+__all__ = ["Filling"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Filling:
+    """The variables of a result at the times of its rows, from the state by walks, as `analyse` has them."""
+
+    motion: FreeMotion
+    solution: Solution
+    time: Array
+    stated: Opened | None = None
+
+    def books(self) -> Books:
+        """Every variable, over the rows up to where the motion ends; NaN after it."""
+        motion, system = self.motion, self.motion.system
+        fill = fill_of(system)
+        labels = fill.labels(system)
+        arrays = results.allocate(labels, len(self.time), fill.absent(system))
+        rows, which = self.solution.at(self.time)
+        layout = self.solution.layout
+        seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
+        touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(self.time))
+        joints = None
+        if self.stated is not None and system.mechanism.space == "spatial":
+            joints = JointsInSpace(self.stated, motion.contacts, len(self.time))
+        arrays["status"][...] = Status.NOT_CONVERGED
+        for lanes, stretch in self._alike(which):
+            at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
+            second, back, onsets = self._solved(at._replace(onsets=stretch.onsets), stretch)
+            seconds[:, lanes] = second
+            window = slice(int(lanes[0]), int(lanes[-1]) + 1)
+            fill_chunk(arrays, back, at.time, window)
+            energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
+            touched = motion.contacts.pushes(back.walk, onsets)
+            touches.fill(lanes, touched, onsets)
+            if joints is not None:
+                joints.fill(back, touched, window)
+        whole = layout.moment(self.time, rows)
+        for array in arrays.values():  # there is no motion any more
+            if array.flags.writeable and array.dtype == np.float64:
+                array[..., which < 0] = np.nan
+        fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
+        resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
+        if self.stated is not None:
+            if joints is not None:
+                joints.unwrap(self.time)
+            filled = None if joints is None else joints.arrays
+            arrays, labels = as_stated(self.stated.run, motion.contacts, touches, arrays, labels, filled)
+            energies = np.vstack([energies, touches.stored.sum(axis=0)])
+        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting, touches)
+
+    def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
+        """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
+        found: list[tuple[NDArray[np.intp], Stretch]] = []
+        stretches = self.solution.stretches
+
+        def key(k: int) -> object:
+            one = stretches[k]
+            return one.sense, one.resting, one.now, one.onsets, None if one.snapshot is None else id(one.snapshot)
+
+        begin = 0
+        for i in range(1, len(which) + 1):
+            same = i < len(which) and i - begin < CHUNK and which[i] >= 0 and key(which[i]) == key(which[begin])
+            if which[begin] >= 0 and not same:
+                found.append((np.arange(begin, i), stretches[which[begin]]))
+            if not same:
+                begin = i
+            if begin < len(which) and which[begin] < 0:
+                break
+        return found
+
+    def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
+        """Accelerations and the walk; at rest with the share of the friction that holds it."""
+        self.motion.begin(stretch.snapshot)
+        if not stretch.resting:
+            found = self.motion.accelerate(at)
+            return found.second, found.back, found.onsets
+        share = Rest(self.motion, self.solution.layout).shares(at)
+        zero = np.zeros_like(at.q)
+        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share)), ()

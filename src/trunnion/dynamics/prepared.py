@@ -1,0 +1,37 @@
+"""What integrates a free motion without play: how its rates are told, and where it stops for a force that jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from trunnion.dynamics.compiled_rates import compiled_rates
+from trunnion.dynamics.integrate import INSIDE, Integration
+from trunnion.dynamics.rates import Dynamics, Walks
+from trunnion.dynamics.start import Places, load_times
+from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.tables import tabulated
+from trunnion.dynamics.tabulated import TabulatedRates
+
+__all__ = ["CYCLES", "FINEST", "integration_of", "rates_of"]
+
+TABLED = 1e-12  # as `integrate.INSIDE`, of tables, which know on which side they are asked
+FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
+CYCLES = 10  # of the nominal motion: the duration if none is stated
+
+
+def rates_of(motion: FreeMotion, known: Places) -> Dynamics:
+    """The rates of a motion: from tables where it has them, else by walks."""
+    tables, walks = tabulated(motion, known), Walks(motion)
+    return (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
+
+
+def integration_of(
+    motion: FreeMotion, known: Places, duration: float, tolerance: float,
+    progress: Callable[[float], None] | None = None, rates: Dynamics | None = None,
+) -> Integration:  # fmt: skip
+    """What integrates a motion. rates: those of `rates_of`, if they are there."""
+    rates = rates or rates_of(motion, known)
+    return Integration(
+        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
+        TABLED if isinstance(rates, TabulatedRates) else INSIDE, load_times(motion, duration),
+    )  # fmt: skip

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from timed import LINEAR, slider_crank, wheel
-from trunnion.dynamics import batch, lanes
+from trunnion.dynamics import batch, lanes, starts
 from trunnion.dynamics.batch import figures_in_time, together
+from trunnion.dynamics.compiled_lanes import CompiledLanes
 from trunnion.dynamics.course import FIGURES, Courses
 from trunnion.dynamics.lanes import picked_drive
 from trunnion.dynamics.rates import Layout, Rates, Walks
@@ -93,6 +94,26 @@ def test_the_flywheel_of_the_theory() -> None:
     values = dict(mechanism.parameters({"links.wheel.inertia": np.array([[0.04], [0.05], [0.06]])}))
     course, _ = courses_of(prepare(mechanism), values, 3, 1.0, 1e-12)
     assert course.numbers[2, 1, -1, -1] == pytest.approx(52.70260701247094, rel=1e-11)
+
+
+def test_machine_code_and_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same motion of every lane, also without machine code, and where it leaves all lanes to NumPy."""
+    pytest.importorskip("llvmlite")
+    run = prepare(slider_crank(drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS["geared"]}}))
+    values, asked = spread(run.system.mechanism, 7, links__crank__inertia=0.1), []
+
+    def ends() -> Any:
+        return courses_of(run, values, 7, 0.1, 1e-10)[0].numbers[1:3, :, -1, -1]
+
+    code = CompiledLanes._run
+    monkeypatch.setattr(CompiledLanes, "_run", lambda self, lanes: asked.append(code(self, lanes)))
+    found = ends()
+    assert len(asked) > 100
+    monkeypatch.setattr(starts, "compiled_lanes", lambda pins, lanes: None)
+    np.testing.assert_allclose(found, ends(), rtol=1e-10)
+    monkeypatch.undo()
+    monkeypatch.setattr(CompiledLanes, "_run", lambda self, lanes: self.found.fill(np.nan))
+    np.testing.assert_allclose(found, ends(), rtol=1e-10)
 
 
 @pytest.mark.slow

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.closed import rates_of
 from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact
 from trunnion.dynamics.impact_law import OPEN, Struck
 from trunnion.dynamics.impact_steps import SteppedMotion
+from trunnion.dynamics.rates import Seen
 from trunnion.dynamics.state import Accelerated
-from trunnion.dynamics.touching import Closed, ContactState, Onset, Push
+from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ImpactMotion"]
 
@@ -65,12 +65,11 @@ class ImpactMotion(SteppedMotion):
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
-    def _pushes(self, dense: Dense, times: Array) -> list[tuple[ContactState, Push]]:
-        """The forces of the contacts at times of a step."""
+    def _touches(self, dense: Dense, times: Array) -> Seen:
+        """The contacts with their forces at times of a step."""
         at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
-            found = self.motion.accelerate(at)
-            return self.motion.contacts.pushes(found.back.walk, found.onsets)
+            return self.closed_rates.touches(at)
 
     def _gaps(self, dense: Dense, times: Array) -> Array:
         """What stays above 0 within a step, (2 contacts, time): gap or normal force, and slip or what friction has left
@@ -79,11 +78,12 @@ class ImpactMotion(SteppedMotion):
         if not any(self.onsets):
             found[: self.count] = self._look(dense, times).gap
             return found
-        for k, (onset, (state, push)) in enumerate(zip(self.onsets, self._pushes(dense, times), strict=True)):
-            found[k] = push.normal if onset else state.gap
+        seen = self._touches(dense, times)
+        for k, onset in enumerate(self.onsets):
+            found[k] = seen.normal[k] if onset else seen.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
-                left = self.friction[k] * push.normal - np.abs(push.friction)
-                found[self.count + k] = onset.sense * state.slip if onset.sense else left
+                left = self.friction[k] * seen.normal[k] - np.abs(seen.friction[k])
+                found[self.count + k] = onset.sense * seen.slip[k] if onset.sense else left
         return found
 
     def _measured(self, dense: Dense, times: Array, begin: float) -> None:
@@ -91,12 +91,11 @@ class ImpactMotion(SteppedMotion):
         if not self._open:
             return
         times = np.append(begin, times)
-        pushes = self._pushes(dense, times)
+        seen = self._touches(dense, times)
         for k, one in self._open.items():
-            state, push = pushes[k]
-            one.force = np.fmax(one.force, float(np.max(push.normal)))
-            one.impulse += float(np.trapezoid(push.normal, times))
-            one.wear += float(np.trapezoid(np.abs(push.normal * state.slip), times))
+            one.force = np.fmax(one.force, float(np.max(seen.normal[k])))
+            one.impulse += float(np.trapezoid(seen.normal[k], times))
+            one.wear += float(np.trapezoid(np.abs(seen.normal[k] * seen.slip[k]), times))
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
@@ -115,8 +114,8 @@ class ImpactMotion(SteppedMotion):
             self._project(time, row)
             self._settle(time, row)
         else:
-            friction = self._pushes(lambda times: row[:, None], np.array([time]))[k][1].friction
-            self._set(dict.fromkeys(together, Closed(-int(np.sign(friction[0])))))
+            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[k, 0]
+            self._set(dict.fromkeys(together, Closed(-int(np.sign(friction)))))
         return np.inf
 
     def _closed(self) -> list[int]:
@@ -134,10 +133,9 @@ class ImpactMotion(SteppedMotion):
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
         at = self.moment(time, row, 0.0, 0.0)
-        linear, states = self.rigid.linear(at), self._states_at(at)
-        rates = rates_of(states)[:, 0]
-        gaps = np.array([float(np.ravel(one.gap)[0]) for one in states])
-        meet = (gaps <= self.meet) & (rates[: self.count] < 0.0)
+        linear = self.closed_rates.linear(at)
+        rates = linear.driven + linear.ways @ at.rate[:, 0]
+        meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
         found, pauses = self._law(linear, places, rates, self.restitution), dict[int, float]()
         if found is not None:
@@ -270,13 +268,10 @@ class ImpactMotion(SteppedMotion):
         n, closed = self.layout.coordinates, self._closed()
         at = self.moment(time, row, 0.0, 0.0)
         for _ in range(2):
-            linear, gaps = (
-                self.rigid.linear(at),
-                np.array([float(np.ravel(self._states_at(at)[k].gap)[0]) for k in closed]),
-            )
-            row[:n] -= _nearest(linear.mass, linear.ways[closed], gaps)
+            linear = self.closed_rates.linear(at)
+            row[:n] -= _nearest(linear.mass, linear.ways[closed], linear.gaps[closed])
             at = self.moment(time, row, 0.0, 0.0)
-        linear = self.rigid.linear(at)
+        linear = self.closed_rates.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
         row[n : 2 * n] -= _nearest(linear.mass, ways, rates[[*closed, *sticks]])

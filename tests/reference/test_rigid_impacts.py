@@ -216,11 +216,11 @@ def test_a_pin_closes_in_its_hole_and_the_account_is_right() -> None:
     assert balanced(result)
 
 
-def trammel() -> Mechanism:
+def trammel(clearance: float = 2e-4, friction: float = 0.05) -> Mechanism:
     """A rod whose ends slide in guides at right angles, both in play; nothing else connects it with the ground."""
     points = {"H": {"at": [0, 0], "axis": [1, 0]}, "V": {"at": [0, 0], "axis": [0, 1]}}
-    guide_ = {"guide": {"length": 0.06, "height": 0.03, "clearance": 2e-4}, "contact": RIGID, "friction": 0.05}
-    slider = {"mass": 0.5, "inertia": 2e-4}
+    guide_ = {"guide": {"length": 0.06, "height": 0.03, "clearance": clearance}, "contact": RIGID}
+    guide_["friction"], slider = friction, {"mass": 0.5, "inertia": 2e-4}
     return Mechanism(
         gravity=[0, -9.81],
         links={
@@ -276,6 +276,15 @@ def test_a_rod_in_two_guides_keeps_its_account() -> None:
     }
     assert balanced(found)
     assert attribute(found, "findings") == []
+
+
+@pytest.mark.slow
+def test_impacts_that_accumulate_on_two_guides_at_once_come_to_rest() -> None:
+    """A contact that another lets go lower than rounding stays closed, and one that is a rounding below its wall as the
+    other strikes does not strike again."""
+    found = simulate(trammel(2e-5, 0.1), 0.3, 30)
+    assert codes(found) == []
+    assert balanced(found)
 
 
 @pytest.mark.slow

@@ -163,20 +163,22 @@ class ImpactMotion(SteppedMotion):
     def _flights(
         self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, change: Array
     ) -> dict[int, tuple[float, bool]]:
-        """Of every place that rebounds and comes back: the time until it does, s; where it rebounds so low that the
-        impacts accumulate, that until they have."""
+        """Of every place that rebounds and comes back: the time until it does, s; where it goes so low, rebounding or
+        let go, that this is none, that until its impacts have accumulated."""
         n, after, found = self.layout.coordinates, row.copy(), dict[int, tuple[float, bool]]()
         after[n : 2 * n] += change
         rebounds = [i for i, k in enumerate(places) if struck.cases[i] is not OPEN and before[k] < 0.0]
-        free = [k for i, k in enumerate(places) if i in rebounds or struck.cases[i] is OPEN]
+        closed = [k for i, k in enumerate(places) if struck.cases[i] is not OPEN and self.onsets[k] is not None]
+        free = [k for k in places if k not in closed]
         onsets = tuple(None if k in free else onset for k, onset in enumerate(self.onsets))
         walk = self.motion.accelerate(self.moment(time, after, 0.0, 0.0)._replace(onsets=onsets)).back.walk
-        for i in rebounds:
-            k, speed = places[i], float(struck.after[i])
+        for i, k in enumerate(places):
+            speed, e = max(float(struck.after[i]), 0.0), float(self.restitution[k])
             pull = -float(np.ravel(self.motion.contacts.each[k].accelerations(walk)[0])[0])
-            if pull > 0.0 and speed > 0.0 and self.restitution[k] > 0.0:
-                low, e = 0.5 * speed * speed / pull < self.low[k], self.restitution[k]
-                found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
+            if pull > 0.0 and e > 0.0 and k in free:
+                low = 0.5 * speed * speed / pull < self.low[k]
+                if low or i in rebounds:
+                    found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
         return found
 
     def _after(
@@ -188,21 +190,23 @@ class ImpactMotion(SteppedMotion):
             case, normal = struck.cases[i], float(struck.impulse[i])
             slips = abs(before[self.count + k]), abs(struck.after[len(places) + i])
             approach, wear = max(-float(before[k]), 0.0), 0.5 * normal * float(sum(slips))
-            if case is not OPEN and (k in pauses or self.onsets[k] is not None or self.restitution[k] == 0.0):
+            keeps = case is not OPEN and (self.onsets[k] is not None or self.restitution[k] == 0.0)
+            if keeps or k in pauses:
                 still = self.friction[k] > 0.0 and slips[1] <= STILL * max(slips[0], approach)
-                closed[k] = Closed(0 if still else case or 1)
+                sense = int(np.sign(struck.after[len(places) + i])) if case is OPEN else case
+                closed[k] = Closed(0 if still else sense or 1)
             if self.onsets[k] is not None:
                 self._open[k].impulse += normal
                 self._open[k].wear += wear
-                if case is OPEN:
+                if k not in closed:
                     self._end(k, time, float(struck.after[i]))
             elif case is not OPEN:
                 label, rate = self.motion.contacts.labels[k], float(struck.after[i])
                 self.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
+        self._project(time, row, places)
         if closed:
-            self._project(time, row)
             self._settle(time, row, pauses)
 
     # ---- closed -----------------------------------------------------------------------------------------------
@@ -263,14 +267,20 @@ class ImpactMotion(SteppedMotion):
                 return False
         return True
 
-    def _project(self, time: float, row: Array) -> None:
-        """Take the gaps of closed contacts, and their rates, to 0: the nearest state in the sense of the masses."""
+    def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
+        """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
+        the nearest state in the sense of the masses."""
         n, closed = self.layout.coordinates, self._closed()
         at = self.moment(time, row, 0.0, 0.0)
         for _ in range(2):
             linear = self.closed_rates.linear(at)
-            row[:n] -= _nearest(linear.mass, linear.ways[closed], linear.gaps[closed])
+            shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
+            if not shut:
+                return
+            row[:n] -= _nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
             at = self.moment(time, row, 0.0, 0.0)
+        if not closed:
+            return
         linear = self.closed_rates.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]

@@ -117,6 +117,13 @@ def test_a_range_ends_the_motion() -> None:
     assert np.isnan(result["drive_rate"].values[0, -1])
 
 
+def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it() -> None:
+    motor = {"kind": "constant", "effort": 3.0}
+    driver = {"free": True, "speed": 5, "range": [0.3, 1.0], "initial": {"coordinate": 1.0, "speed": 0}, "motor": motor}
+    result = simulate(slider_crank(0.0, drivers={"O": driver}), 0.5, 10)
+    assert [one.code for one in result.trunnion.findings] == ["simulate.range"]
+
+
 def rocker(friction: float) -> Mechanism:
     """A crank-rocker driven at its rocker, which turns round at cos φ = −0.78125, coupler and crank in line."""
     ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}

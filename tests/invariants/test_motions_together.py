@@ -11,8 +11,9 @@ import pytest
 from timed import LINEAR, slider_crank, wheel
 from trunnion.dynamics import batch, lanes
 from trunnion.dynamics.batch import figures_in_time, together
+from trunnion.dynamics.compiled_lanes import CompiledLanes, compiled_lanes
 from trunnion.dynamics.course import FIGURES, Courses
-from trunnion.dynamics.lanes import picked_drive
+from trunnion.dynamics.lanes import LaneState, picked_drive
 from trunnion.dynamics.rates import Layout, Rates, Walks
 from trunnion.dynamics.sampled import picked, sampled_tables, tabulates
 from trunnion.dynamics.start import places
@@ -93,6 +94,32 @@ def test_the_flywheel_of_the_theory() -> None:
     values = dict(mechanism.parameters({"links.wheel.inertia": np.array([[0.04], [0.05], [0.06]])}))
     course, _ = courses_of(prepare(mechanism), values, 3, 1.0, 1e-12)
     assert course.numbers[2, 1, -1, -1] == pytest.approx(52.70260701247094, rel=1e-11)
+
+
+def test_machine_code_and_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same accelerations and friction forces of every lane, also where it leaves all lanes to NumPy."""
+    pytest.importorskip("llvmlite")
+    run, count = prepare(slider_crank(drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS["geared"]}})), 37
+    values, motion = spread(run.system.mechanism, count, links__crank__inertia=0.1), FreeMotion.of(run)
+    nominal, own = tabulates(motion, places(motion)), batch._drive(motion, values)
+    assert nominal is not None
+    assert own is not None
+    (tables,) = sampled_tables(nominal, values, count)
+    draw, rows, no = np.random.default_rng(1), tables.samples, np.zeros(count, bool)
+    turn = draw.uniform(0.0, 2 * np.pi, count)
+    stretch, speed = np.sum(tables.low <= turn[:, None], axis=1) - 1, draw.uniform(-150.0, 150.0, count)
+    at = LaneState(0.0 * turn, turn, speed, 0.0 * turn, np.maximum(stretch, 0), 0.0 * turn, 0.0 * turn, no, no)
+    code = compiled_lanes([rub.load.across is None for rub in tables.rubs], count)
+    assert code is not None
+    found = []
+    for compiled in (None, code, code):
+        one = lanes.Lanes(tables, rows, picked_drive(own, rows), np.zeros((count, len(tables.rubs))), compiled)
+        found.append([one.rates(at)[0], one.friction])
+        if compiled is not None:
+            monkeypatch.setattr(CompiledLanes, "_run", lambda self, lanes: self.found.fill(np.nan))
+    for name, here, machine, left in zip(("second", "friction"), *found, strict=True):
+        np.testing.assert_allclose(machine, here, rtol=1e-11, atol=1e-11 * np.abs(here).max(), err_msg=name)
+        np.testing.assert_array_equal(left, here, err_msg=name)
 
 
 @pytest.mark.slow

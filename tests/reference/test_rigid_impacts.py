@@ -12,11 +12,13 @@ from typer.testing import CliRunner
 import trunnion.dynamics.impact_motion as impact_motion
 from trunnion import simulate
 from trunnion.cli.app import app
-from trunnion.dynamics.closed import ClosedMotion, rates_of
+from trunnion.dynamics.closed import ClosedMotion, ClosedRates, rates_of
+from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.opened import opened
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.stated_contacts import contacts_of
+from trunnion.dynamics.touching import Closed
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
@@ -213,6 +215,77 @@ def test_a_pin_closes_in_its_hole_and_the_account_is_right() -> None:
     radius = np.hypot(*result["contact_offset"].values[0])
     assert radius[closed] == pytest.approx(0.5e-3, rel=1e-12)
     assert balanced(result)
+
+
+def trammel(clearance: float = 2e-4, friction: float = 0.05) -> Mechanism:
+    """A rod whose ends slide in guides at right angles, both in play; nothing else connects it with the ground."""
+    points = {"H": {"at": [0, 0], "axis": [1, 0]}, "V": {"at": [0, 0], "axis": [0, 1]}}
+    guide_ = {"guide": {"length": 0.06, "height": 0.03, "clearance": clearance}, "contact": RIGID}
+    guide_["friction"], slider = friction, {"mass": 0.5, "inertia": 2e-4}
+    return Mechanism(
+        gravity=[0, -9.81],
+        links={
+            "frame": {"points": points},
+            "h": {"points": {"H": points["H"], "A": [0, 0]}, **slider},
+            "v": {"points": {"V": points["V"], "B": [0, 0]}, **slider},
+            "rod": {"points": {"A": [0, 0], "B": [0.2, 0]}, "mass": 0.3, "centre": [0.1, 0], "inertia": 1e-3},
+        },
+        ground="frame",
+        joints={
+            "H": {"type": "prismatic", "links": ["frame", "h"], **guide_},
+            "V": {"type": "prismatic", "links": ["frame", "v"], **guide_},
+            "A": {"type": "revolute", "links": ["h", "rod"]},
+            "B": {"type": "revolute", "links": ["v", "rod"]},
+        },
+        drivers={"A": {"free": True, "range": ["120 deg", "179 deg"], "speed": 1}},
+        assembly={"B": [0, 0.1732]},
+    )
+
+
+def test_machine_code_of_closed_contacts_and_walks() -> None:
+    """Rates, works, forces of contacts and what impulses come to, for contacts that fly, slip and stick."""
+    pytest.importorskip("llvmlite")
+    mechanism = trammel()
+    run = prepare(mechanism)
+    motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, ["H", "V"]))
+    swift, layout = compiled_closed(motion), Layout.of(motion)
+    assert swift is not None
+    fast, slow = ClosedRates(motion, swift), ClosedRates(motion, None)
+    row = initial_row(motion)
+    row[layout.coordinates : 2 * layout.coordinates] = [0.3, -0.2, 0.5, 2.0, -1.0]
+    fly: Any = (None,) * 8
+    sets: list[dict[int, Closed]] = [{2: Closed(1), 3: Closed(-1)}, {2: Closed(0), 3: Closed(0), 4: Closed(-1)}]
+    for closed in ({}, *sets):
+        onsets = tuple(closed.get(k, fly[k]) for k in range(8))
+        found, expected = fast.derivative(0.0, row, onsets, 0.0), slow.derivative(0.0, row, onsets, 0.0)
+        assert found == pytest.approx(expected, rel=1e-10, abs=1e-9)
+        at = layout.moment(np.zeros(2), np.column_stack([row, row]))._replace(onsets=onsets)
+        if closed:
+            assert swift.touches(at) is not None
+            for here, there in zip(fast.touches(at), slow.touches(at), strict=True):
+                np.testing.assert_allclose(here, there, rtol=1e-10, atol=1e-10)
+    one = layout.moment(np.zeros(1), row[:, None])._replace(onsets=fly)
+    for here, there in zip(fast.linear(one), slow.linear(one), strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-9, atol=1e-9)
+
+
+def test_a_rod_in_two_guides_keeps_its_account() -> None:
+    """A loose link with a joint at its mass centre, and contacts that close on both guides."""
+    found = simulate(trammel(), 0.03, 30)
+    assert {"H.3", "H.4", "V.1", "V.2"} <= {
+        label for label in found["contact"].values if len(events(found, "closes", label))
+    }
+    assert balanced(found)
+    assert attribute(found, "findings") == []
+
+
+@pytest.mark.slow
+def test_impacts_that_accumulate_on_two_guides_at_once_come_to_rest() -> None:
+    """A contact that another lets go lower than rounding stays closed, and one that is a rounding below its wall as the
+    other strikes does not strike again."""
+    found = simulate(trammel(2e-5, 0.1), 0.3, 30)
+    assert codes(found) == []
+    assert balanced(found)
 
 
 @pytest.mark.slow

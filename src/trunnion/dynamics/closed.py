@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.rates import Layout, Rates, Seeing, Seen, Walks
+from trunnion.dynamics.rates import Layout, Rates, Seeing, Seen, Walks, seen_of
 from trunnion.dynamics.state import (
     CLOSE,
     DIFFERENCE,
@@ -34,11 +34,13 @@ Array = NDArray[np.float64]
 
 class Linear(NamedTuple):
     """At one moment: masses M (coordinate, coordinate), how rates of gaps and slips follow from those of the
-    coordinates, W (2 contacts, coordinate), gaps first, and what they are without, (2 contacts,), m/s."""
+    coordinates, W (2 contacts, coordinate), gaps first, what they are without, (2 contacts,), m/s, and the gaps, m,
+    (contact,)."""
 
     mass: Array
     ways: Array
     driven: Array
+    gaps: Array
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,10 @@ class ClosedMotion(FreeMotion):
 
     def accelerate(self, at: Moment, guess: Array | None = None) -> Accelerated:
         """Accelerations with the forces of the closed contacts; NaN where there are none."""
-        closed = [k for k in range(len(at.onsets)) if _sense(at, k) is not None]
+        closed, sticks = self.closed(at)
         if not closed:
             return super().accelerate(at, guess)
         count, lanes = at.q.shape
-        sticks = list({self.contacts.each[k].surface: k for k in reversed(closed) if _sense(at, k) == 0}.values())
         size = count + len(closed) + len(sticks)
         unit = np.concatenate([self.unit, np.full(size - count, self.force)])
         numbers, turned = np.zeros((size, lanes)), np.zeros(lanes, bool)
@@ -89,29 +90,46 @@ class ClosedMotion(FreeMotion):
             np.isfinite(numbers) & (np.abs(step) <= 1e-8 * np.maximum(np.abs(numbers), unit[:, None])), axis=0
         )
         second, onsets = self._unpacked(at, numbers, closed, sticks)
-        onsets = self._shared(onsets, sticks)
+        onsets = self.shared(onsets, sticks)
         return Accelerated(second, self.solve(at._replace(onsets=onsets), second), turned, converged, onsets)
+
+    def closed(self, at: Moment) -> tuple[list[int], list[int]]:
+        """The closed contacts whose forces are to be found, and those that stick: on every wall the first."""
+        closed = [k for k in range(len(at.onsets)) if _sense(at, k) is not None]
+        still = {self.contacts.each[k].surface: k for k in reversed(closed) if _sticks(at.onsets[k])}
+        return closed, list(still.values())
 
     def _unpacked(
         self, at: Moment, numbers: Array, closed: Sequence[int], sticks: Sequence[int]
     ) -> tuple[Array, tuple[Onset, ...]]:
         """Accelerations, and the contacts with their forces."""
-        count, onsets = len(self.names), list(at.onsets)
-        for row, k in enumerate(closed, count):
-            onset = onsets[k]
+        count = len(self.names)
+        return numbers[:count], self.forced(at.onsets, numbers[count:], closed, sticks)
+
+    def forced(
+        self, onsets: Sequence[Onset], forces: Sequence[Any] | Array, closed: Sequence[int], sticks: Sequence[int]
+    ) -> tuple[Onset, ...]:
+        """The contacts with their forces: normal ones, then along the tangent of those that stick."""
+        found = list(onsets)
+        for row, k in enumerate(closed):
+            onset = found[k]
             assert isinstance(onset, Closed)
             if k in sticks:
-                friction = numbers[count + len(closed) + sticks.index(k)]
-            else:  # of those that stick on one wall the first is given all
-                friction = -self.contacts.each[k].coefficient * (onset.sense or 0) * numbers[row]
-            onsets[k] = Closed(onset.sense, numbers[row], friction)
-        return numbers[:count], tuple(onsets)
+                friction = forces[len(closed) + sticks.index(k)]
+            elif _sticks(onset):  # of those that stick on one wall the first is given all
+                friction = 0.0 * forces[row]
+            else:
+                friction = (
+                    -self.contacts.each[k].coefficient * forces[row] * (1 if onset.sense is None else onset.sense)
+                )
+            found[k] = Closed(onset.sense, forces[row], friction)
+        return tuple(found)
 
-    def _shared(self, onsets: Sequence[Onset], sticks: Sequence[int]) -> tuple[Onset, ...]:
+    def shared(self, onsets: Sequence[Onset], sticks: Sequence[int]) -> tuple[Onset, ...]:
         """What holds on one wall, shared out by the normal forces."""
         found = list(onsets)
         for first in sticks:
-            on = [k for k, one in enumerate(onsets) if isinstance(one, Closed) and one.sense == 0
+            on = [k for k, one in enumerate(onsets) if _sticks(one)
                   and self.contacts.each[k].surface == self.contacts.each[first].surface]  # fmt: skip
             forces = {k: onsets[k] for k in on}
             whole = sum(one.normal for one in forces.values() if isinstance(one, Closed))
@@ -150,8 +168,14 @@ class ClosedMotion(FreeMotion):
             time=np.tile(at.time, count + 1), q=q, rate=np.eye(count, count + 1, 1), integral=integral,
             bristles=bristles,
         )  # fmt: skip
-        found = rates_of(self.contacts.states(self.walk(many, np.zeros_like(q))))
-        return Linear(self.inertia(free)[:, :, 0], found[:, 1:] - found[:, :1], found[:, 0])
+        states = self.contacts.states(self.walk(many, np.zeros_like(q)))
+        found, gaps = rates_of(states), np.array([state.gap[0] for state in states], float)
+        return Linear(self.inertia(free)[:, :, 0], found[:, 1:] - found[:, :1], found[:, 0], gaps)
+
+
+def _sticks(onset: Onset) -> bool:
+    """Whether a closed contact does; a sense that is recorded is that of a slip."""
+    return isinstance(onset, Closed) and isinstance(onset.sense, int) and onset.sense == 0
 
 
 def _sense(at: Moment, k: int) -> int | None:
@@ -160,21 +184,30 @@ def _sense(at: Moment, k: int) -> int | None:
     return onset.sense if isinstance(onset, Closed) else None
 
 
-class ClosedRates:
-    """The rates between impacts, as fast as may be, and by walks while a contact is closed."""
+class Swift(Seeing, Protocol):
+    """What tells the rates with closed contacts without walks; None where it is in doubt."""
 
-    def __init__(self, motion: ClosedMotion, free: Seeing) -> None:
-        self.free, self.walks, self.layout = free, Walks(motion), Layout.of(motion)
-        self.swift: Any = getattr(free, "derivative", None)
+    def derivative(self, time: float, row: Array, onsets: Sequence[Onset], now: float) -> Array: ...
+
+    def touches(self, at: Moment) -> Seen | None: ...
+
+    def linear(self, at: Moment) -> Linear | None: ...
+
+
+class ClosedRates:
+    """The rates of rigid bodies that fly or touch, by machine code where there is any, else by walks."""
+
+    def __init__(self, motion: ClosedMotion, swift: Swift | None) -> None:
+        self.motion, self.swift, self.layout = motion, swift, Layout.of(motion)
+        self.walks = Walks(motion)
 
     def __call__(self, at: Moment) -> Rates:
-        return (self.walks if any(at.onsets) else self.free)(at)
+        return (self.swift or self.walks)(at)
 
     def derivative(self, time: float, row: Array, onsets: Sequence[Onset], now: float) -> Array:
         """The derivative of a row; NaN for no answer."""
-        if self.swift is not None and not any(onsets):
-            found: Array = self.swift(time, row, onsets, now)
-            return found
+        if self.swift is not None:
+            return self.swift.derivative(time, row, onsets, now)
         n = self.layout.coordinates
         at = self.layout.moment(np.array([time]), row[:, None], now=now)._replace(onsets=tuple(onsets))
         with np.errstate(all="ignore"):
@@ -183,7 +216,20 @@ class ClosedRates:
 
     def look(self, at: Moment) -> Seen:
         """See `rates.Seeing`; without forces."""
-        return self.free.look(at._replace(onsets=(None,) * len(at.onsets)))
+        return (self.swift or self.walks).look(at._replace(onsets=(None,) * len(at.onsets)))
+
+    def touches(self, at: Moment) -> Seen:
+        """The contacts with their forces, in many lanes; some are closed."""
+        found = self.swift.touches(at) if self.swift else None
+        if found is not None:
+            return found
+        solved = self.motion.accelerate(at)
+        return seen_of(self.motion.contacts.pushes(solved.back.walk, solved.onsets), at.q.shape[1])
+
+    def linear(self, at: Moment) -> Linear:
+        """What impulses come to, at one moment."""
+        found = self.swift.linear(at) if self.swift else None
+        return self.motion.linear(at) if found is None else found
 
 
 def rates_of(states: Sequence[ContactState]) -> Array:

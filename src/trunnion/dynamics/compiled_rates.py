@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any, cast
@@ -22,23 +22,53 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.traced import UntraceableError
 from trunnion.dynamics.rates import Layout, Rates, Seen, Walks
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import Closed, Onset
 from trunnion.solve.compiled_vectors import literals
 
-__all__ = ["CompiledRates", "compiled_rates"]
+__all__ = [
+    "CompiledRates",
+    "Figures",
+    "Kinds",
+    "columns_of",
+    "compilable",
+    "compiled_rates",
+    "errors_of",
+    "missing_of",
+    "works_recorded",
+]
 
 Array = NDArray[np.float64]
 Figures = Callable[[FreeMotion, Moment], list[Number]]  # what a program computes, of a recorded motion
 
 MOST_LANES = 64  # that a program takes at a time
+TOUCHES, SLIPS, STICKS = 1, 2, 3  # how a contact touches: by a law, or closed between rigid bodies
+TOLD = (TOUCHES, SLIPS)  # of which something is told
+Kinds = tuple[int | None, ...]
+
+
+def _kind(onset: Onset) -> int | None:
+    if isinstance(onset, Closed):
+        return SLIPS if onset.sense else STICKS
+    return None if onset is None else TOUCHES
+
+
+def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
+    """The contact of a kind, with what is told of it: speed of approach, or sense of the slip."""
+    if kind == SLIPS:
+        return Closed(next(told))
+    return next(told) if kind == TOUCHES else Closed(0) if kind == STICKS else None
 
 
 def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
-    """The rates as machine code; None where they cannot be: friction, an assembly that is followed, no llvmlite."""
+    """The rates as machine code; None where they cannot be."""
+    found = CompiledRates(motion) if compilable(motion) else None
+    return found if found and found.works() else None
+
+
+def compilable(motion: FreeMotion) -> bool:
+    """Whether it may be: not with friction, an assembly that is followed, or without llvmlite."""
     braked = any(drive.brake for drive in motion.drives.values())
-    if not motion.affine or motion.sticking or braked or motion.followed or find_spec("llvmlite") is None:
-        return None
-    found = CompiledRates(motion)
-    return found if found.works() else None
+    return motion.affine and not (motion.sticking or braked or motion.followed or find_spec("llvmlite") is None)
 
 
 class CompiledRates:
@@ -48,13 +78,14 @@ class CompiledRates:
         self.motion = motion
         self.walks = Walks(motion)
         self.layout = Layout.of(motion)
-        self._programs: dict[tuple[Any, ...], _Program] = {}
+        self.last = 2 * self.layout.coordinates + len(self.layout.works_named)  # of the numbers that are integrated
+        self._programs: dict[tuple[Any, ...], Program] = {}
 
-    def works(self) -> bool:
+    def works(self, onset: Onset = 1.0) -> bool:
         """Whether it can be recorded, with all contacts touching."""
         n, count = self.layout.coordinates, len(self.motion.contacts.each)
         q, rate, integral, none = (np.zeros((k, 1)) for k in (n, n, n, 0))
-        at = Moment(np.zeros(1), q, rate, integral, none, onsets=(1.0,) * count)
+        at = Moment(np.zeros(1), q, rate, integral, none, onsets=(onset,) * count)
         try:
             self._program("rates", at)
         except (UntraceableError, TypeError, ValueError, NotImplementedError):
@@ -67,13 +98,13 @@ class CompiledRates:
         found = self._program("rates", at).run(at)[:, 0]
         if found[-1] != 0.0 or not np.all(np.isfinite(found)):
             return self.walks(at)
-        return Rates(found[:n], found[n : 2 * n], np.empty(0), found[2 * n : -1], True)
+        return Rates(found[:n], found[n : 2 * n], np.empty(0), found[2 * n : self.last], True)
 
-    def derivative(self, time: float, row: Array, onsets: Sequence[Number | None], now: float) -> Array:
+    def derivative(self, time: float, row: Array, onsets: Sequence[Onset], now: float) -> Array:
         """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
         n, found = self.layout.coordinates, np.empty(len(row))
         rates = self._program_of("rates", onsets, now).of_row(time, row[: 3 * n], onsets)
-        found[:n], found[n : 3 * n], found[3 * n :] = row[n : 2 * n], rates[: 2 * n], rates[2 * n : -1]
+        found[:n], found[n : 3 * n], found[3 * n :] = row[n : 2 * n], rates[: 2 * n], rates[2 * n : self.last]
         if rates[-1] == 0.0 and math.isfinite(found.sum()):
             return found
         at = self.layout.moment(np.array([time]), row[:, None], now=now)._replace(onsets=tuple(onsets))
@@ -87,23 +118,25 @@ class CompiledRates:
             return self.walks.look(at)
         return Seen(*found[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
-    def _program(self, what: str, at: Moment) -> _Program:
+    def _program(self, what: str, at: Moment) -> Program:
         return self._program_of(what, at.onsets, at.now)
 
-    def _program_of(self, what: str, onsets: Sequence[Number | None], now: float) -> _Program:
-        touching = tuple(onset is not None for onset in onsets)
-        key = what, touching, now
+    def _program_of(self, what: str, onsets: Sequence[Onset], now: float) -> Program:
+        kinds = tuple(map(_kind, onsets))
+        key = what, kinds, now
         if key not in self._programs:
-            rates = functools.partial(_rates_of, unit=self.motion.trial.tolist())
-            figures: Figures = rates if what == "rates" else _seen
-            self._programs[key] = _Program(self.motion, figures, touching, now)
+            self._programs[key] = Program(self.motion, self.figures(what, kinds), kinds, now)
         return self._programs[key]
 
+    def figures(self, what: str, kinds: Kinds) -> Figures:
+        """What a program computes: the rates, or how the contacts are."""
+        return functools.partial(_rates_of, unit=self.motion.trial.tolist()) if what == "rates" else _seen
 
-class _Program:
+
+class Program:
     """Some numbers of a motion as machine code, of lanes of states; the last of them: whether there is any doubt."""
 
-    def __init__(self, motion: FreeMotion, figures: Figures, touching: Sequence[bool], now: float) -> None:
+    def __init__(self, motion: FreeMotion, figures: Figures, kinds: Kinds, now: float) -> None:
         from trunnion.engines.graph import POSITION, Graph
         from trunnion.engines.machine_code import MachineCode, vector_width
         from trunnion.engines.program import program
@@ -115,9 +148,9 @@ class _Program:
         recorded = {path: Recorded(graph, graph.input(path, 0)) for path in given}
         self.states = ["time", *(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n))]
         state = [Recorded(graph, graph.input(name, POSITION)) for name in self.states]
-        self.onsets = [f"onset{k}" for k, is_ in enumerate(touching) if is_]
-        onset = iter([Recorded(graph, graph.input(name, 0)) for name in self.onsets])
-        onsets = tuple(next(onset) if is_ else None for is_ in touching)
+        self.onsets = [f"onset{k}" for k, kind in enumerate(kinds) if kind in TOLD]
+        told: Any = iter([Recorded(graph, graph.input(name, 0)) for name in self.onsets])
+        onsets = tuple(_onset(kind, told) for kind in kinds)
         parts: Any = [state[1 + k * n : 1 + (k + 1) * n] for k in range(3)]
         q, rate, integral = parts
         at = Moment(cast("Any", state[0]), q, rate, integral, cast("Any", []), now=now, onsets=onsets)
@@ -152,7 +185,7 @@ class _Program:
             parts.append(self.found[:, : part.shape[1]].copy())
         return np.hstack(parts)
 
-    def of_row(self, time: float, state: Array, onsets: Sequence[Number | None]) -> Array:
+    def of_row(self, time: float, state: Array, onsets: Sequence[Onset]) -> Array:
         """The numbers of one state: coordinates, rates, integrals; overwritten by the next."""
         self._begin(onsets)
         self.state[0, : self.width] = time
@@ -161,10 +194,10 @@ class _Program:
         found: Array = self.found[:, 0]
         return found
 
-    def _begin(self, onsets: Sequence[Number | None]) -> None:
-        touching = (onset for onset in onsets if onset is not None)
-        for name, onset in zip(self.onsets, touching, strict=True):
-            self.numbers[name][0] = onset
+    def _begin(self, onsets: Sequence[Onset]) -> None:
+        told = [onset.sense if isinstance(onset, Closed) else onset for onset in onsets if _kind(onset) in TOLD]
+        for name, number in zip(self.onsets, told, strict=True):
+            self.numbers[name][0] = number
 
 
 # ---- what is recorded -----------------------------------------------------------------------------------------
@@ -172,22 +205,32 @@ class _Program:
 
 def _rates_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
     """Accelerations, rates of the controllers' integrals, works, as `rates.Walks` has them."""
+    nothing: Any = [0.0] * len(motion.names)
+    columns = columns_of(motion, at, unit)
+    matrix = [list(row) for row in zip(*columns, strict=True)]
+    second = _eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])
+    return [*second, *errors_of(motion, at), *works_recorded(motion, at, second)]
+
+
+def columns_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[list[Number]]:
+    """The columns of M, from rest and without contacts, whose forces would leave no digits to the differences."""
     count = len(motion.names)
     nothing: Any = [0.0] * count
-    # from rest and without contacts, whose forces would leave no digits to the differences
     still = at._replace(rate=nothing, onsets=(None,) * len(at.onsets))
-    zero, columns = _missing(motion, still, nothing), []
+    zero, columns = missing_of(motion, still, nothing), []
     for k, size in enumerate(unit):
         step = [size if i == k else 0.0 for i in range(count)]
-        columns.append([(one - rest) / size for one, rest in zip(_missing(motion, still, step), zero, strict=True)])
-    matrix = [list(row) for row in zip(*columns, strict=True)]
-    second = _eliminated(matrix, [-one for one in _missing(motion, at, nothing)])
-    drives = list(motion.drives.values())
-    errors = [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in enumerate(drives)]
-    return [*second, *errors, *_works(motion, at, second)]
+        columns.append([(one - rest) / size for one, rest in zip(missing_of(motion, still, step), zero, strict=True)])
+    return columns
 
 
-def _missing(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
+def errors_of(motion: FreeMotion, at: Moment) -> list[Number]:
+    """Rates of the controllers' integrals."""
+    drives: Any = enumerate(motion.drives.values())
+    return [drive.error(at.time, at.rate[i], at.integral[i], at.now) for i, drive in drives]
+
+
+def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
     """E − T of every free coordinate."""
     back = motion.solve(at, second, {})
     found = []
@@ -197,7 +240,7 @@ def _missing(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
     return found
 
 
-def _works(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
+def works_recorded(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
     """Powers, as `rates.works_of` has them."""
     back = motion.solve(at, second, {})
     stated = motion.system.mechanism.loads
@@ -214,7 +257,7 @@ def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     """What `rates.Seen` has, of every contact."""
     nothing: Any = [0.0] * len(motion.names)
     found = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
-    parts = [(state.gap, state.rate, state.slip, push.normal) for state, push in found]
+    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
     return [one[i] for i in range(len(Seen._fields)) for one in parts]
 
 

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.closed import rates_of
 from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact, step_nodes
 from trunnion.dynamics.impact_law import OPEN, Struck
 from trunnion.dynamics.impact_steps import SteppedMotion
+from trunnion.dynamics.rates import Seen
 from trunnion.dynamics.state import Accelerated
-from trunnion.dynamics.touching import Closed, ContactState, Onset, Push
+from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ImpactMotion"]
 
@@ -65,12 +65,11 @@ class ImpactMotion(SteppedMotion):
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
-    def _pushes(self, dense: Dense, times: Array) -> list[tuple[ContactState, Push]]:
-        """The forces of the contacts at times of a step."""
+    def _touches(self, dense: Dense, times: Array) -> Seen:
+        """The contacts with their forces at times of a step."""
         at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
-            found = self.motion.accelerate(at)
-            return self.motion.contacts.pushes(found.back.walk, found.onsets)
+            return self.closed_rates.touches(at)
 
     def _gaps(self, dense: Dense, times: Array) -> Array:
         """What stays above 0 within a step, (2 contacts, time): gap or normal force, and slip or what friction has left
@@ -79,11 +78,12 @@ class ImpactMotion(SteppedMotion):
         if not any(self.onsets):
             found[: self.count] = self._look(dense, times).gap
             return found
-        for k, (onset, (state, push)) in enumerate(zip(self.onsets, self._pushes(dense, times), strict=True)):
-            found[k] = push.normal if onset else state.gap
+        seen = self._touches(dense, times)
+        for k, onset in enumerate(self.onsets):
+            found[k] = seen.normal[k] if onset else seen.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
-                left = self.friction[k] * push.normal - np.abs(push.friction)
-                found[self.count + k] = onset.sense * state.slip if onset.sense else left
+                left = self.friction[k] * seen.normal[k] - np.abs(seen.friction[k])
+                found[self.count + k] = onset.sense * seen.slip[k] if onset.sense else left
         return found
 
     def _measured(self, dense: Dense, begin: float, end: float) -> None:
@@ -91,12 +91,11 @@ class ImpactMotion(SteppedMotion):
         if not self._open:
             return
         times, weights = step_nodes(begin, end)
-        pushes = self._pushes(dense, times)
+        seen = self._touches(dense, times)
         for k, one in self._open.items():
-            state, push = pushes[k]
-            one.force = np.fmax(one.force, float(np.max(push.normal)))
-            one.impulse += float(weights @ push.normal)
-            one.wear += float(weights @ np.abs(push.normal * state.slip))
+            one.force = np.fmax(one.force, float(np.max(seen.normal[k])))
+            one.impulse += float(weights @ seen.normal[k])
+            one.wear += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
@@ -115,8 +114,8 @@ class ImpactMotion(SteppedMotion):
             self._project(time, row)
             self._settle(time, row)
         else:
-            friction = self._pushes(lambda times: row[:, None], np.array([time]))[k][1].friction
-            self._set(dict.fromkeys(together, Closed(-int(np.sign(friction[0])))))
+            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[k, 0]
+            self._set(dict.fromkeys(together, Closed(-int(np.sign(friction)))))
         return np.inf
 
     def _closed(self) -> list[int]:
@@ -134,10 +133,9 @@ class ImpactMotion(SteppedMotion):
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
         at = self.moment(time, row, 0.0, 0.0)
-        linear, states = self.rigid.linear(at), self._states_at(at)
-        rates = rates_of(states)[:, 0]
-        gaps = np.array([float(np.ravel(one.gap)[0]) for one in states])
-        meet = (gaps <= self.meet) & (rates[: self.count] < 0.0)
+        linear = self.closed_rates.linear(at)
+        rates = linear.driven + linear.ways @ at.rate[:, 0]
+        meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
         found, pauses = self._law(linear, places, rates, self.restitution), dict[int, float]()
         if found is not None:
@@ -165,20 +163,22 @@ class ImpactMotion(SteppedMotion):
     def _flights(
         self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, change: Array
     ) -> dict[int, tuple[float, bool]]:
-        """Of every place that rebounds and comes back: the time until it does, s; where it rebounds so low that the
-        impacts accumulate, that until they have."""
+        """Of every place that rebounds and comes back: the time until it does, s; where it goes so low, rebounding or
+        let go, that this is none, that until its impacts have accumulated."""
         n, after, found = self.layout.coordinates, row.copy(), dict[int, tuple[float, bool]]()
         after[n : 2 * n] += change
         rebounds = [i for i, k in enumerate(places) if struck.cases[i] is not OPEN and before[k] < 0.0]
-        free = [k for i, k in enumerate(places) if i in rebounds or struck.cases[i] is OPEN]
+        closed = [k for i, k in enumerate(places) if struck.cases[i] is not OPEN and self.onsets[k] is not None]
+        free = [k for k in places if k not in closed]
         onsets = tuple(None if k in free else onset for k, onset in enumerate(self.onsets))
         walk = self.motion.accelerate(self.moment(time, after, 0.0, 0.0)._replace(onsets=onsets)).back.walk
-        for i in rebounds:
-            k, speed = places[i], float(struck.after[i])
+        for i, k in enumerate(places):
+            speed, e = max(float(struck.after[i]), 0.0), float(self.restitution[k])
             pull = -float(np.ravel(self.motion.contacts.each[k].accelerations(walk)[0])[0])
-            if pull > 0.0 and speed > 0.0 and self.restitution[k] > 0.0:
-                low, e = 0.5 * speed * speed / pull < self.low[k], self.restitution[k]
-                found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
+            if pull > 0.0 and e > 0.0 and k in free:
+                low = 0.5 * speed * speed / pull < self.low[k]
+                if low or i in rebounds:
+                    found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
         return found
 
     def _after(
@@ -190,21 +190,23 @@ class ImpactMotion(SteppedMotion):
             case, normal = struck.cases[i], float(struck.impulse[i])
             slips = abs(before[self.count + k]), abs(struck.after[len(places) + i])
             approach, wear = max(-float(before[k]), 0.0), 0.5 * normal * float(sum(slips))
-            if case is not OPEN and (k in pauses or self.onsets[k] is not None or self.restitution[k] == 0.0):
+            keeps = case is not OPEN and (self.onsets[k] is not None or self.restitution[k] == 0.0)
+            if keeps or k in pauses:
                 still = self.friction[k] > 0.0 and slips[1] <= STILL * max(slips[0], approach)
-                closed[k] = Closed(0 if still else case or 1)
+                sense = int(np.sign(struck.after[len(places) + i])) if case is OPEN else case
+                closed[k] = Closed(0 if still else sense or 1)
             if self.onsets[k] is not None:
                 self._open[k].impulse += normal
                 self._open[k].wear += wear
-                if case is OPEN:
+                if k not in closed:
                     self._end(k, time, float(struck.after[i]))
             elif case is not OPEN:
                 label, rate = self.motion.contacts.labels[k], float(struck.after[i])
                 self.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
+        self._project(time, row, places)
         if closed:
-            self._project(time, row)
             self._settle(time, row, pauses)
 
     # ---- closed -----------------------------------------------------------------------------------------------
@@ -265,18 +267,21 @@ class ImpactMotion(SteppedMotion):
                 return False
         return True
 
-    def _project(self, time: float, row: Array) -> None:
-        """Take the gaps of closed contacts, and their rates, to 0: the nearest state in the sense of the masses."""
+    def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
+        """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
+        the nearest state in the sense of the masses."""
         n, closed = self.layout.coordinates, self._closed()
         at = self.moment(time, row, 0.0, 0.0)
         for _ in range(2):
-            linear, gaps = (
-                self.rigid.linear(at),
-                np.array([float(np.ravel(self._states_at(at)[k].gap)[0]) for k in closed]),
-            )
-            row[:n] -= _nearest(linear.mass, linear.ways[closed], gaps)
+            linear = self.closed_rates.linear(at)
+            shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
+            if not shut:
+                return
+            row[:n] -= _nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
             at = self.moment(time, row, 0.0, 0.0)
-        linear = self.rigid.linear(at)
+        if not closed:
+            return
+        linear = self.closed_rates.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
         row[n : 2 * n] -= _nearest(linear.mass, ways, rates[[*closed, *sticks]])

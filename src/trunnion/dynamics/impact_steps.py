@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.closed import ClosedMotion, Linear, rates_of
+from trunnion.dynamics.closed import ClosedMotion, ClosedRates, Linear
 from trunnion.dynamics.contact_motion import ContactMotion, Impact, OpenContact
 from trunnion.dynamics.impact_law import Struck, strike
 from trunnion.dynamics.integrate import Event, Stretch
 from trunnion.dynamics.state import Moment
-from trunnion.dynamics.touching import Closed, ContactState
+from trunnion.dynamics.touching import Closed
 
 __all__ = ["SteppedMotion"]
 
@@ -39,16 +39,14 @@ class SteppedMotion(ContactMotion):
     def __post_init__(self) -> None:
         super().__post_init__()
         assert isinstance(self.motion, ClosedMotion)
+        assert isinstance(self.dynamics, ClosedRates)
+        self.closed_rates = self.dynamics
         self.rigid, each = self.motion, self.motion.contacts.each
         self.count = len(each)
         self.friction = np.array([one.coefficient for one in each])
         self.restitution = np.array([one.restitution for one in each])
 
     # ---- impulses ---------------------------------------------------------------------------------------------
-
-    def _states_at(self, at: Moment) -> list[ContactState]:
-        """The contacts at one moment."""
-        return self.motion.contacts.states(self.motion.walk(at, np.zeros_like(at.q)))
 
     def _law(
         self, linear: Linear, places: list[int], rates: Array, restitution: Array, old: Array | None = None
@@ -112,10 +110,10 @@ class SteppedMotion(ContactMotion):
             return np.full_like(row, np.nan)
         ahead = self.layout.row(rate, rates)
         after[n:] += step * ahead[n:]
-        states = self._states_at(at)
-        places = [k for k, state in enumerate(states) if float(state.gap[0]) <= 0.0]
+        places = [k for k, gap in enumerate(self.seeing.look(at).gap[:, 0]) if gap <= 0.0]
         if places:
-            linear, before = self.rigid.linear(at), rates_of(states)[:, 0]
+            linear = self.closed_rates.linear(at)
+            before = linear.driven + linear.ways @ rate
             found = self._law(linear, places, before + step * linear.ways @ rates.second, self.restitution, before)
             if found is None:
                 self._stop("no_contact_force", time, row)

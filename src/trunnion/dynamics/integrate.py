@@ -250,6 +250,9 @@ class Integration:
         n = self.layout.coordinates
         between = self._place(float(row[0]), sense or float(np.sign(row[n])))
         rate = self._rate(sense, now, between)
+        if row[n] == 0.0 and row[0] in self.limits and rate(time, row)[n] * (row[0] - sum(self.limits) / 2) > 0.0:
+            self.end("range", time, {"coordinate": float(row[0])})
+            return time, row, None
         first = min(step, 0.5 * (until - time)) if step else None
         solver, marks = self._solver(rate, time, row, until, self._absolute(row), first), [time]
         dead_centre = DeadCentre(self.motion, self.layout)

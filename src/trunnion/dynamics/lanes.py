@@ -7,12 +7,14 @@ settled is left as it is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.dynamics.compiled_lanes import CompiledLanes, Settled
 from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.sampled import SampledTables
 from trunnion.dynamics.tables import FIXED
@@ -62,13 +64,14 @@ class Lanes:
     """Some lanes of a table, to be asked again and again.
 
     rows: of the tables; drive: of these lanes; friction: of each contact, where the next settling begins, (lane,
-    contact), kept up to date.
+    contact), kept up to date; compiled: machine code of the equations, if there is any.
     """
 
     tables: SampledTables
     rows: Rows
     drive: Drive
     friction: Array
+    compiled: CompiledLanes | None = None
 
     def __post_init__(self) -> None:
         rubs = self.tables.rubs
@@ -84,10 +87,8 @@ class Lanes:
         """q̈ and the rate of the controller's integral, (lane,); NaN where no one solution is certain."""
         matrix, slips = self._numbers(at)
         through = np.where(at.sense != 0.0, at.sense, np.where(at.speed >= 0.0, 1.0, -1.0))
-        known = self._known(matrix, at.speed, through)
         per = self._per(slips, at.speed, np.where(at.speed != 0.0, at.speed, at.sense))
-        second = self._solved(matrix, known, per, at, through)
-        return second, self._error(at)
+        return self._solved(matrix, per, at, through), self._error(at)
 
     def beyond(self, at: LaneState) -> Array:
         """By how much what drives lanes at rest exceeds the effort at which they break away in their sense, (lane,).
@@ -131,8 +132,7 @@ class Lanes:
         tables, q = self.tables, at.q
         if self.period is not None:
             q = q - at.lap * self.period if tables.parted else np.mod(q, self.period)
-        panel, basis = tables.basis(self.rows, at.stretch, q)
-        found = np.matmul(basis[:, None], tables.coefficients[self.rows, panel])[:, 0]
+        found = tables.numbers(self.rows, at.stretch, q)
         whole = self.size * self.wide
         return found[:, :whole].reshape(-1, self.size, self.wide), found[:, whole:]
 
@@ -158,7 +158,7 @@ class Lanes:
 
     # ---- the equations ----------------------------------------------------------------------------------------
 
-    def _solved(self, matrix: Array, known: Array, per: Array, at: LaneState, through: Array) -> Array:
+    def _solved(self, matrix: Array, per: Array, at: LaneState, through: Array) -> Array:
         """q̈; the loss of the gear goes by where the power flows."""
         drive, shaft = self.drive, self.shaft(at)
         way = np.where(at.speed != 0.0, np.sign(at.speed), at.sense)
@@ -168,22 +168,43 @@ class Lanes:
         left = np.arange(len(shaft))
         for _ in range(2):
             share = drive.ratio * np.where(driving, drive.efficiency, 1.0 / drive.efficiency)
-            mass = matrix[left, 0, 0] + _at(share * rotor, left)
-            start = (_at(share * shaft - brake, left) - known[left, 0]) / mass
-            own = matrix if len(left) == len(matrix) else matrix[left]
-            influence = own[:, 1:, FIXED:] - own[:, 1:, :1] * (own[:, :1, FIXED:] / mass[:, None, None])
-            first = own[:, 1:, 0] * start[:, None] + known[left, 1:]
-            friction, settled = self._settled(per[left], first, influence, self.friction[left])
-            second = start - np.sum(own[:, 0, FIXED:] * friction, axis=1) / mass
-            flow = (shaft[left] - _at(rotor, left) * second) * through[left]
+            given = [at.speed, through, share, shaft, brake, rotor]
+            one = self._accelerated(matrix, per, [_at(number, left) for number in given], left)
+            flow = (shaft[left] - _at(rotor, left) * one.second) * through[left]
             flow = flow * np.sign(_at(drive.ratio, left))
-            kept = settled & (mass > 0.0) & (lossless[left] | ((flow >= 0.0) == driving[left]))
-            self.friction[left[kept]], found[left[kept]] = friction[kept], second[kept]
-            left = left[settled & (mass > 0.0) & ~kept]
+            sound = one.settled & (one.mass > 0.0)
+            kept = sound & (lossless[left] | ((flow >= 0.0) == driving[left]))
+            self.friction[left[kept]], found[left[kept]] = one.friction[kept], one.second[kept]
+            left = left[sound & ~kept]
             if not len(left):
                 break
             driving[left] = False
         return found
+
+    def _accelerated(self, matrix: Array, per: Array, given: Sequence[Any], left: Rows) -> Settled:
+        """q̈ of some lanes; by machine code where there is any, and by NumPy what that leaves."""
+        if len(left) < len(matrix):
+            matrix, per = matrix[left], per[left]
+        if self.compiled is None:
+            return self._by_numpy(matrix, per, given, self.friction[left])
+        found = self.compiled(matrix, per, self.friction[left], given)
+        rest = np.flatnonzero(~found.settled)
+        if len(rest):
+            own = self._by_numpy(matrix[rest], per[rest], [_at(one, rest) for one in given], self.friction[left[rest]])
+            for whole, part in zip(found, own, strict=True):
+                whole[rest] = part
+        return found
+
+    def _by_numpy(self, matrix: Array, per: Array, given: Sequence[Any], begin: Array) -> Settled:
+        """q̈ with the friction that goes with it. given: see `compiled_lanes.GIVEN`."""
+        speed, through, share, free, brake, rotor = given
+        known = self._known(matrix, speed, through)
+        mass = matrix[:, 0, 0] + share * rotor
+        start = (share * free - brake - known[:, 0]) / mass
+        influence = matrix[:, 1:, FIXED:] - matrix[:, 1:, :1] * (matrix[:, :1, FIXED:] / mass[:, None, None])
+        friction, settled = self._settled(per, matrix[:, 1:, 0] * start[:, None] + known[:, 1:], influence, begin)
+        second = start - np.sum(matrix[:, 0, FIXED:] * friction, axis=1) / mass
+        return Settled(friction, second, mass, settled)
 
     def _settled(self, per: Array, first: Array, influence: Array, begin: Array) -> tuple[Array, Flags]:
         """Friction forces that obey their laws, and where they are certain to be the only ones."""

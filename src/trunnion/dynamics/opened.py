@@ -42,6 +42,7 @@ KEPT = (
 )  # fmt: skip
 PARTS = ("x", "y", "turn")  # of the way to the ground of a link that no joint holds
 MOST_CHOICES = 5000
+BESIDE = 0.1  # of the size
 SHARE = (
     1e-3  # of a radian or of the size: how far the stated motion of a coordinate that is freed goes, which is not it
 )
@@ -160,23 +161,31 @@ def _hang(data: dict[str, Any], ground: str, link: str, walk: Forward) -> dict[s
     """Connect a loose link with the ground by slides along x and y and a turn; their coordinates and rates."""
     along, across, turn = names = [f"{link}_in_play_{part}" for part in PARTS]
     carriers = [f"{along}_carrier", f"{across}_carrier"]
-    centre = tuple(_number(part) for part in walk.system.centre(walk.values, link))
+    place = _turning_point(data, link, walk)
     links = data["links"]
     x, y = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
     links[ground]["points"][along] = x
     links[carriers[0]] = {"points": {along: x, across: y}}
     links[carriers[1]] = {"points": {across: y, turn: [0, 0]}}
-    links[link]["points"][turn] = list(centre)
+    links[link]["points"][turn] = list(place)
     ends = ([ground, carriers[0]], carriers, [carriers[1], link])
     for name, kind, pair in zip(names, ("prismatic", "prismatic", "revolute"), ends, strict=True):
         data["joints"][name] = {"type": kind, "links": pair, "friction": 0, "seat": "free"}
-    at, frame, twist = walk.at(link, centre), walk.motions[link].frame, walk.motions[link].twist
+    at, frame, twist = walk.at(link, place), walk.motions[link].frame, walk.motions[link].twist
     angle = np.arctan2(_number(frame.s), _number(frame.c))
     return {
         along: (_number(at.place[0]), _number(at.velocity[0])),
         across: (_number(at.place[1]), _number(at.velocity[1])),
         turn: (float(angle), _number(twist.w)),
     }
+
+
+def _turning_point(data: Mapping[str, Any], link: str, walk: Forward) -> tuple[float, ...]:
+    """The mass centre of a link; beside it where a joint is, for two that turn at one point move nothing."""
+    x, y = (_number(part) for part in walk.system.centre(walk.values, link))
+    joints = [name for name, joint in data["joints"].items() if link in joint["links"]]
+    taken = {tuple(_number(walk.values[f"links.{link}.points.{name}.{one}"]) for one in "xy") for name in joints}
+    return (x + BESIDE * _number(walk.system.size(walk.values)) if (x, y) in taken else x), y
 
 
 # ---- chains in space ------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -9,11 +10,11 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Contacts
+from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
-__all__ = ["CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seeing", "Seen", "Walks", "works_of"]
+__all__ = ["CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seeing", "Seen", "Walks", "seen_of", "works_of"]
 
 Array = NDArray[np.float64]
 
@@ -43,12 +44,13 @@ class Dynamics(Protocol):
 
 
 class Seen(NamedTuple):
-    """Of every contact, (contact, lane): gap, m, its rate and slip, m/s, and normal force, N."""
+    """Of every contact, (contact, lane): gap, m, its rate and slip, m/s, normal force and friction, N."""
 
     gap: Array
     rate: Array
     slip: Array
     normal: Array
+    friction: Array
 
 
 class Seeing(Dynamics, Protocol):
@@ -118,10 +120,15 @@ class Walks:
 
     def look(self, at: Moment) -> Seen:
         """See `Seeing`."""
-        motion, lanes = self.motion, at.q.shape[1]
+        motion = self.motion
         found = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
-        parts = [(state.gap, state.rate, state.slip, push.normal) for state, push in found]
-        return Seen(*(np.array([np.broadcast_to(one[i], lanes) for one in parts]) for i in range(len(Seen._fields))))
+        return seen_of(found, at.q.shape[1])
+
+
+def seen_of(found: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
+    """Of contacts at many moments what is looked at."""
+    parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
+    return Seen(*(np.array([np.broadcast_to(one[i], lanes) for one in parts]) for i in range(len(Seen._fields))))
 
 
 def works_of(back: Backward, at: Moment, contacts: Contacts | None = None) -> Array:

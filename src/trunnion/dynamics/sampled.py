@@ -8,7 +8,7 @@ many stretches go together.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,8 +41,9 @@ class SampledTables:
     """Polynomials of every number over the way, of samples whose ways have as many stretches.
 
     samples: which they are; low, width: (sample, stretch), coordinate at which each begins and width of its panels;
-    first, count: (stretch,), its panels; coefficients: (sample, panel, node, number); period: of the way, (sample,),
-    None of a range; parted: whether there is a bend at all; parameters: of the law of each contact.
+    first, count: (stretch,), its panels; coefficients: (sample, panel, node, number), of those numbers, `some` of the
+    `whole`, that are not 0 all along; period: of the way, (sample,), None of a range; parted: whether there is a bend
+    at all; parameters: of the law of each contact.
     """
 
     motion: FreeMotion
@@ -55,7 +56,16 @@ class SampledTables:
     coefficients: Array
     period: Array | None
     parted: bool
-    parameters: Sequence[Mapping[str, Any]] = field(default_factory=tuple)
+    parameters: Sequence[Mapping[str, Any]]
+    some: Rows
+    whole: int
+
+    def numbers(self, rows: Rows, stretch: Rows, q: Array) -> Array:
+        """Every number at coordinates within stretches of the first turn, (lane, number)."""
+        panel, basis = self.basis(rows, stretch, q)
+        found = np.zeros((len(rows), self.whole))
+        found[:, self.some] = np.matmul(basis[:, None], self.coefficients[rows, panel])[:, 0]
+        return found
 
     def basis(self, rows: Rows, stretch: Rows, q: Array) -> tuple[Rows, Array]:
         """Panels and values of the polynomials, (lane, node), at coordinates within stretches of the first turn."""
@@ -108,15 +118,17 @@ def sampled_tables(nominal: Tables, values: Values, count: int) -> Iterator[Samp
 def _joined(parts: Sequence[SampledTables]) -> SampledTables:
     """Those of several walks, one after the other."""
     first = parts[0]
+    some = np.unique(np.concatenate([part.some for part in parts]))
     own: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
-        for name in ("samples", "low", "width", "coefficients", *(("period",) if first.period is not None else ()))
+        for name in ("samples", "low", "width", *(("period",) if first.period is not None else ()))
     }
+    own["coefficients"] = np.concatenate([np.take(part.coefficients, some, axis=-1) for part in parts])
     parameters = [
         {key: _one([part.parameters[k][key] for part in parts]) for key in each}
         for k, each in enumerate(first.parameters)
     ]
-    return replace(first, **own, parameters=parameters)
+    return replace(first, **own, parameters=parameters, some=some)
 
 
 def _one(values: Sequence[Any]) -> Any:
@@ -164,7 +176,7 @@ def _tables(
 ) -> SampledTables:  # fmt: skip
     edges = np.array([_edges(way) for way in ways])
     begin, width, first = _laid(edges, count)
-    coefficients, miss = _fitted(nominal, values, begin, width)
+    coefficients, largest, miss = _fitted(nominal, values, begin, width)
     kept = np.flatnonzero(miss <= LOST)
     period = None if ways[0].period is None else np.array([way.period for way in ways], float)
     parameters = [
@@ -175,6 +187,7 @@ def _tables(
         nominal.motion, nominal.rubs, samples[kept], edges[kept, :-1], width[kept][:, first], first, count,
         coefficients[kept],
         None if period is None else period[kept], len(ways[0].bends) > 0, parameters,
+        np.flatnonzero(largest.any(axis=0)), coefficients.shape[-1],
     )  # fmt: skip
 
 
@@ -182,8 +195,9 @@ def _rowed(value: Any, rows: Rows) -> Any:
     return value[rows, 0] if np.ndim(value) == 2 else float(np.ravel(value)[0])
 
 
-def _fitted(nominal: Tables, values: Values, begin: Array, width: Array) -> tuple[Array, Array]:
-    """Coefficients (sample, panel, node, number) through the Chebyshev nodes of every panel, and largest misses."""
+def _fitted(nominal: Tables, values: Values, begin: Array, width: Array) -> tuple[Array, Array, Array]:
+    """Coefficients (sample, panel, node, number) through the Chebyshev nodes of every panel, the numbers'
+    largest values (sample, number), and largest misses."""
     samples, panels = begin.shape
     inside = np.concatenate([np.cos(ANGLES), TRIED])
     q = (begin[..., None] + 0.5 * width[..., None] * (1.0 + inside)).reshape(samples, -1)
@@ -197,4 +211,4 @@ def _fitted(nominal: Tables, values: Values, begin: Array, width: Array) -> tupl
     scale = np.array([scale_of(one, len(nominal.rubs)) for one in largest])
     worst = np.max(miss / np.where(scale > 0, scale, 1.0), axis=1)
     size = found.shape[0] - POWERS
-    return np.ascontiguousarray(coefficients[..., :size]), worst
+    return coefficients[..., :size], largest[:, :size], worst

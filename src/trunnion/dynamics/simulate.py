@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates
+from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
@@ -110,14 +111,14 @@ def _with_play(
     row = initial_row(motion)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
-    rates: Seeing = compiled_rates(motion) or Walks(motion)
     tolerances, times = max(fine, FINEST), load_times(motion, duration)
     integration: ContactMotion
     if isinstance(motion, ClosedMotion):
-        rates = ClosedRates(motion, rates)
-        integration = ImpactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
+        closed = ClosedRates(motion, compiled_closed(motion))
+        integration = ImpactMotion(motion, closed, duration, tolerances, progress=progress, times=times)
         integration.impact_step = impact_step
     else:
+        rates: Seeing = compiled_rates(motion) or Walks(motion)
         integration = ContactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
     solution = _run(integration, row)
     time = np.linspace(0.0, duration, steps + 1)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
+from trunnion.dynamics.compiled_lanes import compiled_lanes
 from trunnion.dynamics.course import NODES, Courses
 from trunnion.dynamics.lanes import Lanes, LaneState, picked_drive
 from trunnion.dynamics.motor import Drive
@@ -85,6 +86,8 @@ class Starts:
         self.breaks = np.sort(np.array([np.broadcast_to(one, (count,)) for one in times], float).T, axis=1)
         self.next = np.zeros(count, np.intp)
         self._pass_breaks(np.arange(count))
+        pins = [rub.load.across is None for rub in self.tables.rubs]
+        self.compiled = compiled_lanes(pins, count)
         self.found: list[tuple[Rows, Array]] = []
 
     # ---- the whole way ----------------------------------------------------------------------------------------
@@ -121,7 +124,7 @@ class Starts:
         return found
 
     def _asked(self, lanes: Rows) -> Lanes:
-        return Lanes(self.tables, lanes, picked_drive(self.drive, lanes), self.friction[lanes])
+        return Lanes(self.tables, lanes, picked_drive(self.drive, lanes), self.friction[lanes], self.compiled)
 
     def _rates(self, asked: Lanes, lanes: Rows, rows: Array, now: Array) -> Array:
         """The derivative of states by time."""

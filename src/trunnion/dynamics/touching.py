@@ -172,7 +172,7 @@ class PinContact(Contact):
         cx, cy, ux, uy = (one - other for one, other in zip(a, b, strict=True))
         far, first = _acceleration(walk, self.body, self.pin), _acceleration(walk, self.other, self.hole)
         ax, ay = far[0] - first[0], far[1] - first[1]
-        size = np.hypot(cx, cy)
+        size = namespace(cx, cy).hypot(cx, cy)
         nx, ny = cx / size, cy / size
         away, along = ux * nx + uy * ny, uy * nx - ux * ny
         spin = primal(walk.motions[self.body].twist.w)
@@ -231,9 +231,9 @@ class EdgeContact(Contact):
         return -self.side * (ay * tx - ax * ty), ax * tx + ay * ty
 
 
-def _acceleration(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Array, Array]:
+def _acceleration(walk: Forward, link: str, local: tuple[float, float]) -> tuple[Any, Any]:
     """Acceleration of a point of a link, m/s²."""
-    x, y = (np.asarray(primal(part), float) for part in walk.at(link, local).acceleration[:2])
+    x, y = (primal(part) for part in walk.at(link, local).acceleration[:2])
     return x, y
 
 

@@ -1,0 +1,162 @@
+"""Machine code of contacts of rigid bodies that stay closed: their forces are unknowns beside the accelerations.
+
+  M q̈ − W_f λ = T − E₀,  W q̈ = −w₀
+
+with λ the normal forces and, where a contact sticks, those along the tangent; W the accelerations of gaps and of the
+slips that stay 0 by q̈, W_f the efforts of the forces, friction of those that slip included. All is affine, so that
+every column is a difference of two walks at the same pose, from rest; see `compiled_rates`.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.dynamics.closed import ClosedMotion, Linear
+from trunnion.dynamics.compiled_rates import (
+    CompiledRates,
+    Figures,
+    Kinds,
+    columns_of,
+    compilable,
+    errors_of,
+    missing_of,
+    works_recorded,
+)
+from trunnion.dynamics.rates import Seen
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.touching import ContactState
+from trunnion.solve.forward import Forward
+
+__all__ = ["CompiledClosed", "compiled_closed"]
+
+
+def compiled_closed(motion: ClosedMotion) -> CompiledClosed | None:
+    """The rates as machine code; None where they cannot be."""
+    found = CompiledClosed(motion) if compilable(motion) else None
+    return found if found and found.works(None) else None
+
+
+class CompiledClosed(CompiledRates):
+    """The rates with contacts that fly or stay closed, one program for every set of those that are closed."""
+
+    def figures(self, what: str, kinds: Kinds) -> Figures:
+        """Rates and contacts of closed ones come from one program."""
+        unit = self.motion.trial.tolist()
+        if what == "linear":
+            return functools.partial(_linear, unit=unit)
+        if what == "rates" and any(kinds):
+            assert isinstance(self.motion, ClosedMotion)
+            return functools.partial(_closed, unit=unit, force=self.motion.force)
+        return super().figures(what, kinds)
+
+    def touches(self, at: Moment) -> Seen | None:
+        """The contacts with their forces, in many lanes, some of them closed; None where there is any doubt."""
+        found = self._program("rates", at).run(at)
+        if np.any(found[-1]) or not np.all(np.isfinite(found)):
+            return None
+        return Seen(*found[self.last : -1].reshape(len(Seen._fields), -1, at.q.shape[1]))
+
+    def linear(self, at: Moment) -> Linear | None:
+        """See `ClosedMotion.linear`; None where there is any doubt."""
+        count, contacts = self.layout.coordinates, len(at.onsets)
+        free = at._replace(onsets=(None,) * contacts)
+        found = self._program("linear", free).run(free)[:, 0]
+        if found[-1] or not np.all(np.isfinite(found)):
+            return None
+        mass, rest = found[: count * count].reshape(count, count).T, found[count * count : -1]
+        ways = rest[: 2 * contacts * count].reshape(count, 2 * contacts).T
+        return Linear(mass, ways, *np.split(rest[2 * contacts * count :], [2 * contacts]))
+
+
+# ---- what is recorded -----------------------------------------------------------------------------------------
+
+
+def _linear(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
+    """Columns of M, of W for rates of gaps and slips, these at rest, and gaps."""
+    count = len(motion.names)
+    nothing: Any = [0.0] * count
+
+    def states(rate: Any) -> list[ContactState]:
+        return motion.contacts.states(motion.walk(at._replace(rate=rate), nothing))
+
+    still = states(nothing)
+    rest, columns = _rates(still), list[Number]()
+    for k in range(count):
+        moved = _rates(states([1.0 if i == k else 0.0 for i in range(count)]))
+        columns += [one - zero for one, zero in zip(moved, rest, strict=True)]
+    mass = [one for column in columns_of(motion, at, unit) for one in column]
+    return [*mass, *columns, *rest, *(state.gap for state in still)]
+
+
+def _rates(states: Sequence[ContactState]) -> list[Number]:
+    return [*(state.rate for state in states), *(state.slip for state in states)]
+
+
+def _closed(motion: FreeMotion, at: Moment, unit: Sequence[float], force: float) -> list[Number]:
+    """What the rates are, and of every contact what `rates.Seen` has."""
+    assert isinstance(motion, ClosedMotion)
+    nothing: Any = [0.0] * len(motion.names)
+    free = at._replace(onsets=(None,) * len(at.onsets))
+    still = free._replace(rate=nothing)
+    closed, sticks = motion.closed(at)
+    columns = [column + more for column, more in zip(columns_of(motion, at, unit),
+               _driven(motion, still, closed, sticks, unit), strict=True)]  # fmt: skip
+    zero = missing_of(motion, still, nothing)
+    for k in range(len(closed) + len(sticks)):
+        forces = [force if i == k else 0.0 for i in range(len(closed) + len(sticks))]
+        pushed = missing_of(motion, still._replace(onsets=motion.forced(at.onsets, forces, closed, sticks)), nothing)
+        own: list[Number] = [(one - rest) / force for one, rest in zip(pushed, zero, strict=True)]
+        columns.append(own + [0.0] * (len(closed) + len(sticks)))
+    right = [*missing_of(motion, free, nothing), *_kept(motion, motion.walk(free, nothing), closed, sticks)]
+    numbers, sound = _eliminated([list(row) for row in zip(*columns, strict=True)], [-one for one in right])
+    second: Any = numbers[: len(nothing)]
+    onsets = motion.forced(at.onsets, numbers[len(nothing) :], closed, sticks)
+    done = at._replace(onsets=motion.shared(onsets, sticks))
+    found = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
+    touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
+    seen = [one[i] for i in range(len(Seen._fields)) for one in touches]
+    xp = namespace(sound)
+    second = [xp.where(sound > 0.0, one, np.nan) for one in second]
+    return [*second, *errors_of(motion, at), *works_recorded(motion, done, second), *seen]
+
+
+def _driven(
+    motion: ClosedMotion, still: Moment, closed: Sequence[int], sticks: Sequence[int], unit: Sequence[float]
+) -> list[list[Number]]:
+    """W: accelerations of gaps and of slips that stay 0, by those of the coordinates; a list for each coordinate."""
+    nothing: Any = [0.0] * len(unit)
+    zero, found = _kept(motion, motion.walk(still, nothing), closed, sticks), []
+    for k, size in enumerate(unit):
+        step: Any = [size if i == k else 0.0 for i in range(len(unit))]
+        moved = _kept(motion, motion.walk(still, step), closed, sticks)
+        found.append([(one - rest) / size for one, rest in zip(moved, zero, strict=True)])
+    return found
+
+
+def _kept(motion: ClosedMotion, walk: Forward, closed: Sequence[int], sticks: Sequence[int]) -> list[Number]:
+    """Accelerations that closed contacts keep at 0: of gaps, and of slips of those that stick."""
+    moved = {k: motion.contacts.each[k].accelerations(walk) for k in closed}
+    return [*(moved[k][0] for k in closed), *(moved[k][1] for k in sticks)]
+
+
+def _eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], Number]:
+    """x of A x = b, masses first and then forces; and the least pivot, of masses and of forces that have a solution
+    all positive."""
+    count, least = len(right), matrix[0][0]
+    xp = namespace(least)
+    for k in range(count):
+        least = xp.minimum(least, matrix[k][k])
+        for i in range(k + 1, count):
+            share = matrix[i][k] / matrix[k][k]
+            matrix[i] = [a - share * b for a, b in zip(matrix[i], matrix[k], strict=True)]
+            right[i] = right[i] - share * right[k]
+    found: list[Number] = [0.0] * count
+    for i in reversed(range(count)):
+        rest = sum((matrix[i][j] * found[j] for j in range(i + 1, count)), 0.0)
+        found[i] = (right[i] - rest) / matrix[i][i]
+    return found, least

@@ -71,10 +71,12 @@ class Crossing(NamedTuple):
 class ContactMotion(Integration):
     """An integration that follows the contacts of `motion`.
 
-    onsets: of each contact its speed of approach, m/s, None while it does not touch; impacts: those that are over.
+    onsets: of each contact its speed of approach, m/s, None while it does not touch; impacts: those that are over;
+    senses: of joints that may stick, see `Moment`.
     """
 
     impacts: list[Impact] = field(default_factory=list)
+    senses: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,7 +107,7 @@ class ContactMotion(Integration):
             crossing = self._first(dense, before, times)
             end = after if crossing is None else crossing.time
             self._measured(dense, np.append(times[times < end], end), before)
-            self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets))
+            self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets, self.senses))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
             self._follow(end, found, sense, now)
             self._held(solver, found)

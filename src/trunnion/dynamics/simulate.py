@@ -23,6 +23,8 @@ from trunnion.dynamics.rates import Seeing, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
 from trunnion.dynamics.shown import Touches, as_stated
+from trunnion.dynamics.stick_motion import StickMotion
+from trunnion.dynamics.sticking import StickingMotion
 from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tables import tabulated
@@ -91,7 +93,7 @@ def simulated(
     _check_step(impact_step, duration, mechanism)
     if in_play(mechanism):
         return _with_play(run, duration, steps, tolerance, progress, impact_step)
-    motion = FreeMotion.of(run)
+    motion = StickingMotion.of(run)
     known = places(motion)
     integration = integration_of(motion, known, duration, tolerance, progress)
     row = initial_row(motion)
@@ -109,7 +111,7 @@ def _with_play(
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
     rigid = is_rigid(run.system.mechanism)
-    motion = (ClosedMotion if rigid else FreeMotion).of(prepare(bare.mechanism), contacts)
+    motion = (ClosedMotion if rigid else StickingMotion).of(prepare(bare.mechanism), contacts)
     row = initial_row(motion)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
@@ -121,7 +123,8 @@ def _with_play(
         integration = ImpactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
         integration.impact_step = impact_step
     else:
-        integration = ContactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
+        kind = StickMotion if motion.resisted else ContactMotion
+        integration = kind(motion, rates, duration, tolerances, progress=progress, times=times)
     solution = _run(integration, row)
     time = np.linspace(0.0, duration, steps + 1)
     books = Filling(motion, solution, time, run).books()
@@ -143,6 +146,8 @@ def integration_of(
 ) -> Integration:  # fmt: skip
     """What integrates a motion: from tables where it has them, else by walks."""
     tables, walks = tabulated(motion, known), Walks(motion)
+    if motion.resisted:
+        return StickMotion(motion, walks, duration, tolerance, progress=progress, times=load_times(motion, duration))
     rates = (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
     return Integration(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
@@ -206,7 +211,8 @@ class Filling:
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
-            second, back, onsets = self._solved(at._replace(onsets=stretch.onsets), stretch)
+            at = at._replace(onsets=stretch.onsets, senses=stretch.senses)
+            second, back, onsets = self._solved(at, stretch)
             seconds[:, lanes] = second
             window = slice(int(lanes[0]), int(lanes[-1]) + 1)
             fill_chunk(arrays, back, at.time, window)
@@ -230,7 +236,7 @@ class Filling:
 
         def key(k: int) -> object:
             one = stretches[k]
-            return one.sense, one.resting, one.now, one.onsets, None if one.snapshot is None else id(one.snapshot)
+            return one.sense, one.resting, one.now, one.onsets, one.senses, None if one.snapshot is None else id(one.snapshot)
 
         begin = 0
         for i in range(1, len(which) + 1):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from timed import slider_crank, wheel
 from trunnion.dynamics.simulate import simulate
 from trunnion.model.mechanism import Mechanism
 
@@ -22,80 +24,86 @@ F = 0.3
 
 def events(data: Any) -> list[tuple[str, str, float]]:
     """Kind, joint and time, s, of all events."""
-    return [(kind, of, float(time)) for (kind, of, *_), time in zip(json.loads(data.attrs["events"]), data.event_time, strict=True)]
+    return [
+        (kind, of, float(time))
+        for (kind, of, *_), time in zip(json.loads(data.attrs["events"]), data.event_time, strict=True)
+    ]
 
 
-def reference(
-    state: Array, end: float, parts: Callable[[Array], tuple[Array, Array, Array]],
-    limits: Callable[[Array, Array], Array], ways: Array,
-) -> tuple[Array, list[tuple[str, int, float]]]:  # fmt: skip
+@dataclass
+class Reference:
     """Motion of M q̈ + h = −Wᵀ(friction), friction ± its limit or what keeps W q̇ at 0, from event to event.
 
-    parts: mass matrix, h, their coordinates; limits: of the state and the accelerations; ways: W, (joint, coordinate).
+    parts: M and h; limits: of the state and the accelerations; ways: W, (joint, coordinate); modes: of the joints, +1
+    or −1 where they slide, 0 where they stick.
     """
-    count, time, found = len(state) // 2, 0.0, []
-    modes = [int(np.sign(one)) if abs(one) > 1e-9 else 0 for one in ways @ state[count:]]
 
-    def solved(y: Array, modes: Sequence[int]) -> tuple[Array, Array]:
+    parts: Callable[[Array], tuple[Array, Array]]
+    limits: Callable[[Array, Array], Array]
+    ways: Array
+    modes: list[int] = field(default_factory=list)
+
+    def solved(self, y: Array, modes: Sequence[int]) -> tuple[Array, Array]:
         """Accelerations and friction in the joints: limits follow the accelerations, by repeated substitution."""
-        mass, rest, _ = parts(y)
-        second, force = np.zeros(count), np.zeros(len(ways))
+        mass, rest = self.parts(y)
+        count, held = len(rest), [k for k, mode in enumerate(modes) if mode == 0]
+        second, force = np.zeros(count), np.zeros(len(modes))
+        rows = self.ways[held]
+        matrix = np.block([[mass, rows.T], [rows, np.zeros((len(held), len(held)))]])
         for _ in range(60):
-            limit = limits(y, second)
-            held = [k for k, mode in enumerate(modes) if mode == 0]
-            slid = sum((ways[k] * mode * limit[k] for k, mode in enumerate(modes)), np.zeros(count))
-            matrix = np.block([[mass, ways[held].T], [ways[held], np.zeros((len(held), len(held)))]])
-            answer = np.linalg.solve(matrix, np.concatenate([-rest - slid, np.zeros(len(held))]))
+            force = np.array(modes) * self.limits(y, second)
+            answer = np.linalg.solve(matrix, np.concatenate([-rest - self.ways.T @ force, np.zeros(len(held))]))
             second = answer[:count]
-            force = np.array([mode * limit[k] for k, mode in enumerate(modes)])
             force[held] = answer[count:]
         return second, force
 
-    def consistent(y: Array, crossed: int | None, left: bool) -> list[int]:
-        free = [k for k, one in enumerate(ways @ y[count:]) if abs(one) < 1e-7 or k == crossed]
+    def consistent(self, y: Array, crossed: int | None = None) -> list[int]:
+        """The first case of sticking and sliding that friction and accelerations allow."""
+        rates = self.ways @ y[len(y) // 2 :]
+        free = [k for k, one in enumerate(rates) if abs(one) < 1e-7 or k == crossed]
+        left = crossed is not None and self.modes[crossed] == 0
         for case in itertools.product((0, 1, -1), repeat=len(free)):
-            tried = [int(np.sign(one)) for one in ways @ y[count:]]
+            tried = [int(np.sign(one)) for one in rates]
             for k, mode in zip(free, case, strict=True):
                 tried[k] = mode
-            second, force = solved(y, tried)
-            if left and tried[crossed] == 0:  # type: ignore[call-overload]
-                continue
-            limit = limits(y, second)
-            if all(abs(force[k]) <= limit[k] * (1 + 1e-9) if tried[k] == 0 else
-                   tried[k] * (ways[k] @ second) >= -1e-6 for k in free):  # fmt: skip
+            second, force = self.solved(y, tried)
+            limit = self.limits(y, second)
+            held = (abs(force[k]) <= limit[k] * (1 + 1e-9) for k in free if tried[k] == 0)
+            slid = (tried[k] * (self.ways[k] @ second) >= -1e-6 for k in free if tried[k])
+            if all(held) and all(slid) and not (left and tried[crossed or 0] == 0):
                 return tried
         raise AssertionError("no case is consistent")
 
-    modes = consistent(state, None, False)
-    while time < end:
-        def watch(k: int) -> Callable[[float, Array], float]:
-            def own(t: float, y: Array) -> float:
-                if modes[k]:
-                    return modes[k] * float(ways[k] @ y[count:]) + 1e-11
-                second, force = solved(y, modes)
-                return float(limits(y, second)[k] - abs(force[k])) + 1e-11
+    def watched(self, k: int) -> Callable[[float, Array], float]:
+        """What stays above 0 until the k-th joint does something else."""
 
-            own.terminal, own.direction = True, -1.0  # type: ignore[attr-defined]
-            return own
+        def own(t: float, y: Array) -> float:
+            if self.modes[k]:
+                return self.modes[k] * float(self.ways[k] @ y[len(y) // 2 :]) + 1e-11
+            second, force = self.solved(y, self.modes)
+            return float(self.limits(y, second)[k] - abs(force[k])) + 1e-11
 
-        now = list(modes)
-        part = solve_ivp(
-            lambda t, y: np.concatenate([y[count:], solved(y, now)[0]]), (time, end), state,
-            method="DOP853", rtol=1e-11, atol=1e-12, events=[watch(k) for k in range(len(ways))], max_step=0.02,
-        )  # fmt: skip
-        time, state = float(part.t[-1]), part.y[:, -1].copy()
-        hit = [k for k, times in enumerate(part.t_events) if len(times)]
-        if not hit:
-            break
-        (k,) = hit[:1]
-        left = modes[k] == 0
-        was, modes = modes, consistent(state, k, left)
-        for i in range(len(ways)):
-            if was[i] and not modes[i]:
-                state[count:] -= np.linalg.lstsq(ways[[i]], ways[[i]] @ state[count:])[0]
-            if bool(was[i]) != bool(modes[i]):
-                found.append(("break-away" if was[i] == 0 else "stick", i, time))
-    return state, found
+        own.terminal, own.direction = True, -1.0  # type: ignore[attr-defined]
+        return own
+
+    def run(self, state: Array, end: float) -> tuple[Array, list[tuple[str, int, float]]]:
+        """The state at the end, and the events."""
+        time, count, found = 0.0, len(state) // 2, list[tuple[str, int, float]]()
+        self.modes = self.consistent(state)
+        while True:
+            part = solve_ivp(
+                lambda t, y: np.concatenate([y[count:], self.solved(y, self.modes)[0]]), (time, end), state,
+                method="DOP853", rtol=1e-11, atol=1e-12, events=[self.watched(k) for k in range(len(self.ways))],
+                max_step=0.02,
+            )  # fmt: skip
+            time, state = float(part.t[-1]), part.y[:, -1].copy()
+            hit = [k for k, times in enumerate(part.t_events) if len(times)]
+            if not hit:
+                return state, found
+            was, self.modes = self.modes, self.consistent(state, hit[0])
+            for i, (before, after) in enumerate(zip(was, self.modes, strict=True)):
+                if bool(before) != bool(after):
+                    found.append(("stick" if before else "break-away", i, time))
 
 
 # ---- blocks ---------------------------------------------------------------------------------------------------
@@ -127,18 +135,20 @@ def blocks(**more: Any) -> Mechanism:
 
 
 def test_blocks_stick_and_slip_as_their_equations_say() -> None:
-    data = simulate(blocks(), 2.5, 50)
+    data = simulate(blocks(), 1.3, 20)
     mass = np.array([[LOW + HIGH, HIGH], [HIGH, HIGH]])
     limit = np.array([0.05 * (LOW + HIGH) * G, F * HIGH * G])
-    end, told = reference(
-        np.array([0.4, 0.0, 0.0, 0.0]), 2.5, lambda y: (mass, np.array([STIFF * y[0], 0.0]), y), lambda y, a: limit,
-        np.eye(2),
-    )  # fmt: skip
+    one = Reference(lambda y: (mass, np.array([STIFF * y[0], 0.0])), lambda y, a: limit, np.eye(2))
+    end, told = one.run(np.array([0.4, 0.0, 0.0, 0.0]), 1.3)
     found = [one for one in events(data) if one[2] > 0]
     assert [(kind, "AB"[k]) for kind, k, _ in told] == [(kind, of) for kind, of, _ in found]
     assert [time for *_, time in found] == pytest.approx([time for *_, time in told], abs=1e-7)
     assert data.drive_coordinate[:, -1].values == pytest.approx(end[:2], abs=1e-7)
     assert float(abs(data.energy_residual).max()) < 1e-8 * float(data.work_friction[-1])
+    sticks = [kind for kind, of, _ in found if of == "B"]
+    assert sticks == ["stick", "break-away"]
+    assert data.sticking.sel(joint="B").values.sum() == 1  # of the rows, 65 ms apart
+    assert not data.sticking.sel(joint="A").values.any()
 
 
 # ---- a double pendulum ----------------------------------------------------------------------------------------
@@ -149,9 +159,7 @@ M, J, C = (1.0, 0.8), (0.02, 0.015), (0.25, 0.2)
 
 def pendulum(friction: float = F, **more: Any) -> Mechanism:
     """Two links that hang from thick pins; relative angles are the coordinates."""
-    bars = {
-        name: {"mass": M[i], "inertia": J[i], "centre": [C[i], 0]} for i, name in enumerate(("upper", "lower"))
-    }
+    bars = {name: {"mass": M[i], "inertia": J[i], "centre": [C[i], 0]} for i, name in enumerate(("upper", "lower"))}
     data: dict[str, Any] = {
         "gravity": [0, -G],
         "links": {
@@ -172,7 +180,7 @@ def pendulum(friction: float = F, **more: Any) -> Mechanism:
     return Mechanism(**{**data, **more})
 
 
-def _pendulum_parts(y: Array) -> tuple[Array, Array, Array]:
+def _pendulum_parts(y: Array) -> tuple[Array, Array]:
     """Lagrange's equations in relative angles: M q̈ + h = 0."""
     (a, b, u, v) = y
     couple = M[1] * ARM * C[1]
@@ -187,7 +195,7 @@ def _pendulum_parts(y: Array) -> tuple[Array, Array, Array]:
         -couple * np.sin(b) * (2 * u * v + v * v) + (M[0] * C[0] + M[1] * ARM) * G * np.cos(a) + weight,
         couple * np.sin(b) * u * u + weight,
     ])  # fmt: skip
-    return mass, h, y
+    return mass, h
 
 
 def _pendulum_limits(y: Array, second: Array) -> Array:
@@ -201,12 +209,48 @@ def _pendulum_limits(y: Array, second: Array) -> Array:
     return F * PIN * np.abs([at_a, at_b])
 
 
+@pytest.mark.slow
 def test_a_double_pendulum_comes_to_rest_in_friction_as_its_equations_say() -> None:
     data = simulate(pendulum(), 3.0, 50)
-    end, told = reference(np.array([-0.3, 0.5, 0.0, 0.0]), 3.0, _pendulum_parts, _pendulum_limits, np.eye(2))
+    end, told = Reference(_pendulum_parts, _pendulum_limits, np.eye(2)).run(np.array([-0.3, 0.5, 0.0, 0.0]), 3.0)
     found = [one for one in events(data) if one[2] > 0]
     assert [(kind, "AB"[k]) for kind, k, _ in told] == [(kind, of) for kind, of, _ in found]
     assert len(told) > 3
     assert [time for *_, time in found] == pytest.approx([time for *_, time in told], abs=1e-6)
     assert data.drive_coordinate[:, -1].values == pytest.approx(end[:2], abs=1e-6)
     assert float(abs(data.energy_residual).max()) < 1e-8 * float(data.work_friction[-1])
+
+
+# ---- coordinates that know nothing of each other --------------------------------------------------------------
+
+
+def beside(one: Mechanism) -> Mechanism:
+    """A mechanism with a wheel beside it, that is free as well."""
+    data = one.data()
+    ground = one.fixed_link
+    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
+    links[ground] = {**links[ground], "points": {**links[ground]["points"], "W": [1, 1]}}
+    joints = {**data["joints"], "W": {"type": "revolute", "links": [ground, "disc"], "friction": 0}}
+    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": 3.0}}}
+    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers})
+
+
+def test_a_braked_motor_with_a_lossy_gear_stops_as_its_closed_form_says() -> None:
+    motor = {"kind": "constant", "effort": 2, "efficiency": 0.8, "off_from": 1.0, "brake": 0.4, "brake_from": 1.0}
+    data = simulate(beside(wheel(motor, drag=0.6)), 3.0, 30)
+    assert ("stick", "A", pytest.approx(2.0, abs=1e-8)) in events(data)
+    assert data.drive_coordinate.sel(driver="A").values[-1] == pytest.approx(20.0, abs=1e-7)  # 10 on either side of 1 s
+    assert data.drive_rate.sel(driver="W").values[-1] == pytest.approx(3.0, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_a_linkage_breaks_away_beside_another_as_alone() -> None:
+    """At rest four joints stick in one freedom: the friction of all together holds it, as long as it can."""
+    motor = {"kind": "table", "over": "time", "points": [[0, 0], [0.1, 8]]}
+    drivers = {"O": {"speed": 100, "motor": motor, "initial": {"coordinate": 1.0, "speed": 0}}}
+    alone = simulate(one := slider_crank(0.1, drivers=drivers), 0.06, 12, tolerance=1e-10)
+    both = simulate(beside(one), 0.06, 12, tolerance=1e-10)
+    (left,) = (time for kind, of, time in events(alone) if kind == "break-away")
+    assert [time for kind, of, time in events(both) if (kind, of) == ("break-away", "O")] == pytest.approx([left])
+    for key in ("drive_coordinate", "drive_rate"):
+        assert both[key].sel(driver="O").values == pytest.approx(alone[key].sel(driver="O").values, abs=1e-7)

@@ -170,8 +170,10 @@ class ClosedRates:
     def __call__(self, at: Moment) -> Rates:
         return (self.walks if any(at.onsets) else self.free)(at)
 
-    def derivative(self, time: float, row: Array, onsets: Sequence[Onset], now: float) -> Array:
-        """The derivative of a row; NaN for no answer."""
+    def derivative(
+        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
+    ) -> Array:
+        """The derivative of a row; NaN for no answer. senses: none, as no joint sticks."""
         if self.swift is not None and not any(onsets):
             found: Array = self.swift(time, row, onsets, now)
             return found

@@ -124,7 +124,7 @@ class ContactMotion(Integration):
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            found: Array = derivative(moment, numbers, self.onsets, now)
+            found: Array = derivative(moment, numbers, self.onsets, now, self.senses)
             return found
 
         return rate

@@ -23,10 +23,10 @@ from trunnion.dynamics.rates import Seeing, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books, result_of
 from trunnion.dynamics.shown import Touches, as_stated
-from trunnion.dynamics.stick_motion import StickMotion
-from trunnion.dynamics.sticking import StickingMotion
 from trunnion.dynamics.start import Places, initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.stick_motion import StickMotion
+from trunnion.dynamics.sticking import StickingMotion
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
 from trunnion.dynamics.touching import Onset, contacts_of
@@ -147,7 +147,8 @@ def integration_of(
     """What integrates a motion: from tables where it has them, else by walks."""
     tables, walks = tabulated(motion, known), Walks(motion)
     if motion.resisted:
-        return StickMotion(motion, walks, duration, tolerance, progress=progress, times=load_times(motion, duration))
+        seeing: Seeing = compiled_rates(motion) or walks
+        return StickMotion(motion, seeing, duration, tolerance, progress=progress, times=load_times(motion, duration))
     rates = (compiled_rates(motion) or walks) if tables is None else TabulatedRates(tables, walks)
     return Integration(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
@@ -227,7 +228,18 @@ class Filling:
         if self.stated is not None:
             arrays, labels = as_stated(self.stated, motion.contacts, touches, arrays, labels)
             energies = np.vstack([energies, touches.stored.sum(axis=0)])
-        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting, touches)
+        works, sticking = layout.works(rows), self._sticking(which)
+        return Books(self.time, arrays, labels, whole, seconds, energies, works, resting, touches, sticking)
+
+    def _sticking(self, which: NDArray[np.intp]) -> NDArray[np.bool_] | None:
+        """Which joints stick, (joint, row), where they do one by one; of joints in play none does."""
+        if not self.motion.resisted:
+            return None
+        joints = list((self.stated or self.motion.run).system.joints)
+        found = np.zeros((len(joints), len(which)), bool)
+        for i, name in enumerate(self.motion.resisted):
+            found[joints.index(name)] = [k >= 0 and self.solution.stretches[k].senses[i] == 0 for k in which]
+        return found
 
     def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
         """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
@@ -236,7 +248,14 @@ class Filling:
 
         def key(k: int) -> object:
             one = stretches[k]
-            return one.sense, one.resting, one.now, one.onsets, one.senses, None if one.snapshot is None else id(one.snapshot)
+            return (
+                one.sense,
+                one.resting,
+                one.now,
+                one.onsets,
+                one.senses,
+                None if one.snapshot is None else id(one.snapshot),
+            )
 
         begin = 0
         for i in range(1, len(which) + 1):

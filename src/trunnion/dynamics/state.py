@@ -43,8 +43,8 @@ class Moment(NamedTuple):
     """The state of some lanes: time, s, coordinates and rates (coordinate, lane), controllers' integrals likewise,
     deflections of bristles (bristle, lane), m. sense: of the motion where the speed is 0, +1 or −1, of one coordinate;
     now: a time within the stretch, which says what is switched on; onsets: of each contact of joints in play its speed
-    of approach, m/s, None while it does not touch; senses: where several coordinates are free, in which sense each joint
-    of `FreeMotion.resisted` slides, +1 or −1, 0 where it sticks; empty: it is as the speeds say.
+    of approach, m/s, None while it does not touch; senses: where several coordinates are free, in which sense each
+    joint of `FreeMotion.resisted` slides, +1 or −1, 0 where it sticks; empty: it is as the speeds say.
     """
 
     time: Array
@@ -292,7 +292,8 @@ class FreeMotion:
         time = np.tile(at.time, count + 1)
         many = at._replace(time=time, q=q, rate=rate, integral=integral, bristles=bristles)
         wide: dict[str, Sense] = {
-            joint: np.tile(np.asarray(sense), count + 1) if np.ndim(sense) else sense for joint, sense in senses.items()
+            joint: np.tile(sense, count + 1) if isinstance(sense, np.ndarray) else sense
+            for joint, sense in senses.items()
         }
         found = self.missing(many, np.concatenate(tried, axis=1), wide).reshape(count, count + 1, lanes)
         slopes = (found[:, 1:] - found[:, :1]) / steps[None]

@@ -29,6 +29,8 @@ MEET = 1e-8  # of a typical speed: joints that are as slow may stick
 SLACK = 1e-10  # of a typical speed, of a share: what a joint may miss before it counts
 BRINK = 1e-8  # of a share: as near to its end a joint breaks away
 TINY = 1e-9  # of the accelerations: what is none
+SOON = 1e-3  # of a typical time: how far ahead one looks for the sense of what does not move now
+IDLE = 1e-7  # of a typical speed for a typical rate: what moves a joint as little does not, now
 MOST_CASES = 729  # of joints that stick or slide, which are tried one after the other
 
 
@@ -73,7 +75,8 @@ class StickMotion(ContactMotion):
                 walk, left = self.motion.walk(at, np.zeros_like(at.q)), 0.0 * senses
             else:
                 found = self.motion.accelerate(at)
-                walk, left = found.back.walk, 1.0 + SLACK - np.abs(np.nan_to_num(found.shares, nan=np.inf))
+                shares = np.asarray(found.shares, float)
+                walk, left = found.back.walk, 1.0 + SLACK - np.abs(np.nan_to_num(shares, nan=np.inf))
             ahead = senses * self.free.speeds(walk, len(times)) / self._slow[:, None] + SLACK
         own = np.where(senses == 0, left, ahead)
         return np.vstack([super()._gaps(dense, times), own]) if self.count else own
@@ -92,12 +95,17 @@ class StickMotion(ContactMotion):
         before, crossed = self.senses, self._crossed
         at, self._crossed = self.moment(time, row, 0.0, self.now), None
         with np.errstate(all="ignore"):
-            speeds = self.free.speeds(self.motion.walk(at, np.zeros_like(at.q)), 1)[:, 0]
-            may = [k for k, speed in enumerate(speeds) if abs(speed) <= MEET * self._slow[k] or k == crossed]
-            may = sorted({*may, *(k for k, sense in enumerate(before) if sense == 0)})
-            base = [0 if k in may else int(np.sign(speed)) for k, speed in enumerate(speeds)]
+            ways, speeds = self.free.ways(at)
+            slow = {k for k, speed in enumerate(speeds) if abs(speed) <= MEET or k == crossed}
+            slow |= {k for k, sense in enumerate(before) if sense == 0}
+            may = [k for k in sorted(slow) if np.max(np.abs(ways[k])) > IDLE]  # others turn round as they must
+            base = [0 if k in may else int(np.sign(speed)) or 1 for k, speed in enumerate(speeds)]
             brink = crossed is not None and before[crossed] == 0
             senses = self._consistent(at, base, may, brink)
+            if senses is not None and (idle := [k for k in slow if k not in may and k != crossed]):
+                ahead = self._ahead(at._replace(senses=senses))
+                base = [int(np.sign(ahead[k])) or 1 if k in idle else sense for k, sense in enumerate(base)]
+                senses = self._consistent(at, base, may, brink)
             if senses is None:
                 self._stop("no_acceleration", time, row)
                 return False
@@ -112,6 +120,13 @@ class StickMotion(ContactMotion):
             elif senses[k] != 0 and not was:
                 self.solution.events.append(Event(time, "break-away", joint, float(senses[k])))
         return True
+
+    def _ahead(self, at: Moment) -> Array:
+        """Relative speeds of all joints a little later, as the accelerations have it."""
+        second, soon = self.motion.accelerate(at).second, SOON / np.max(self.pace)
+        rate = at.rate + second * soon
+        walk = self.motion.walk(at._replace(q=at.q + 0.5 * (at.rate + rate) * soon, rate=rate), second)
+        return self.free.speeds(walk, 1)[:, 0]
 
     def _consistent(self, at: Moment, base: Sequence[int], may: Sequence[int], brink: bool) -> Senses | None:
         """The senses of all joints of which those that may stick agree with shares and accelerations; None: no case
@@ -133,9 +148,7 @@ class StickMotion(ContactMotion):
                 return tuple(senses)
         return None
 
-    def _objections(
-        self, at: Moment, senses: Sequence[int], may: Sequence[int], brink: bool
-    ) -> dict[int, int] | None:
+    def _objections(self, at: Moment, senses: Sequence[int], may: Sequence[int], brink: bool) -> dict[int, int] | None:
         """Joints that do not do what a case says, with what they seem to do instead; None: it has no accelerations.
         brink: whether those break away that are at the end of their share."""
         found = self.motion.accelerate(at._replace(senses=tuple(senses)))

@@ -1,9 +1,10 @@
 """Accelerations while single joints stick and others slide: several free coordinates in friction.
 
-A joint that sticks keeps its relative speed at 0, a q̈ + b = 0, under a share s of what resists it, −1 ≤ s ≤ 1. Shares
-and accelerations are found together, from the efforts E(q̈, s) = T and from the joints that stay at rest: Newton's method
-on the walks, one lane for each acceleration and each share. Where more joints stick than coordinates are free the shares
-are not determined; of all that hold, those are taken whose largest is least, so that the joints hold as long as they can.
+A joint that sticks keeps its relative speed at 0, a q̈ + b = 0, under a share s of what resists it, −1 ≤ s ≤ 1.
+Shares and accelerations are found together, from the efforts E(q̈, s) = T and from the joints that stay at rest:
+Newton's method on the walks, one lane for each acceleration and each share. Where more joints stick than coordinates
+are free the shares are not determined; of all that hold, those are taken whose largest is least, so that the joints
+hold as long as they can.
 """
 
 from __future__ import annotations
@@ -121,17 +122,21 @@ class StickingMotion(FreeMotion):
 
         Source: A. Müller (2026), arXiv:2604.19419.
         """
-        count = len(self.names)
-        many = _repeated(at, count + 2)._replace(
-            rate=np.hstack([np.eye(count, count + 1, 1), at.rate]), onsets=(None,) * len(at.onsets)
-        )
-        speeds = self.speeds(self.walk(many, np.zeros((count, count + 2))), count + 2)[list(sticks)]
-        ways = (speeds[:, 1:-1] - speeds[:, :1]) * np.sqrt(self.unit) / np.sqrt(self.typical[list(sticks)])[:, None]
-        missed = speeds[:, -1] / np.sqrt(self.typical[list(sticks)])
+        every, speeds = self.ways(at)
+        ways, missed = every[list(sticks)], speeds[list(sticks)]
         spread = np.linalg.solve(self.mass(at), ways.T)
         change = spread @ np.linalg.lstsq(ways @ spread, missed, rcond=RANK)[0]
         found: Array = at.rate[:, 0] - np.sqrt(self.unit) * change
         return found
+
+    def ways(self, at: Moment) -> tuple[Array, Array]:
+        """How relative speeds follow from the rates, (joint, coordinate), and these speeds, (joint,), all by what is
+        typical; one lane."""
+        count = len(self.names)
+        many = _repeated(at, count + 2)._replace(rate=np.hstack([np.eye(count, count + 1, 1), at.rate]))
+        speeds = self.speeds(self.walk(many, np.zeros((count, count + 2))), count + 2)
+        speeds = speeds / np.sqrt(self.typical)[:, None]
+        return (speeds[:, 1:-1] - speeds[:, :1]) * np.sqrt(self.unit), speeds[:, -1]
 
     def mass(self, at: Moment) -> Array:
         """∂E/∂q̈ without friction, coordinates by what is typical of each, (equation, coordinate); one lane."""
@@ -147,7 +152,9 @@ def _repeated(at: Moment, times: int) -> Moment:
     return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles)
 
 
-def _steps(slopes: Array, missed: Array, numbers: Array, unit: Array, typical: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _steps(
+    slopes: Array, missed: Array, numbers: Array, unit: Array, typical: Array
+) -> tuple[Array, NDArray[np.bool_]]:
     """The next step of Newton's method in every lane, and lanes in which more acceleration takes less effort."""
     lanes, count = missed.shape[1], len(missed) - len(typical)
     step, turned = np.full(missed.shape, np.nan), np.zeros(lanes, bool)
@@ -185,9 +192,10 @@ def least_shares(ways: Array, wanted: Array) -> Array:
     orthogonal to r − 1 of the columns W_j, of r equations. All other shares are ± that, as ν·W_j says.
     """
     rank, count = ways.shape
+    if rank == 0:
+        return np.zeros(count)
     if rank == count:
-        square: Array = np.linalg.lstsq(ways, wanted, rcond=1e-12)[0]
-        return square
+        return np.asarray(np.linalg.lstsq(ways, wanted, rcond=1e-12)[0], float)
     best, found = -1.0, np.zeros(count)
     for inside in itertools.combinations(range(count), rank - 1):
         normal = np.linalg.svd(ways[:, inside].T)[2][-1] if inside else np.ones(1)

@@ -1,10 +1,12 @@
 """Rates of a free motion as machine code: the walks recorded once.
 
 Without friction in the joints E(q, q̇, q̈) = E₀ + M q̈: one walk at rest and one for each unit acceleration give M and E₀,
-all at the same pose, so that the poses are computed once. The equation M q̈ = T − E₀ is solved by elimination as part of
-the program. With friction E is not affine: rounds of Newton's method, each with the walks for its own slopes, are a loop
-of the program, and where they or the friction did not settle the walks are asked. What contacts touch, in which sense
-joints slide and what is switched on decides which program it is; while a joint sticks the walks are asked.
+all at the same pose, so that the poses are computed once. The equation M q̈ = T − E₀ is solved by elimination as part
+of the program.
+
+With friction E is not affine: rounds of Newton's method, each with the walks for its own slopes, are a loop of the
+program, and where they or the friction did not settle the walks are asked. What contacts touch, in which sense joints
+slide and what is switched on decides which program it is; while a joint sticks the walks are asked.
 """
 
 from __future__ import annotations
@@ -104,9 +106,7 @@ class CompiledRates:
     def _program(self, what: str, at: Moment) -> _Program:
         return self._program_of(what, at.onsets, at.now, at.senses if what == "rates" else ())
 
-    def _program_of(
-        self, what: str, onsets: Sequence[Number | None], now: float, senses: tuple[int, ...]
-    ) -> _Program:
+    def _program_of(self, what: str, onsets: Sequence[Number | None], now: float, senses: tuple[int, ...]) -> _Program:
         touching = tuple(onset is not None for onset in onsets)
         key = what, touching, now, senses
         if key not in self._programs:
@@ -190,8 +190,9 @@ class _Program:
 
 def _rates_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
     """Accelerations, rates of the controllers' integrals, works, as `rates.Walks` has them; 1 where there is doubt."""
+    doubt: Number = 0.0
     if motion.affine:
-        second, doubt = _affine(motion, at, unit), 0.0
+        second = _affine(motion, at, unit)
     else:
         second, doubt = _by_rounds(motion, at, unit)
     drives = list(motion.drives.values())

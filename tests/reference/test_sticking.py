@@ -221,6 +221,25 @@ def test_a_double_pendulum_comes_to_rest_in_friction_as_its_equations_say() -> N
     assert float(abs(data.energy_residual).max()) < 1e-8 * float(data.work_friction[-1])
 
 
+@pytest.mark.slow
+def test_the_pendulum_in_space_is_that_in_the_plane() -> None:
+    plane = pendulum()
+    data = plane.data()
+    links = {
+        name: {
+            **link, "points": {key: {"at": [*at, 0], "axis": [0, 0, 1]} for key, at in link["points"].items()},
+            **({"centre": [*link["centre"], 0], "inertia": dict.fromkeys(("xx", "yy", "zz"), J[i - 1])} if i else {}),
+        }
+        for i, (name, link) in enumerate(data["links"].items())
+    }  # fmt: skip
+    pin = {"joint_defaults": {"pin": {"radius": PIN, "length": 1}, "friction": F}}
+    space = Mechanism(**{**data, "space": "spatial", "gravity": [0, -G, 0], "links": links, **pin})
+    one, other = simulate(plane, 0.75, 15), simulate(space, 0.75, 15)
+    assert [kind for kind, *_ in events(other)].count("stick") == 1
+    assert other.event_time.values == pytest.approx(one.event_time.values, abs=1e-7)
+    assert other.drive_coordinate.values == pytest.approx(one.drive_coordinate.values, abs=1e-7)
+
+
 # ---- coordinates that know nothing of each other --------------------------------------------------------------
 
 

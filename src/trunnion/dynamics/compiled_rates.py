@@ -43,7 +43,7 @@ def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
     """The rates as machine code; None where they cannot be: losses in gears, brakes, friction with a memory or at rest
     of one coordinate, an assembly that is followed, no llvmlite."""
     lossy = any(drive.brake or drive.efficiency < 1.0 for drive in motion.drives.values())
-    resting = motion.sticking and not motion.resisted
+    resting = motion.sticking and len(motion.names) == 1
     if lossy or resting or motion.bristles or motion.followed or find_spec("llvmlite") is None:
         return None
     found = CompiledRates(motion)

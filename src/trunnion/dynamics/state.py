@@ -26,7 +26,7 @@ from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
-from trunnion.solve.system import Cycle, System, Values, freed, law_of, rubbing, sticking
+from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
 __all__ = ["Accelerated", "FreeMotion", "Moment"]
 
@@ -128,7 +128,9 @@ class FreeMotion:
         if len(self.names) == 1:
             return ()
         held = {name for name, drive in self.drives.items() if drive.brake or drive.efficiency < 1.0}
-        return tuple(name for name in self.system.joints if name in held or name in self.sticking)
+        held |= self.system.resisted.keys()
+        held |= set(self.sticking) & set(felt(self.system, self.system.mechanism.parameter_set.nominal))
+        return tuple(name for name in self.system.joints if name in held)
 
     @cached_property
     def affine(self) -> bool:

@@ -46,6 +46,19 @@ def rattling(contact: dict[str, Any] | None = None, pin: dict[str, Any] | None =
     return Mechanism(**{**data, **more})
 
 
+def rubbing(friction: float | dict[str, Any], **more: Any) -> Mechanism:
+    """The same with friction in the other joints."""
+    sizes = {"guide": {"length": 0.05}}, {"pin": {"radius": 0.01}}
+    joints = {
+        name: one if name == "Q" else {**one, "friction": friction, **sizes[one["type"] == "revolute"]}
+        for name, one in rattling().data()["joints"].items()
+    }
+    return rattling(joints=joints, **more)
+
+
+SMOOTH = {"law": "brown-mcphee", "coefficient": 0.1, "static": 0.12, "transition_speed": 0.01}
+
+
 def both_pins(mass: float = 0.21) -> Mechanism:
     """The same with the crank pin in play as well: no joint holds the rod any more."""
     one = rattling().data()

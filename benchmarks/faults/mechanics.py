@@ -387,6 +387,30 @@ _DYNAMICS = (
     ),
 )
 
+_STICKING = (
+    Fault(
+        "shares-beyond-their-end",
+        "dynamics/stick_motion.py",
+        "if most > 1.0 + SLACK",
+        "if most > 1.5 + SLACK",
+        ("tests/reference/test_sticking.py", "-k", "blocks"),
+    ),
+    Fault(
+        "shares-that-are-not-the-least",
+        "dynamics/sticking.py",
+        "abs(normal @ wanted) / whole <= best",
+        "abs(normal @ wanted) / whole >= best >= 0.0",
+        ("tests/invariants/test_least_shares.py",),
+    ),
+    Fault(
+        "brake-that-holds-nothing",
+        "dynamics/motor.py",
+        " - share * self.braking(now)",
+        "",
+        ("tests/reference/test_sticking.py", "-k", "braked"),
+    ),
+)
+
 _CONTACT = (
     Fault(
         "slip-without-the-spin-of-the-pin",
@@ -432,4 +456,4 @@ _CONTACT = (
     ),
 )
 
-FAULTS = (*_CONTACT, *_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_DYNAMICS, *_MEASURES)
+FAULTS = (*_CONTACT, *_STICKING, *_ALGEBRA, *_JOINTS, *_GROUPS, *_ENGINES, *_SOLVE, *_CYCLE, *_DYNAMICS, *_MEASURES)

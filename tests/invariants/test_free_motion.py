@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
+from playing import rattling
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
 from trunnion.dynamics.integrate import Integration
@@ -213,15 +214,11 @@ def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
         simulate(wheel(LINEAR), **options)
 
 
-def test_several_free_drivers_do_not_stick() -> None:
-    data = {**wheel(LINEAR).data()}
-    data["links"] = {**data["links"], "ground": {"points": {"A": [0, 0], "B": [1, 0]}},
-                     "other": {"points": {"B": [0, 0]}, "inertia": 0.1}}  # fmt: skip
-    data["joints"] = {**data["joints"], "B": {"type": "revolute", "links": ["ground", "other"]}}
-    data["drivers"] = {**data["drivers"], "B": {"speed": 1, "free": True}}
+def test_joints_do_not_stick_beside_rigid_bodies_in_play() -> None:
+    loads = {"drag": {"joint": "S", "resisting_force": 1}}
     with pytest.raises(MechanismError) as caught:
-        simulate(Mechanism(**data), 1.0)
-    assert caught.value.findings[0].where == "loads.drag"
+        simulate(rattling({"law": "rigid", "restitution": 0.4}, loads=loads), 1e-3)
+    assert [one.where for one in caught.value.findings] == ["loads.drag"]
 
 
 @pytest.mark.parametrize("name", MOTORS)

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import trunnion
-from playing import LANKARANI, SPEED, both_pins, loose_slider, own_equations, rattling
+from playing import LANKARANI, SMOOTH, SPEED, both_pins, loose_slider, own_equations, rattling, rubbing
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.opened import in_play, opened
 from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
+from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import MechanismError
 from trunnion.joints.contact import CONTACT_LAWS, hertz_stiffness, loss_factor, restitution_of
 from trunnion.model.mechanism import Mechanism
@@ -107,6 +108,15 @@ def test_contacts_of_the_first_turn() -> None:
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [SMOOTH, 0.1], ids=["smooth", "coulomb"])
+def test_a_turn_with_friction_in_the_other_joints(friction: float | dict[str, Any]) -> None:
+    """Many contacts, and the books balance."""
+    result = trunnion.simulate(rubbing(friction), duration=2 * np.pi / SPEED, steps=200)
+    assert result.sizes["impact"] > 15
+    assert float(abs(result["energy_residual"]).max()) < 1e-8 * float(abs(result["work_drive"]).max())
+
+
 def test_the_reaction_in_play_is_the_contact_force() -> None:
     """On the slider by the rod; and the slider's mass times its acceleration, along the guide without friction."""
     result = trunnion.simulate(rattling(), duration=3e-4, steps=300)
@@ -121,7 +131,7 @@ def test_the_reaction_in_play_is_the_contact_force() -> None:
 
 def test_machine_code_has_the_rates_of_the_walks() -> None:
     pytest.importorskip("llvmlite")
-    for mechanism in (rattling(), both_pins(), loose_slider()):
+    for mechanism in (rattling(), both_pins(), loose_slider(), rubbing(SMOOTH), rubbing(0.1)):
         motion, row = _opened(mechanism)
         compiled = compiled_rates(motion)
         assert compiled is not None
@@ -131,7 +141,8 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
             onsets = tuple(
                 float(speed) if rng.random() < 0.5 else None for speed in rng.random(len(motion.contacts.each))
             )
-            at = Layout.of(motion).moment(np.array([1e-4]), state[:, None])._replace(onsets=onsets)
+            senses = tuple(int(one) for one in rng.choice((-1, 1), len(motion.resisted)))
+            at = Layout.of(motion).moment(np.array([1e-4]), state[:, None])._replace(onsets=onsets, senses=senses)
             one, other = compiled(at), Walks(motion)(at)
             assert np.allclose(one.second, other.second, rtol=1e-9)
             assert np.allclose(one.works, other.works, rtol=1e-9, atol=1e-13 * np.max(np.abs(other.second)))
@@ -141,7 +152,7 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
 
 def _opened(mechanism: Mechanism) -> tuple[FreeMotion, Array]:
     run = prepare(mechanism)
-    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
+    motion = StickingMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
     return motion, initial_row(motion)
 
 

@@ -12,6 +12,7 @@ from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import Run
 
@@ -109,8 +110,25 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
     yield from _of_several(mechanism)
     if len(free) < 2 and not playing:
         return
-    why = f"with {', '.join(playing)} in play" if playing else f"with {len(free)} free drivers"
-    yield from _sticking(mechanism, free, playing, why)
+    yield from _contacts(mechanism, playing)
+    if any(joint.contact.of.rigid for joint in mechanism.effective_joints.values() if joint.contact is not None):
+        why = "joints stick one by one, which is not solved beside joints in play between rigid bodies"
+        yield from _sticking(mechanism, free, why, "use another law of contact, or remove it")
+        return
+    for where, joint, what in _resisting(mechanism, free):
+        if joint in playing:
+            yield Finding(
+                f"{what} joint {joint}, which is in play", where, "remove it, or let another joint be in play"
+            )
+        elif PAIRS[mechanism.effective_joints[joint].type].count != 1:
+            why = f"{what} joint {joint}, which has more than one freedom, and {len(free)} coordinates are free"
+            remedy = f"use a law that is smooth at rest: {', '.join(_smooth())}; or one free driver"
+            yield Finding(why, where, remedy)
+
+
+def _smooth() -> list[str]:
+    """Friction laws without an interval at rest."""
+    return [name for name, law in FRICTION_LAWS.items() if not law.interval_at_rest]
 
 
 def _of_several(mechanism: Mechanism) -> Iterator[Finding]:
@@ -139,41 +157,39 @@ def _unlike(mechanism: Mechanism, playing: list[str]) -> Iterator[Finding]:
         yield Finding(what, f"joints.{other}.contact.law", "use law: rigid for all joints in play, or for none")
 
 
-def _sticking(mechanism: Mechanism, free: list[str], playing: list[str], why: str) -> Iterator[Finding]:
-    """What may hold a joint at rest where several coordinates are free: joints would stick one by one."""
-    one_by_one, remedy = (
-        f"{why} joints stick one by one",
-        "remove it, or let no joint be in play" if playing else "remove it, or use one free driver",
-    )
-    for name in free:
-        motor = mechanism.drivers[name].motor
-        if motor is None:
-            continue
-        if motor.efficiency is not None and motor.efficiency.source != 1:
-            what = f"the gear's loss may hold its joint at rest, and {one_by_one}"
-            yield Finding(what, f"drivers.{name}.motor.efficiency", remedy)
-        if motor.brake is not None:
-            yield Finding(
-                f"a brake may hold its joint at rest, and {one_by_one}", f"drivers.{name}.motor.brake", remedy
-            )
-    smooth = [name for name, law in FRICTION_LAWS.items() if not law.interval_at_rest]
-    plain = [name for name in smooth if FRICTION_LAWS[name].relaxation is None]
-    for name, joint in mechanism.effective_joints.items():
+def _contacts(mechanism: Mechanism, playing: list[str]) -> Iterator[Finding]:
+    """Friction laws that are none of a contact which comes and goes."""
+    plain = [name for name in _smooth() if FRICTION_LAWS[name].relaxation is None]
+    for name in playing:
+        joint = mechanism.effective_joints[name]
         law = joint.friction.law if joint.friction else None
         may = ["coulomb"] if joint.contact and joint.contact.of.rigid else plain
-        if law and name in playing:
-            if law not in may:
-                what = f"the law {law} is not one of a contact that comes and goes"
-                yield Finding(what, f"joints.{name}.friction", f"use {' or '.join(may)}")
-        elif law and FRICTION_LAWS[law].interval_at_rest:
-            what = f"the law {law} lets a joint stick, and {one_by_one}"
-            yield Finding(what, f"joints.{name}.friction", f"use a law that is smooth at rest: {', '.join(smooth)}")
+        if law and law not in may:
+            what = f"the law {law} is not one of a contact that comes and goes"
+            yield Finding(what, f"joints.{name}.friction", f"use {' or '.join(may)}")
+
+
+def _resisting(mechanism: Mechanism, free: list[str]) -> Iterator[tuple[str, str, str]]:
+    """What may hold a joint at rest: its path, the joint, and words that end before the joint."""
+    for name in free:
+        motor = mechanism.drivers[name].motor
+        if motor is not None and motor.efficiency is not None and motor.efficiency.source != 1:
+            yield f"drivers.{name}.motor.efficiency", name, "the gear's loss may hold"
+        if motor is not None and motor.brake is not None:
+            yield f"drivers.{name}.motor.brake", name, "a brake may hold"
+    for name, joint in mechanism.effective_joints.items():
+        law = joint.friction.law if joint.friction else None
+        if law and joint.contact is None and FRICTION_LAWS[law].interval_at_rest:
+            yield f"joints.{name}.friction", name, f"the law {law} may hold"
         if joint.losses is not None and joint.losses.constant is not None:
-            what = f"it may hold the joint at rest, and {one_by_one}"
-            yield Finding(what, f"joints.{name}.losses.constant", "state viscous instead, or use one free driver")
+            yield f"joints.{name}.losses.constant", name, "the constant loss may hold"
     for name, load in mechanism.loads.items():
         if load.joint is not None:
-            what = f"it may hold its joint at rest, and {one_by_one}"
-            remedy = "state it as a force at a point of a link, use a damper instead, or no joint in play"
-            other = "use a damper (springs: damping) instead, or one free driver"
-            yield Finding(what, f"loads.{name}", remedy if playing else other)
+            yield f"loads.{name}", load.joint, "the load may hold"
+
+
+def _sticking(mechanism: Mechanism, free: list[str], why: str, remedy: str) -> Iterator[Finding]:
+    """What may hold a joint at rest, where that is not solved."""
+    for where, joint, what in _resisting(mechanism, free):
+        smooth = f"use a law that is smooth at rest: {', '.join(_smooth())}" if where.endswith("friction") else remedy
+        yield Finding(f"{what} joint {joint}, and {why}", where, smooth)

@@ -204,8 +204,10 @@ class ClosedRates:
     def __call__(self, at: Moment) -> Rates:
         return (self.swift or self.walks)(at)
 
-    def derivative(self, time: float, row: Array, onsets: Sequence[Onset], now: float) -> Array:
-        """The derivative of a row; NaN for no answer."""
+    def derivative(
+        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
+    ) -> Array:
+        """The derivative of a row; NaN for no answer. senses: none, as no joint sticks."""
         if self.swift is not None:
             return self.swift.derivative(time, row, onsets, now)
         n = self.layout.coordinates

@@ -37,7 +37,8 @@ __all__ = ["CompiledClosed", "compiled_closed"]
 
 def compiled_closed(motion: ClosedMotion) -> CompiledClosed | None:
     """The rates as machine code; None where they cannot be."""
-    found = CompiledClosed(motion) if compilable(motion) else None
+    sure = motion.affine and not motion.sticking
+    found = CompiledClosed(motion) if sure and compilable(motion) else None
     return found if found and found.works(None) else None
 
 
@@ -90,7 +91,7 @@ def _linear(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Numbe
         moved = _rates(states([1.0 if i == k else 0.0 for i in range(count)]))
         columns += [one - zero for one, zero in zip(moved, rest, strict=True)]
     mass = [one for column in columns_of(motion, at, unit) for one in column]
-    return [*mass, *columns, *rest, *(state.gap for state in still)]
+    return [*mass, *columns, *rest, *(state.gap for state in still), 0.0]
 
 
 def _rates(states: Sequence[ContactState]) -> list[Number]:
@@ -122,7 +123,8 @@ def _closed(motion: FreeMotion, at: Moment, unit: Sequence[float], force: float)
     seen = [one[i] for i in range(len(Seen._fields)) for one in touches]
     xp = namespace(sound)
     second = [xp.where(sound > 0.0, one, np.nan) for one in second]
-    return [*second, *errors_of(motion, at), *works_recorded(motion, done, second), *seen]
+    back = motion.solve(done, second, sliding=True)
+    return [*second, *errors_of(motion, at), *works_recorded(motion, done, back), *seen, 0.0]
 
 
 def _driven(

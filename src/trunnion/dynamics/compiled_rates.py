@@ -1,8 +1,12 @@
-"""Rates of a free motion as machine code: the walks recorded once, for mechanisms whose efforts are affine in q̈.
+"""Rates of a free motion as machine code: the walks recorded once.
 
 Without friction in the joints E(q, q̇, q̈) = E₀ + M q̈: one walk at rest and one for each unit acceleration give M and E₀,
-all at the same pose, so that the poses are computed once. The equation M q̈ = T − E₀ is solved by elimination as part of
-the program. What contacts touch, and what is switched on, decides which program it is.
+all at the same pose, so that the poses are computed once. The equation M q̈ = T − E₀ is solved by elimination as part
+of the program.
+
+With friction E is not affine: rounds of Newton's method, each with the walks for its own slopes, are a loop of the
+program, and where they or the friction did not settle the walks are asked. What contacts touch, in which sense joints
+slide and what is switched on decides which program it is; while a joint sticks the walks are asked.
 """
 
 from __future__ import annotations
@@ -19,10 +23,11 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.traced import UntraceableError
+from trunnion.algebra.traced import UntraceableError, looped
 from trunnion.dynamics.rates import Layout, Rates, Seen, Walks
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import DIFFERENCE, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
+from trunnion.solve.backward import Backward
 from trunnion.solve.compiled_vectors import literals
 
 __all__ = [
@@ -40,6 +45,8 @@ __all__ = [
 Array = NDArray[np.float64]
 Figures = Callable[[FreeMotion, Moment], list[Number]]  # what a program computes, of a recorded motion
 
+ROUNDS = 5  # of Newton's method in a program
+CLOSE = 1e-8  # of an acceleration: a last step of which the next is below rounding
 MOST_LANES = 64  # that a program takes at a time
 TOUCHES, SLIPS, STICKS = 1, 2, 3  # how a contact touches: by a law, or closed between rigid bodies
 TOLD = (TOUCHES, SLIPS)  # of which something is told
@@ -60,15 +67,19 @@ def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
 
 
 def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
-    """The rates as machine code; None where they cannot be."""
-    found = CompiledRates(motion) if compilable(motion) else None
-    return found if found and found.works() else None
+    """The rates as machine code; None where they cannot be: losses in gears, brakes, friction with a memory or at rest
+    of one coordinate, an assembly that is followed, no llvmlite."""
+    resting = motion.sticking and len(motion.names) == 1
+    if resting or motion.bristles or not compilable(motion):
+        return None
+    found = CompiledRates(motion)
+    return found if found.works() else None
 
 
 def compilable(motion: FreeMotion) -> bool:
-    """Whether it may be: not with friction, an assembly that is followed, or without llvmlite."""
-    braked = any(drive.brake for drive in motion.drives.values())
-    return motion.affine and not (motion.sticking or braked or motion.followed or find_spec("llvmlite") is None)
+    """Whether it may be: without losses in gears, brakes and an assembly that is followed, where llvmlite is there."""
+    lossy = any(drive.brake or drive.efficiency < 1.0 for drive in motion.drives.values())
+    return not (lossy or motion.followed or find_spec("llvmlite") is None)
 
 
 class CompiledRates:
@@ -85,29 +96,36 @@ class CompiledRates:
         """Whether it can be recorded, with all contacts touching."""
         n, count = self.layout.coordinates, len(self.motion.contacts.each)
         q, rate, integral, none = (np.zeros((k, 1)) for k in (n, n, n, 0))
-        at = Moment(np.zeros(1), q, rate, integral, none, onsets=(onset,) * count)
+        senses = (1,) * len(self.motion.resisted)
+        at = Moment(np.zeros(1), q, rate, integral, none, onsets=(onset,) * count, senses=senses)
         try:
             self._program("rates", at)
-        except (UntraceableError, TypeError, ValueError, NotImplementedError):
+        except UntraceableError:
             return False
         return True
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
         n = self.layout.coordinates
+        if 0 in at.senses:
+            return self.walks(at)
         found = self._program("rates", at).run(at)[:, 0]
         if found[-1] != 0.0 or not np.all(np.isfinite(found)):
             return self.walks(at)
         return Rates(found[:n], found[n : 2 * n], np.empty(0), found[2 * n : self.last], True)
 
-    def derivative(self, time: float, row: Array, onsets: Sequence[Onset], now: float) -> Array:
+    def derivative(
+        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
+    ) -> Array:
         """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
         n, found = self.layout.coordinates, np.empty(len(row))
-        rates = self._program_of("rates", onsets, now).of_row(time, row[: 3 * n], onsets)
-        found[:n], found[n : 3 * n], found[3 * n :] = row[n : 2 * n], rates[: 2 * n], rates[2 * n : self.last]
-        if rates[-1] == 0.0 and math.isfinite(found.sum()):
-            return found
-        at = self.layout.moment(np.array([time]), row[:, None], now=now)._replace(onsets=tuple(onsets))
+        if 0 not in senses:
+            rates = self._program_of("rates", onsets, now, senses).of_row(time, row[: 3 * n], onsets)
+            found[:n], found[n : 3 * n], found[3 * n :] = row[n : 2 * n], rates[: 2 * n], rates[2 * n : self.last]
+            if rates[-1] == 0.0 and math.isfinite(found.sum()):
+                return found
+        at = self.layout.moment(np.array([time]), row[:, None], now=now)
+        at = at._replace(onsets=tuple(onsets), senses=senses)
         told = self.walks(at)
         return self.layout.row(row[n : 2 * n], told) if told.sound else np.full(len(row), np.nan)
 
@@ -119,13 +137,13 @@ class CompiledRates:
         return Seen(*found[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
     def _program(self, what: str, at: Moment) -> Program:
-        return self._program_of(what, at.onsets, at.now)
+        return self._program_of(what, at.onsets, at.now, at.senses if what == "rates" else ())
 
-    def _program_of(self, what: str, onsets: Sequence[Onset], now: float) -> Program:
+    def _program_of(self, what: str, onsets: Sequence[Onset], now: float, senses: tuple[int, ...]) -> Program:
         kinds = tuple(map(_kind, onsets))
-        key = what, kinds, now
+        key = what, kinds, now, senses
         if key not in self._programs:
-            self._programs[key] = Program(self.motion, self.figures(what, kinds), kinds, now)
+            self._programs[key] = Program(self.motion, self.figures(what, kinds), kinds, now, senses)
         return self._programs[key]
 
     def figures(self, what: str, kinds: Kinds) -> Figures:
@@ -136,7 +154,7 @@ class CompiledRates:
 class Program:
     """Some numbers of a motion as machine code, of lanes of states; the last of them: whether there is any doubt."""
 
-    def __init__(self, motion: FreeMotion, figures: Figures, kinds: Kinds, now: float) -> None:
+    def __init__(self, motion: FreeMotion, figures: Figures, kinds: Kinds, now: float, senses: tuple[int, ...]) -> None:
         from trunnion.engines.graph import POSITION, Graph
         from trunnion.engines.machine_code import MachineCode, vector_width
         from trunnion.engines.program import program
@@ -153,11 +171,11 @@ class Program:
         onsets = tuple(_onset(kind, told) for kind in kinds)
         parts: Any = [state[1 + k * n : 1 + (k + 1) * n] for k in range(3)]
         q, rate, integral = parts
-        at = Moment(cast("Any", state[0]), q, rate, integral, cast("Any", []), now=now, onsets=onsets)
+        at = Moment(cast("Any", state[0]), q, rate, integral, cast("Any", []), now=now, onsets=onsets, senses=senses)
         bare = replace(motion, run=replace(motion.run, values={**constant, **recorded}))
         with np.errstate(all="ignore"):
-            wanted = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]
-        doubt = graph.constant(0.0)
+            *wanted, doubtful = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]
+        doubt = doubtful
         for one in graph.doubts:
             doubt = graph.apply("max", doubt, graph.as_float(one))
         outputs = [*wanted, graph.as_float(doubt)]
@@ -204,12 +222,46 @@ class Program:
 
 
 def _rates_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
-    """Accelerations, rates of the controllers' integrals, works, as `rates.Walks` has them."""
+    """Accelerations, rates of the controllers' integrals, works, as `rates.Walks` has them; 1 where there is doubt."""
+    doubt: Number = 0.0
+    if motion.affine:
+        second = _affine(motion, at, unit)
+    else:
+        second, doubt = _by_rounds(motion, at, unit)
+    back = motion.solve(at, cast("Any", second), sliding=True)
+    for one in back.settled:
+        doubt = np.maximum(doubt, np.where(one.converged, 0.0, 1.0))
+    return [*second, *errors_of(motion, at), *works_recorded(motion, at, back), doubt]
+
+
+def _by_rounds(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> tuple[list[Number], Number]:
+    """Accelerations by Newton's method with slopes by differences, and 1 where it did not end."""
+    count = len(motion.names)
+
+    def step(numbers: list[Number]) -> list[Number]:
+        second, columns = numbers[:count], []
+        missed = missing_of(motion, at, second)
+        for k, size in enumerate(unit):
+            ahead = DIFFERENCE * np.maximum(np.abs(second[k]), 1e-2 * size)
+            tried = [one + ahead if i == k else one for i, one in enumerate(second)]
+            columns.append([(a - b) / ahead for a, b in zip(missing_of(motion, at, tried), missed, strict=True)])
+        change = _eliminated([list(row) for row in zip(*columns, strict=True)], missed)
+        return [*(one - part for one, part in zip(second, change, strict=True)), *change]
+
+    begin = [0.0 * rate for rate in at.rate]
+    found = looped(step, [*begin, *begin], ROUNDS)
+    doubt: Number = 0.0
+    for one, change, size in zip(found[:count], found[count:], unit, strict=True):
+        small = CLOSE * np.maximum(np.abs(one), 1e-2 * size)
+        doubt = np.maximum(doubt, np.where(np.abs(change) <= small, 0.0, 1.0))
+    return found[:count], doubt
+
+
+def _affine(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
+    """Accelerations where efforts are affine in them."""
     nothing: Any = [0.0] * len(motion.names)
-    columns = columns_of(motion, at, unit)
-    matrix = [list(row) for row in zip(*columns, strict=True)]
-    second = _eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])
-    return [*second, *errors_of(motion, at), *works_recorded(motion, at, second)]
+    matrix = [list(row) for row in zip(*columns_of(motion, at, unit), strict=True)]
+    return _eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])
 
 
 def columns_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[list[Number]]:
@@ -232,7 +284,7 @@ def errors_of(motion: FreeMotion, at: Moment) -> list[Number]:
 
 def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
     """E − T of every free coordinate."""
-    back = motion.solve(at, second, {})
+    back = motion.solve(at, second, sliding=True)
     found = []
     for i, (name, drive) in enumerate(motion.drives.items()):
         given = drive.effort(at.time, at.rate[i], second[i], at.integral[i], at.now)
@@ -240,14 +292,14 @@ def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
     return found
 
 
-def works_recorded(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
+def works_recorded(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
     """Powers, as `rates.works_of` has them."""
-    back = motion.solve(at, second, {})
     stated = motion.system.mechanism.loads
     drive = sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0)
     loads = sum((power for name, power in back.load_powers.items() if name in stated), 0.0)
     springs = sum((state.power for state in back.springs.values()), 0.0)
-    found = [drive, loads, springs, 0.0]
+    friction = sum((back.friction_power(joint) for joint in back.walk.system.joints), 0.0)
+    found = [drive, loads, springs, friction]
     if motion.contacts.each:
         found.append(sum((push.loss for _, push in motion.contacts.pushes(back.walk, at.onsets)), 0.0))
     return found
@@ -258,7 +310,7 @@ def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     nothing: Any = [0.0] * len(motion.names)
     found = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
     parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
-    return [one[i] for i in range(len(Seen._fields)) for one in parts]
+    return [*(one[i] for i in range(len(Seen._fields)) for one in parts), 0.0]
 
 
 def _eliminated(matrix: list[list[Number]], right: list[Number]) -> list[Number]:

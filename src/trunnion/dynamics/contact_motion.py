@@ -78,10 +78,12 @@ class Crossing(NamedTuple):
 class ContactMotion(Integration):
     """An integration that follows the contacts of `motion`.
 
-    onsets: of each contact its speed of approach, m/s, None while it does not touch; impacts: those that are over.
+    onsets: of each contact its speed of approach, m/s, None while it does not touch; impacts: those that are over;
+    senses: of joints that may stick, see `Moment`.
     """
 
     impacts: list[Impact] = field(default_factory=list)
+    senses: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,7 +114,7 @@ class ContactMotion(Integration):
             crossing = self._first(dense, before, times)
             end = after if crossing is None else crossing.time
             self._measured(dense, before, end)
-            self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets))
+            self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets, self.senses))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
             self._follow(end, found, sense, now)
             self._held(solver, found)
@@ -129,7 +131,7 @@ class ContactMotion(Integration):
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            found: Array = derivative(moment, numbers, self.onsets, now)
+            found: Array = derivative(moment, numbers, self.onsets, now, self.senses)
             return found
 
         return rate

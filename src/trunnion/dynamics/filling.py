@@ -53,7 +53,8 @@ class Filling:
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
-            second, back, onsets = self._solved(at._replace(onsets=stretch.onsets), stretch)
+            at = at._replace(onsets=stretch.onsets, senses=stretch.senses)
+            second, back, onsets = self._solved(at, stretch)
             seconds[:, lanes] = second
             window = slice(int(lanes[0]), int(lanes[-1]) + 1)
             fill_chunk(arrays, back, at.time, window)
@@ -74,7 +75,18 @@ class Filling:
             filled = None if joints is None else joints.arrays
             arrays, labels = as_stated(self.stated.run, motion.contacts, touches, arrays, labels, filled)
             energies = np.vstack([energies, touches.stored.sum(axis=0)])
-        return Books(self.time, arrays, labels, whole, seconds, energies, layout.works(rows), resting, touches)
+        works, sticking = layout.works(rows), self._sticking(which)
+        return Books(self.time, arrays, labels, whole, seconds, energies, works, resting, touches, sticking)
+
+    def _sticking(self, which: NDArray[np.intp]) -> NDArray[np.bool_] | None:
+        """Which joints stick, (joint, row), where they do one by one; of joints in play none does."""
+        if not self.motion.resisted:
+            return None
+        joints = list((self.stated.run if self.stated else self.motion.run).system.joints)
+        found = np.zeros((len(joints), len(which)), bool)
+        for i, name in enumerate(self.motion.resisted):
+            found[joints.index(name)] = [k >= 0 and self.solution.stretches[k].senses[i] == 0 for k in which]
+        return found
 
     def _alike(self, which: NDArray[np.intp]) -> list[tuple[NDArray[np.intp], Stretch]]:
         """Runs of rows that one walk can solve: of the same sense, switches and assembly."""
@@ -83,7 +95,8 @@ class Filling:
 
         def key(k: int) -> object:
             one = stretches[k]
-            return one.sense, one.resting, one.now, one.onsets, None if one.snapshot is None else id(one.snapshot)
+            snapshot = None if one.snapshot is None else id(one.snapshot)
+            return one.sense, one.resting, one.now, one.onsets, one.senses, snapshot
 
         begin = 0
         for i in range(1, len(which) + 1):

@@ -56,7 +56,7 @@ class Stretch(NamedTuple):
     """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
 
     sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
-    goes on, where it is followed; onsets: of the contacts of joints in play, see `Moment`.
+    goes on, where it is followed; onsets, senses: of contacts and of joints that may stick, see `Moment`.
     """
 
     begin: float
@@ -67,6 +67,7 @@ class Stretch(NamedTuple):
     now: float
     snapshot: Snapshot | None = None
     onsets: tuple[Onset, ...] = ()
+    senses: tuple[int, ...] = ()
 
 
 class Passing(NamedTuple):

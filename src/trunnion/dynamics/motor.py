@@ -82,6 +82,14 @@ class Drive:
         free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
         return transmitted(free, np.where(speed != 0.0, speed, sense), self.ratio, self.efficiency)
 
+    def resisted(self, time: Array, speed: Array, second: Array, integral: Array, now: float, share: Any) -> Array:
+        """Effort as of `effort`, less the brake: full losses of a motion in the sense of a share of ±1, a share of them
+        in between, at rest."""
+        free = self.shaft(time, speed, integral, now) - self.inertia * self.ratio * second
+        ahead, back = (transmitted(free, np.asarray(sense), self.ratio, self.efficiency) for sense in (1.0, -1.0))
+        found: Array = 0.5 * ((1.0 + share) * ahead + (1.0 - share) * back) - share * self.braking(now)
+        return found
+
     def braking(self, now: float) -> float:
         """Effort of the brake, against the motion."""
         return self.brake if now >= self.brake_from else 0.0

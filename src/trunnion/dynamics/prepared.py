@@ -9,6 +9,7 @@ from trunnion.dynamics.integrate import INSIDE, Integration
 from trunnion.dynamics.rates import Dynamics, Walks
 from trunnion.dynamics.start import Places, load_times
 from trunnion.dynamics.state import FreeMotion
+from trunnion.dynamics.stick_motion import StickMotion
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
 
@@ -30,8 +31,11 @@ def integration_of(
     progress: Callable[[float], None] | None = None, rates: Dynamics | None = None,
 ) -> Integration:  # fmt: skip
     """What integrates a motion. rates: those of `rates_of`, if they are there."""
-    rates = rates or rates_of(motion, known)
+    rates, times = rates or rates_of(motion, known), load_times(motion, duration)
+    if motion.resisted:
+        assert not isinstance(rates, TabulatedRates)  # which are of one coordinate
+        return StickMotion(motion, rates, duration, tolerance, progress=progress, times=times)
     return Integration(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
-        TABLED if isinstance(rates, TabulatedRates) else INSIDE, load_times(motion, duration),
+        TABLED if isinstance(rates, TabulatedRates) else INSIDE, times,
     )  # fmt: skip

@@ -50,13 +50,15 @@ MOTION: dict[str, Variable] = {
     "potential_energy": Variable(("time",), "J", "potential energy of the links in the field of gravity"),
     "energy_residual": Variable(("time",), "J", "works less changes of energy; 0 but for the errors of integration"),
     "resting": Variable(("time",), "1", "1 while the mechanism rests in friction", np.int8),
+    "sticking": Variable(("joint", "time"), "1", "1 while the joint sticks; with several free coordinates", np.int8),
     "event_time": Variable(("event",), "s", "time of the event"),
 }
 
 
 class Books(NamedTuple):
     """What is known at the rows of a result: variables as `analyse` has them, state, accelerations of the free
-    coordinates, kinetic and potential energy, works, and where the mechanism rests."""
+    coordinates, kinetic and potential energy, works, where the mechanism rests, and (joint, time) which
+    joints stick."""
 
     time: Array
     arrays: Mapping[str, Array]
@@ -67,6 +69,7 @@ class Books(NamedTuple):
     works: Array
     resting: NDArray[np.bool_]
     touches: Touches | None = None
+    sticking: NDArray[np.bool_] | None = None
 
 
 def result_of(
@@ -149,6 +152,7 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residua
         "potential_energy": books.energies[1],
         "energy_residual": residual,
         "resting": books.resting,
+        **({} if books.sticking is None else {"sticking": books.sticking}),
         "event_time": np.array([one.time for one in solution.events], float),
     }
 

@@ -24,6 +24,8 @@ from trunnion.dynamics.start import initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.steady import steady as steady_result
+from trunnion.dynamics.stick_motion import StickMotion
+from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import Run, prepare
@@ -88,7 +90,7 @@ def simulated(
         return steady_result(mechanism, duration, steps, tolerance, progress)
     if playing:
         return _with_play(run, duration, steps, tolerance, progress, impact_step)
-    motion = FreeMotion.of(run)
+    motion = StickingMotion.of(run)
     known = places(motion)
     integration = integration_of(motion, known, duration, tolerance, progress)
     row = initial_row(motion)
@@ -107,7 +109,7 @@ def _with_play(
     contacts = contacts_of(run, in_play(run.system.mechanism))
     rigid, loose = is_rigid(run.system.mechanism), prepare(bare.mechanism)
     refuse_undetermined(loose, in_play(run.system.mechanism))
-    motion = (ClosedMotion if rigid else FreeMotion).of(loose, contacts)
+    motion = (ClosedMotion if rigid else StickingMotion).of(loose, contacts)
     row = initial_row(motion)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
@@ -119,7 +121,8 @@ def _with_play(
         integration.impact_step = impact_step
     else:
         rates: Seeing = compiled_rates(motion) or Walks(motion)
-        integration = ContactMotion(motion, rates, duration, tolerances, progress=progress, times=times)
+        kind = StickMotion if motion.resisted else ContactMotion
+        integration = kind(motion, rates, duration, tolerances, progress=progress, times=times)
     solution = _run(integration, row)
     time = np.linspace(0.0, duration, steps + 1)
     books = Filling(motion, solution, time, bare).books()

@@ -26,7 +26,7 @@ from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
-from trunnion.solve.system import Cycle, System, Values, freed, law_of, rubbing, sticking
+from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
 __all__ = ["Accelerated", "FreeMotion", "Moment"]
 
@@ -43,7 +43,8 @@ class Moment(NamedTuple):
     """The state of some lanes: time, s, coordinates and rates (coordinate, lane), controllers' integrals likewise,
     deflections of bristles (bristle, lane), m. sense: of the motion where the speed is 0, +1 or −1, of one coordinate;
     now: a time within the stretch, which says what is switched on; onsets: of each contact of joints in play its speed
-    of approach, m/s, None while it does not touch.
+    of approach, m/s, None while it does not touch; senses: where several coordinates are free, in which sense each
+    joint of `FreeMotion.resisted` slides, +1 or −1, 0 where it sticks; empty: it is as the speeds say.
     """
 
     time: Array
@@ -54,6 +55,7 @@ class Moment(NamedTuple):
     sense: float = 0.0
     now: float = 0.0
     onsets: tuple[Onset, ...] = ()
+    senses: tuple[int, ...] = ()
 
 
 class Accelerated(NamedTuple):
@@ -61,7 +63,8 @@ class Accelerated(NamedTuple):
 
     back: lanes as asked for. turned: lanes in which more acceleration would take less effort: the mechanism locks
     itself under its inertia, so that there is no acceleration or there are several. converged: lanes that are solved.
-    onsets: of contacts, with the forces of those that stay closed.
+    onsets: of contacts, with the forces of those that stay closed. shares: of what resists each joint of
+    `FreeMotion.resisted`, (joint, lane), what acts: ±1 where it slides.
     """
 
     second: Array
@@ -69,6 +72,7 @@ class Accelerated(NamedTuple):
     turned: NDArray[np.bool_]
     converged: NDArray[np.bool_]
     onsets: tuple[Onset, ...] = ()
+    shares: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,16 @@ class FreeMotion:
         return tuple(sticking(self.system))
 
     @cached_property
+    def resisted(self) -> tuple[str, ...]:
+        """Where several coordinates are free: joints that may stick, by friction, loads, brakes or losses of gears."""
+        if len(self.names) == 1:
+            return ()
+        held = {name for name, drive in self.drives.items() if drive.brake or drive.efficiency < 1.0}
+        held |= self.system.resisted.keys()
+        held |= set(self.sticking) & set(felt(self.system, self.system.mechanism.parameter_set.nominal))
+        return tuple(name for name in self.system.joints if name in held)
+
+    @cached_property
     def affine(self) -> bool:
         """Whether efforts are affine in the accelerations."""
         return not rubbing(self.system) and all(drive.efficiency == 1.0 for drive in self.drives.values())
@@ -161,6 +175,7 @@ class FreeMotion:
             dict(zip(self.bristles, at.bristles, strict=True)),
             acting=self._acting(at.onsets),
             sliding=sliding,
+            rests={joint: sense == 0 for joint, sense in zip(self.resisted, at.senses, strict=False)},
         )
         return solve(self.system, self.values_at(at, second), self.assembly, at.time, self.method, given)
 
@@ -171,7 +186,10 @@ class FreeMotion:
         return lambda walk: self.contacts.actions(walk, onsets)
 
     def beginning(self, at: Moment, share: Number = 1.0) -> dict[str, Sense]:
-        """The sense in which each joint that sticks is about to move, times a share; of one coordinate."""
+        """The sense in which each joint that sticks is about to move, times a share; of several coordinates those in
+        which joints slide."""
+        if at.senses:
+            return {joint: float(sense) for joint, sense in zip(self.resisted, at.senses, strict=True)}
         if len(self.names) != 1 or not self.sticking or not np.any(np.asarray(at.sense)):
             return {}
         rate = np.broadcast_to(self.unit[0] ** 0.5, at.q.shape)
@@ -203,11 +221,15 @@ class FreeMotion:
 
     # ---- accelerations ----------------------------------------------------------------------------------------
 
-    def given(self, at: Moment, second: Array) -> Array:
-        """What the motors give, less the brakes, (coordinate, lane)."""
+    def given(self, at: Moment, second: Array, senses: Mapping[str, Sense] | None = None) -> Array:
+        """What the motors give, less the brakes, (coordinate, lane). senses: shares of what resists the joints that
+        stick, and senses of those that slide, where several coordinates are free."""
         found = []
-        for i, drive in enumerate(self.drives.values()):
+        for i, (name, drive) in enumerate(self.drives.items()):
             rate = at.rate[i]
+            if at.senses and senses and name in senses:
+                found.append(drive.resisted(at.time, rate, second[i], at.integral[i], at.now, senses[name]))
+                continue
             effort = drive.effort(at.time, rate, second[i], at.integral[i], at.now, at.sense)
             sense = np.where(rate != 0.0, np.sign(rate), at.sense)
             found.append(effort - sense * drive.braking(at.now))
@@ -221,7 +243,7 @@ class FreeMotion:
     def missing(self, at: Moment, second: Array, zero_slip: Mapping[str, Sense]) -> Array:
         """E − T, (coordinate, lane)."""
         back = self.solve(at, second, zero_slip, sliding=True)
-        found: Array = self.demanded(back, at.q.shape) - self.given(at, second)
+        found: Array = self.demanded(back, at.q.shape) - self.given(at, second, zero_slip)
         return found
 
     def accelerate(self, at: Moment, guess: Array | None = None) -> Accelerated:
@@ -246,7 +268,7 @@ class FreeMotion:
             if np.all(~np.isfinite(step) | (np.abs(step) <= CLOSE * DIFFERENCE * largest)):
                 break
             back = self.solve(at, second, senses, sliding=True)  # most are there after one step, as this walk tells
-            step = -_solved(slopes, self.demanded(back, at.q.shape) - self.given(at, second))
+            step = -_solved(slopes, self.demanded(back, at.q.shape) - self.given(at, second, senses))
             if np.all(np.abs(step) <= SETTLED * largest) and not np.any(turned):
                 return Accelerated(second, back, turned, np.ones(lanes, bool), at.onsets)
         converged = np.all(np.isfinite(second) & (self.affine | (np.abs(step) <= 1e-8 * largest)), axis=0)
@@ -271,7 +293,10 @@ class FreeMotion:
         )
         time = np.tile(at.time, count + 1)
         many = at._replace(time=time, q=q, rate=rate, integral=integral, bristles=bristles)
-        wide: dict[str, Sense] = {joint: np.tile(np.asarray(sense), count + 1) for joint, sense in senses.items()}
+        wide: dict[str, Sense] = {
+            joint: np.tile(sense, count + 1) if isinstance(sense, np.ndarray) else sense
+            for joint, sense in senses.items()
+        }
         found = self.missing(many, np.concatenate(tried, axis=1), wide).reshape(count, count + 1, lanes)
         slopes = (found[:, 1:] - found[:, :1]) / steps[None]
         miss: Array = found[:, 0]

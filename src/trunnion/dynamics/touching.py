@@ -260,7 +260,7 @@ class Contacts:
     @property
     def least_clearance(self) -> float:
         """m."""
-        return min(one.clearance for one in self.each)
+        return min((one.clearance for one in self.each), default=0.0)
 
     def states(self, walk: Forward) -> list[ContactState]:
         """Where all surfaces are."""

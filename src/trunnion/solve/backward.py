@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -52,7 +52,8 @@ class Given:
     the bristles of laws that have them, m, in the sense of the slip; that of steady sliding if not stated. travel: how
     links also move since the seats among the values (`seats.JOINT.1.x` …) change along the way. acting: what acts on
     the links of a walk beside the loads and springs of the model, by name. sliding: whether what has no speed has begun
-    to slide, so that no law takes its value at rest.
+    to slide, so that no law takes its value at rest. rests: of joints of which it is known whatever their speed says
+    whether they rest, under the share that zero_slip states, or slide in its sense.
     """
 
     zero_slip: Mapping[str, Sense] = field(default_factory=dict)
@@ -60,6 +61,7 @@ class Given:
     travel: Mapping[str, Travel] = field(default_factory=dict)
     acting: Callable[[Forward], Iterable[tuple[str, LoadAction]]] | None = None
     sliding: bool = False
+    rests: Mapping[str, bool] = field(default_factory=dict)
 
 
 def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Share:
@@ -79,10 +81,17 @@ def held(
     if law.at_rest is not None and not sliding:
         law = replace(law, function=functools.partial(_resting, law.function, law.at_rest))
         parameters = {**parameters, "resting": np.where(zero, 1.0, 0.0)}
-    if law.interval_at_rest and np.any(np.abs(sense) < 1.0) and np.any(sense):
+    if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
         share = np.where(zero, np.abs(sense), 1.0)
         return replace(law, function=functools.partial(_shared, law.function)), {**parameters, "share": share}, speed
     return law, parameters, speed
+
+
+def _slip_known(slip: Number, sense: Share, rests: bool) -> tuple[Number, Number]:
+    """Slip and where it is zero, of a contact of which it is known whether it rests or slides in a sense."""
+    if rests:
+        return slip, np.True_
+    return namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense), np.False_
 
 
 def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Number, **parameters: Number) -> Number:
@@ -192,7 +201,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     back.contacts.update((joint, list(system.geometry.contacts(walk, joint))) for joint in rubbing(system))
     back.slips.update((joint, _slip(back, joint)) for joint in system.joints)
     _add_body_loads(back)
-    _add_stated_loads(back, given.zero_slip)
+    _add_stated_loads(back, given.zero_slip, given.rests)
     for name, action in given.acting(walk) if given.acting else ():
         back.load_powers[name] = action.power
         _act(back, name, action)
@@ -232,7 +241,7 @@ def body_loads(walk: Forward) -> dict[str, Any]:
 def stated_actions(walk: Forward, zero_slip: Mapping[str, Sense]) -> tuple[dict[str, Any], Number, Number]:
     """What the stated loads and springs do to every link, and the power of both, W. zero_slip: see `Given`."""
     back = Backward(walk, _unloaded(walk))
-    _add_stated_loads(back, zero_slip)
+    _add_stated_loads(back, zero_slip, ())
     powers = sum(back.load_powers.values(), 0.0), sum((state.power for state in back.springs.values()), 0.0)
     return back.loads, *powers
 
@@ -271,13 +280,13 @@ def _add_body_loads(back: Backward) -> None:
         back.add(link, load)
 
 
-def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense]) -> None:
+def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], known: Container[str]) -> None:
     """The loads and springs of the model, with the power each gives the mechanism."""
     senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
-    for name, action in stated_loads(back.walk, senses):
+    for name, action in stated_loads(back.walk, senses, known):
         back.load_powers[name] = action.power
         _act(back, f"loads.{name}", action)
-    for name, action, effort in losses(back.walk, senses):
+    for name, action, effort in losses(back.walk, senses, known):
         back.drags[name] = effort, -action.power
         for link, wrench in action.on:
             back.add(link, wrench)
@@ -304,7 +313,8 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     for k, place in enumerate(places):
         for i, one in enumerate(() if place.witness else back.contacts.get(place.joint, ())):
             contacts.append(_contact(back, module.links, k, place.joint, one, given, i))
-            rubbed.append(one)
+            # power goes by the speed itself where the law is told on which side of rest it is
+            rubbed.append(one if place.joint in given.rests else one._replace(slip=contacts[-1].slip))
             if one.turning is not None:
                 back.turning[place.joint] = contacts[-1], one.turning
     contacts += teeth(walk, number)
@@ -332,7 +342,10 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Ru
     walk, law = back.walk, law_of(back.walk.system, joint)
     parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
     sense = sense_of(given.zero_slip, joint, i)
-    law, parameters, speed = held(law, parameters, one.slip, one.zero, sense, given.sliding)
+    slip, zero, known = one.slip, one.zero, joint in given.rests
+    if known:
+        slip, zero = _slip_known(slip, sense, given.rests[joint])
+    law, parameters, speed = held(law, parameters, slip, zero, sense, given.sliding and not known)
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
     first, second = walk.system.joints[joint][1]
@@ -355,7 +368,7 @@ def _record(
     for contact, one, force in rubbed:
         part = algebra.times(force, one.unit)
         friction, amount = algebra.added(friction, part), literal.plus(amount, literal.times(force, one.amount))
-        loss = literal.less(loss, force * contact.slip)
+        loss = literal.less(loss, force * one.slip)
         if contact.own is not None:
             wrench = algebra.minus(wrench, part)
     back.friction_wrenches[joint], back.friction[joint], back.losses[joint] = friction, amount, loss

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -191,8 +191,10 @@ def stated_walk(system: System, values: Values, assembly: Assembly, time: Number
 # ---- loads ----------------------------------------------------------------------------------------------------
 
 
-def stated_loads(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, LoadAction]]:
-    """The loads of the model, by name. zero_slip: see `backward.Given`."""
+def stated_loads(
+    walk: Forward, zero_slip: Mapping[str, Share], known: Container[str] = ()
+) -> Iterator[tuple[str, LoadAction]]:
+    """The loads of the model, by name. zero_slip: see `backward.Given`; known: joints of which it tells all."""
     stated = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
         path = f"loads.{name}"
@@ -201,7 +203,8 @@ def stated_loads(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tupl
         else:
             torque, force = stated.get(f"{path}.resisting_torque"), stated.get(f"{path}.resisting_force")
             size = force if torque is None else torque
-            yield name, _resist(walk, load, size, torque is not None, zero_slip.get(load.joint, 0.0))
+            at_rest = zero_slip.get(load.joint, 0.0)
+            yield name, _resist(walk, load, size, torque is not None, at_rest, load.joint in known)
 
 
 def _push(stated: Stated, load: Load, path: str) -> LoadAction:
@@ -218,14 +221,15 @@ def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
-def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share) -> LoadAction:
+def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share, known: bool) -> LoadAction:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only.
 
-    at_rest: the share of the load where there is no motion, with the sign of that which is about to begin.
+    at_rest: the share of the load where there is no motion, with the sign of that which is about to begin; known:
+    whatever the speed says.
     """
     joint = load.joint or ""
     speed = walk.rates(joint)[0 if turns else 1]
-    sign = _sense(walk, joint, turns, speed, at_rest)
+    sign = at_rest if known else _sense(walk, joint, turns, speed, at_rest)
     if load.only is not None:
         sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, joint, -sign * size, turns, speed)
@@ -247,13 +251,16 @@ def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Num
 # ---- losses of joints ------------------------------------------------------------------------------------------
 
 
-def losses(walk: Forward, zero_slip: Mapping[str, Share]) -> Iterator[tuple[str, LoadAction, Number]]:
+def losses(
+    walk: Forward, zero_slip: Mapping[str, Share], known: Container[str] = ()
+) -> Iterator[tuple[str, LoadAction, Number]]:
     """What resists the joints whatever their load: −sgn(v) constant − viscous v, its power, and the effort itself."""
     for joint in walk.system.lossy:
         turns, path = walk.system.turns(joint), f"joints.{joint}.losses"
         speed = walk.rates(joint)[0 if turns else 1]
         constant, viscous = (walk.values.get(f"{path}.{key}", 0.0) for key in ("constant", "viscous"))
-        sign = _sense(walk, joint, turns, speed, zero_slip.get(joint, 0.0))
+        at_rest = zero_slip.get(joint, 0.0)
+        sign = at_rest if joint in known else _sense(walk, joint, turns, speed, at_rest)
         effort = -sign * constant - viscous * speed
         yield joint, _in_joint(walk, joint, effort, turns, speed), effort
 

@@ -41,6 +41,9 @@ def times(result: xr.Dataset) -> list[Column]:
             for axis, name in enumerate(result["axis"].values):
                 found.append(column(result, "contact_offset", f"{contact}.contact_offset.{name}", (k, axis)))
         found += [column(result, name, name, ()) for name in ("work_contact", "contact_energy")]
+    if "sticking" in result:
+        joints = enumerate(result["joint"].values)
+        found += [column(result, "sticking", f"{joint}.sticking", (i,)) for i, joint in joints]
     return [*found, *(column(result, name, name, ()) for name in ENERGY)]
 
 

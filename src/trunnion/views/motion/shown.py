@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 __all__ = ["ENERGIES", "Happening", "Shown", "as_positions", "drivers_of", "energies", "happenings", "shown"]
 
 Array = NDArray[np.float64]
-WORDS = {"break-away": "starts", "rest": "rests", "lock": "locks", "motor-off": "motor off", "brake": "brake on"}
+WORDS = {
+    "break-away": "starts", "rest": "rests", "stick": "sticks", "lock": "locks", "motor-off": "motor off",
+    "brake": "brake on",
+}  # fmt: skip
 ENERGIES = (
     ("work_drive", "work of the drivers"),
     ("work_loads", "work of the loads"),

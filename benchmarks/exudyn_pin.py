@@ -32,7 +32,7 @@ class Contacts(NamedTuple):
     begin: float
     duration: float
     penetration: float
-    count: int
+    number: int
 
 
 def moved(step: float, duration: float) -> None:

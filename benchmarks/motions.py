@@ -172,13 +172,13 @@ def beside_exudyn(console: Console, rounds: int) -> None:
     times = best(
         rounds,
         lambda: trunnion.simulate(mechanism, turn, 100),
-        *(lambda step=step: exudyn_pin.moved(step, turn) for step in peers),  # type: ignore[misc]
+        *(lambda step=step: exudyn_pin.moved(step, turn) for step in peers),
     )
     table = Table("one turn of a pin in its hole", "CPU, s", "contacts", "first: begin", "duration", "penetration")
     names = ("simulate, machine code", *(f"exudyn {version('exudyn')}, steps of {step:g} s" for step in peers))
     for name, seconds, one in zip(names, times, (own, *peers.values()), strict=True):
         off = (one.begin / begin - 1, one.duration / lasts - 1, one.penetration / PENETRATION - 1)
-        table.add_row(name, f"{seconds:.2f}", str(one.count), *(f"{share:.1e}" for share in off))
+        table.add_row(name, f"{seconds:.2f}", str(one.number), *(f"{share:.1e}" for share in off))
     console.print(table)
 
 

@@ -171,9 +171,9 @@ def square(axes: Axes, most: float, shown: float, factor: float, unit: str) -> N
     outside(axes, most, unit)
 
 
-def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:
+def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2, lift: float = 0.0) -> None:
     """A legend in rows above the axes, where it hides no curve; room: characters that a row holds; none of fewer than
-    `least` entries.
+    `least` entries; lift: height of what stands between axes and legend, points.
     """
     handles, labels = axes.get_legend_handles_labels()
     if len(handles) < least:
@@ -182,5 +182,5 @@ def legend(axes: Axes, most: int = 6, room: int = 90, least: int = 2) -> None:
     columns = len(labels) if fits else max(1, min(most, (room + 10) // (max(map(len, labels)) + 7)))
     axes.legend(
         handles, labels, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=columns, frameon=False, fontsize=8.5,
-        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3,
+        labelcolor=INK, handlelength=2.2, columnspacing=1.6, borderaxespad=0.3 + lift / 8.5,
     )  # fmt: skip

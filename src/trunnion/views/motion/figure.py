@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "check_kind", "figure", "sheet"]
 
 PANEL = 2.6  # height, inches
+LINE, LETTER = 9.5, 0.009  # of an event's word: points from row to row, share of the axes' width a letter
 MOST_MARKED = 12  # events drawn; of more, marks would hide the curves
 
 
@@ -65,9 +66,8 @@ def sheet(result: xr.Dataset) -> Figure:
 def _panel(axes: Axes, motion: Shown, draw: Callable[[Axes, xr.Dataset, Abscissa], None]) -> None:
     over = abscissa(motion.rows)
     draw(axes, motion.rows, over)
-    if draw is not _phase:
-        _events(axes, motion, over)
-    legend(axes)
+    rows = _events(axes, motion, over) if draw is not _phase else 0
+    legend(axes, lift=LINE * rows)
 
 
 def _speed(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
@@ -120,20 +120,28 @@ def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _events(axes: Axes, motion: Shown, over: Abscissa) -> None:
-    """Thin lines where something happens, with a word above."""
+def _events(axes: Axes, motion: Shown, over: Abscissa) -> int:
+    """Thin lines where something happens, with words above the axes, each in the lowest row where it meets no other;
+    how many rows there are.
+    """
     events = [one for one in motion.events if one.word not in contacts.OF_IMPACTS]  # the curves show these
     last = float(motion.rows["time"].values[-1])
     if len(events) > MOST_MARKED or not last > 0:
-        return
+        return 0
+    ends: list[float] = []  # of what stands in each row, as shares of the axes' width
+    low, high = axes.get_xlim()
     for one in events:
         at = over.values[-1] * min(one.time, last) / last
+        place, half = (at - low) / (high - low), 0.5 * LETTER * (len(one.word) + 2)
+        middle = min(max(place, half), 1.0 - half)
+        row = next((k for k, end in enumerate(ends) if end <= middle - half), len(ends))
+        ends[row : row + 1] = [middle + half]
         axes.axvline(at, color=MUTED, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1.2)
-        before = at > 0.9 * over.values[-1]  # of the line, where there is no room behind it
         axes.annotate(
-            one.word, (at, 1.0), xycoords=("data", "axes fraction"), xytext=(-3 if before else 3, -3),
-            textcoords="offset points", fontsize=7.5, color=MUTED, va="top", ha="right" if before else "left",
+            one.word, (middle, 1.0), xycoords="axes fraction", xytext=(0, 2 + LINE * row), textcoords="offset points",
+            fontsize=7.5, color=MUTED, va="bottom", ha="center",
         )  # fmt: skip
+    return len(ends)
 
 
 # a kind of figure: its title, and what draws it into axes

@@ -5,6 +5,7 @@ import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
 const MOST_LINES = 24; // events of a motion that are drawn over the whole height
+const LINE = 12; // height of a row of their words
 const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
@@ -81,28 +82,32 @@ function swatch(kind) {
 
 function draw(chart, width) {
   const { scene, scale, series, band } = chart;
-  const height = Math.round(Math.min(Math.max(width * 0.46, 190), 270));
   const [x0, x1] = domain(scene.abscissa);
   const [y0, y1] = vertical(chart);
   const right = width - MARGIN.right;
+  const x = (value) => MARGIN.left + ((value - x0) / (x1 - x0)) * (right - MARGIN.left);
+  const words = labels(scene, x, right);
+  const top = MARGIN.top + LINE * Math.max(0, ...words.map(({ row }) => row + 1));
+  const height = Math.round(Math.min(Math.max(width * 0.46, 190), 270)) + top - MARGIN.top;
   const bottom = height - MARGIN.bottom;
   const frame = {
     width,
     height,
+    top,
     bottom,
     right,
-    x: (value) => MARGIN.left + ((value - x0) / (x1 - x0)) * (right - MARGIN.left),
-    y: (value) => bottom - ((value - y0) / (y1 - y0)) * (bottom - MARGIN.top),
+    x,
+    y: (value) => bottom - ((value - y0) / (y1 - y0)) * (bottom - top),
     back: (px) => x0 + ((px - MARGIN.left) / (right - MARGIN.left)) * (x1 - x0),
   };
   chart.frame = frame;
-  chart.cursor = svg("line", { class: "cursor", y1: MARGIN.top, y2: bottom });
+  chart.cursor = svg("line", { class: "cursor", y1: top, y2: bottom });
   chart.dots = series.map((one) => svg("circle", { class: `dot ${one.kind}`, r: one.quiet ? 0 : 3.2 }));
   const box = {
     x: MARGIN.left - 2,
-    y: MARGIN.top - 2,
+    y: top - 2,
     width: right - MARGIN.left + 4,
-    height: bottom - MARGIN.top + 4,
+    height: bottom - top + 4,
   };
   const curves = series.map((one) =>
     svg("path", { class: `curve ${one.kind}`, d: curvePath(scene, frame, one.values, scale.factor, one.breaks) }),
@@ -115,7 +120,7 @@ function draw(chart, width) {
       { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describe(chart) },
       ...shading(chart, frame),
       ...axes(scene.abscissa, frame, [x0, x1], [y0, y1]),
-      ...events(scene, frame),
+      ...events(scene, frame, words),
       ...chart.marks.map((index) => mark(frame, scene.abscissa.values[index])),
       clipped(box, ...curves, bars),
       chart.cursor,
@@ -126,30 +131,39 @@ function draw(chart, width) {
   moveCursor(chart);
 }
 
-/**
- * The events of a motion in time: a dashed line each, with a word where there is room for it; of many, which would hide
- * the curves, a mark on the axis.
- */
-function events(scene, frame) {
-  let free = MARGIN.left;
+/** The words of the events, above the curves: each in the lowest row where it meets no other; none of many. */
+function labels(scene, x, right) {
+  const list = scene.motion?.events ?? [];
+  if (list.length > MOST_LINES) return [];
+  const ends = []; // of what stands in each row
+  return list.map(({ at, word }) => {
+    const wide = 6 * word.length + 6;
+    const left = Math.max(MARGIN.left, Math.min(x(at) - wide / 2, right - wide));
+    let row = ends.findIndex((end) => end <= left);
+    if (row < 0) row = ends.length;
+    ends[row] = left + wide;
+    return { word, row, middle: left + wide / 2 };
+  });
+}
+
+/** The events of a motion in time: a dashed line each; of many, which would hide the curves, a mark on the axis. */
+function events(scene, frame, words) {
   const list = scene.motion?.events ?? [];
   const many = list.length > MOST_LINES;
-  return list.flatMap(({ at, word }) => {
+  const baseline = (row) => frame.top - 4 - LINE * row;
+  const lines = list.map(({ at, word }, order) => {
     const x = frame.x(at);
-    const line = svg("line", { class: many ? "event many" : "event", x1: x, x2: x, y1: many ? frame.bottom - 7 : MARGIN.top, y2: frame.bottom });
+    const y1 = many ? frame.bottom - 7 : baseline(words[order].row) + 2;
+    const line = svg("line", { class: many ? "event many" : "event", x1: x, x2: x, y1, y2: frame.bottom });
     line.append(svg("title", {}, word));
-    if (many) return [line];
-    const wide = 6 * word.length + 6;
-    const before = x + wide > frame.right; // of the line, where there is no room behind it
-    if (before ? x - wide < free : x < free) return [line];
-    free = before ? x : x + wide;
-    return [line, svg("text", { class: before ? "mark end" : "mark", x: before ? x - 4 : x + 4, y: MARGIN.top + 11 }, word)];
+    return line;
   });
+  return [...lines, ...words.map(({ word, row, middle }) => svg("text", { class: "mark middle", x: middle, y: baseline(row) }, word))];
 }
 
 /** A dotted line up through the chart. */
 function mark(frame, value) {
-  return svg("line", { class: "lost", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: frame.bottom });
+  return svg("line", { class: "lost", x1: frame.x(value), x2: frame.x(value), y1: frame.top, y2: frame.bottom });
 }
 
 function centre({ x, y, width, height }) {
@@ -200,7 +214,7 @@ function axes(abscissa, frame, [x0, x1], [y0, y1]) {
   );
   parts.push(
     ...across.map((value) =>
-      svg("line", { class: "grid", x1: frame.x(value), x2: frame.x(value), y1: MARGIN.top, y2: frame.bottom }),
+      svg("line", { class: "grid", x1: frame.x(value), x2: frame.x(value), y1: frame.top, y2: frame.bottom }),
     ),
   );
   parts.push(
@@ -234,13 +248,13 @@ function shading(chart, frame) {
     return svg("rect", {
       class: "unsolved",
       x: low,
-      y: MARGIN.top,
+      y: frame.top,
       width: Math.max(high - low, 1),
-      height: frame.bottom - MARGIN.top,
+      height: frame.bottom - frame.top,
     });
   });
   const hatched = lost(chart.scene).map((run) => {
-    const path = svg("path", { class: "not-valid", d: hatch(...span(run), frame.bottom) });
+    const path = svg("path", { class: "not-valid", d: hatch(...span(run), frame) });
     path.append(svg("title", {}, "not valid: a pin loses contact"));
     return path;
   });
@@ -248,10 +262,10 @@ function shading(chart, frame) {
 }
 
 /** Slanted strokes over the height of a chart from x = low to high, at least 3 px wide. */
-function hatch(low, high, bottom) {
+function hatch(low, high, { top, bottom }) {
   const [left, right] = high - low < 3 ? [(low + high) / 2 - 1.5, (low + high) / 2 + 1.5] : [low, high];
   let path = "";
-  for (let y = MARGIN.top + (right - left); y <= bottom; y += 5) path += `M${left} ${y}L${right} ${y - right + left}`;
+  for (let y = top + (right - left); y <= bottom; y += 5) path += `M${left} ${y}L${right} ${y - right + left}`;
   return path;
 }
 

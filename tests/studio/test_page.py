@@ -19,9 +19,10 @@ from playwright.sync_api import sync_playwright
 import trunnion
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.studio.answers import examples
 from trunnion.studio.server import Studio
 
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 QUIET = [
     "--no-sandbox",
@@ -37,7 +38,7 @@ PEAK = 1e-6  # of the peak: how near a torque must be
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
-    (folder / "four-bar.yaml").write_text(examples()["durango-fourbar"], encoding="utf-8")
+    (folder / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], encoding="utf-8")
     bound = socket.socket()
     bound.bind(("127.0.0.1", 0))
     own = Studio(folder, "four-bar.yaml", bound.getsockname()[1])
@@ -285,7 +286,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     @pytest.mark.slow
     def test_names_are_never_markup(user):
         evil = "<img src=x onerror=alert(1)>"
-        text = examples()["durango-fourbar"].replace("coupler", f"'{evil}'").replace("name: ", f"name: '{evil}' # ")
+        text = EXAMPLES["durango-fourbar"].replace("coupler", f"'{evil}'").replace("name: ", f"name: '{evil}' # ")
         user.page.click("role=tab[name=Text]")
         user.page.locator("textarea").fill(text)
         user.page.wait_for_timeout(700)
@@ -308,7 +309,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
 
     @pytest.mark.slow
     def test_every_example_opens(user):
-        for name in sorted(examples()):
+        for name in sorted(EXAMPLES):
             user.page.evaluate("name => import('/studio/actions.js').then(a => a.openExample({ name }))", name)
             user.idle()
             errors = user.state("s.answer.value.findings.filter(one => one.severity === 'error').map(one => one.code)")

@@ -276,6 +276,35 @@ def test_a_guide_goes_across_and_the_rod_along():
     np.testing.assert_allclose(moved, [spot[0] + 0.001, spot[1] + 0.002], atol=1e-6)
 
 
+@pytest.mark.parametrize(("size", "unit", "factor"), [(1e-6, "µm", 1e-6), (0.1, "mm", 1e-3), (1e3, "m", 1.0)])
+def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
+    text = (
+        f"trunnion: 1\nlinks:\n  ground: {{points: {{A: [0, 0]}}}}\n"
+        f"  bar: {{points: {{A: [0, 0], B: [{size}, 0]}}}}\njoints: {{A: {{type: revolute, links: [ground, bar]}}}}\n"
+    )
+    places = {"ground.A": [0, 0], "bar.A": [0, 0], "bar.B": [size, 0]}
+    text, places = edited(text, places, {"do": "link", "from": "bar.B", "to": [1.5 * size, 0]})
+    stated = entries_of(text)[0]["links"]["link1"]["points"]["C"][0]
+    number, written = stated.split()
+    assert (float(number) * factor, written) == (pytest.approx(0.5 * size), unit)
+    text, _ = edited(text, places, {"do": "add-point", "link": "bar", "at": [0.5 * size, 0.0]})
+    assert entries_of(text)[0]["links"]["bar"]["points"]["D"][0].endswith(f" {unit}")  # and so it stays
+
+
+def test_a_ground_without_joints_is_to_be_pinned():
+    text, _ = edited(
+        "", {}, {"do": "link", "from": [0, 0], "to": [1, 0]}, {"do": "link", "from": "link1.B", "to": [2, 1]}
+    )
+    told = {one["where"]: one["remedy"] for one in ask(ask="model", text=text)["findings"]}
+    assert told["links.ground"] == "pin another link to it"
+
+
+def test_a_step_says_what_a_value_was_set_to():
+    text, path = examples()[FOURBAR], ["dimensions", "BC"]
+    for value, said in (("5 m", "Set dimensions.BC to 5 m"), (None, "Remove dimensions.BC")):
+        assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
+
+
 def test_what_has_no_length_is_refused():
     text, places = drawn_four_bar()
     found = ask(ask="edit", text=text, places=places, gestures=[{"do": "move", "point": "B", "to": places["link1.A"]}])

@@ -284,6 +284,35 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert user.state("s.solved.value")
 
     @pytest.mark.slow
+    def test_a_bare_number_takes_the_unit_and_a_name_that_is_taken_is_refused(user):
+        field = user.page.locator("#value-dimensions-BC-0")
+        field.fill("5.9")
+        field.press("Tab")
+        user.idle()
+        assert "BC: 5.9 m" in user.state("s.text.value")
+        user.page.locator(".parts button", has_text="rocker").click()
+        user.page.locator(".name-of-part").fill("crank")
+        user.page.locator(".name-of-part").press("Tab")
+        user.idle()
+        assert user.page.locator(".name-of-part").input_value() == "rocker"
+        assert "not a free name" in user.state("s.notice.value.words")
+
+    @pytest.mark.slow
+    def test_a_file_changed_elsewhere_is_not_overwritten(user):
+        save = "import('/studio/actions.js').then(a => a.save('shared.yaml'))"
+        other = user.studio.folder / "shared.yaml"
+        user.page.evaluate(save)
+        user.idle()
+        mine = other.read_text("utf-8")
+        other.write_text(mine + "# elsewhere\n", "utf-8")
+        user.page.evaluate("import('/studio/actions.js').then(a => a.typed('trunnion: 1\\n'))")
+        user.idle()
+        user.page.evaluate(save)
+        user.idle()
+        assert other.read_text("utf-8") == mine + "# elsewhere\n"
+        assert "changed elsewhere" in user.state("s.notice.value.words")
+
+    @pytest.mark.slow
     def test_names_are_never_markup(user):
         evil = "<img src=x onerror=alert(1)>"
         text = EXAMPLES["durango-fourbar"].replace("coupler", f"'{evil}'").replace("name: ", f"name: '{evil}' # ")

@@ -211,6 +211,9 @@ export function save(name = state.fileName.value) {
 
 async function stored(name) {
   const content = state.text.value;
+  const there = name === state.fileName.value ? await fetch(`/file/${encodeURIComponent(name)}`) : null;
+  if (there?.ok && ![state.savedText.value, content].includes(await there.text()))
+    return state.say(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`, true);
   const reply = await fetch(`/file/${encodeURIComponent(name)}`, { method: "PUT", body: content });
   const told = await reply.json().catch(() => ({ error: `${name} could not be saved.` }));
   if (told.error) return state.say(told.error, true);

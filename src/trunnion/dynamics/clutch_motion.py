@@ -5,8 +5,8 @@ the slip s = ω − i q̇; the coordinate is driven by σ C through the gear. Wh
 what the coordinate moves. It slips on from where it would have to carry more than C. The sense is stated of every
 stretch, so that forces are smooth beyond its end, and the end is found on the dense output to rounding.
 
-Source: F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, Wiley, 1996, chapter 6 (stick and slip as
-a complementarity); of one contact of given normal force the cases are tried one after the other.
+Source: Ch. Glocker, F. Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley, 1996 (stick and slip as a
+complementarity); of one contact of given normal force the cases are tried one after the other.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import pytest
 
 from timed import slider_crank, wheel
 from trunnion import MechanismError, simulate
+from trunnion.dynamics.batch import figures_in_time
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.start import places
 from trunnion.dynamics.state import FreeMotion, Moment
@@ -189,3 +190,20 @@ def test_what_a_clutch_is_not_solved_with() -> None:
         simulate(Mechanism(**data), 1.0)
     with pytest.raises(MechanismError, match="steady cycle"):
         simulate(wheel(motor), 1.0, steady=True)
+
+
+def test_motions_with_a_clutch_are_taken_one_by_one() -> None:
+    """Among samples of the capacity: the peak effort is that capacity where it slips."""
+    motor = {"kind": "linear", "stall_effort": 9, "no_load_speed": 100, "inertia": ROTOR, "clutch": 6}
+    run = prepare(wheel(motor))
+    values = {**run.values, "drivers.A.motor.clutch": np.array([[5.0], [100.0]])}
+    peaks = figures_in_time(run, "A", values, 2, 0.2)["peak_effort"]
+    assert peaks == pytest.approx([5.0, 0.6 + WHEEL * (9 - 0.6) / (WHEEL + ROTOR)], rel=1e-9)
+
+
+def test_a_measure_in_a_load_is_told_what_to_name() -> None:
+    data = slider_crank().model_dump(exclude_unset=True)
+    data["measures"] = {"way": {"slide": "S"}}
+    data["loads"] = {"work": {"link": "crank", "moment": "-3 N m * way/(1 m)"}}
+    with pytest.raises(MechanismError, match=r"the measure 'way', which is not known to loads — .*O\.rotation"):
+        Mechanism(**data)

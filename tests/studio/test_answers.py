@@ -300,7 +300,7 @@ def test_a_ground_without_joints_is_to_be_pinned():
 
 
 def test_a_step_says_what_a_value_was_set_to():
-    text, path = examples()[FOURBAR], ["dimensions", "BC"]
+    text, path = EXAMPLES[FOURBAR], ["dimensions", "BC"]
     for value, said in (("5 m", "Set dimensions.BC to 5 m"), (None, "Remove dimensions.BC")):
         assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
 

@@ -11,7 +11,9 @@ const TYPING = 350; // ms of quiet before typed text is solved
 let link;
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
-export async function start() {
+export const start = () => counted(begun());
+
+async function begun() {
   link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
     state.connected.value = open;
     if (open && untracked(() => state.text.value)) solve();

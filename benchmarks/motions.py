@@ -6,7 +6,8 @@ masses, motor and load: its one equation in closed form, integrated by DOP853 of
 the best of several rounds in turn, and the wall time of two processes. Read the ratios; nothing here is a test.
 
 And one turn of a slider-crank whose gudgeon pin rattles in its hole, 28 contacts: by machine code, and the first of its
-contacts by walks and by the equations of its two free coordinates, written by hand.
+contacts by walks and by the equations of its two free coordinates, written by hand. Beside it Exudyn, if it is
+installed, by steps of two sizes, with how far the figures of the first contact are off.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from scipy.integrate import DOP853
 from tests.playing import SPEED, own_equations, rattling
 
 import trunnion
+from benchmarks import exudyn_pin
 from benchmarks.mutants import ROOT
+from benchmarks.side import version
 from trunnion.dynamics.batch import figures_in_time
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
@@ -32,6 +35,7 @@ from trunnion.studies.tolerance import runner
 from trunnion.studies.tolerance.first_order import study
 
 DURATION, TOLERANCE = 1.0, 1e-9
+PENETRATION = 7.795222e-5  # m, of the first contact of the pin, by other integrators to all its digits
 SHARE = 0.01  # of the crank's inertia and of its radius, by which they are toleranced
 
 
@@ -154,6 +158,30 @@ def rattled(console: Console) -> None:
     console.print(table)
 
 
+def beside_exudyn(console: Console, rounds: int) -> None:
+    """The same turn here and in Exudyn: CPU time, and the first contact beside the one by hand."""
+    if not version("exudyn"):
+        console.print("exudyn is not installed: no peer for the pin in its hole")
+        return
+    (begin, lasts, _), _, _ = own_equations(2.9e-4)
+    mechanism, turn = rattling(), 2 * math.pi / SPEED
+    result = trunnion.simulate(mechanism, turn, 100)
+    start, end, depth = (float(result[f"impact_{name}"][0]) for name in ("begin", "end", "depth"))
+    own = exudyn_pin.Contacts(start, end - start, depth, result.sizes["impact"])
+    peers = {step: exudyn_pin.contacts(step, turn) for step in (1e-7, 5e-8)}
+    times = best(
+        rounds,
+        lambda: trunnion.simulate(mechanism, turn, 100),
+        *(lambda step=step: exudyn_pin.moved(step, turn) for step in peers),  # type: ignore[misc]
+    )
+    table = Table("one turn of a pin in its hole", "CPU, s", "contacts", "first: begin", "duration", "penetration")
+    names = ("simulate, machine code", *(f"exudyn {version('exudyn')}, steps of {step:g} s" for step in peers))
+    for name, seconds, one in zip(names, times, (own, *peers.values()), strict=True):
+        off = (one.begin / begin - 1, one.duration / lasts - 1, one.penetration / PENETRATION - 1)
+        table.add_row(name, f"{seconds:.2f}", str(one.count), *(f"{share:.1e}" for share in off))
+    console.print(table)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=10_000)
@@ -161,6 +189,7 @@ def main() -> None:
     arguments = parser.parse_args()
     console = Console()
     rattled(console)
+    beside_exudyn(console, arguments.rounds)
     many(console, arguments.samples, one(console, arguments.rounds))
 
 

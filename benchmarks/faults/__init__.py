@@ -6,9 +6,9 @@ one. `find` stands once in its file; where the code changes, the entry follows i
 
 from __future__ import annotations
 
-from benchmarks.faults import data, mechanics
+from benchmarks.faults import data, mechanics, studio
 from benchmarks.faults.fault import Fault
 
 __all__ = ["FAULTS", "Fault"]
 
-FAULTS: tuple[Fault, ...] = (*mechanics.FAULTS, *data.FAULTS)
+FAULTS: tuple[Fault, ...] = (*mechanics.FAULTS, *data.FAULTS, *studio.FAULTS)

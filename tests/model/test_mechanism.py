@@ -31,7 +31,7 @@ def test_numbers_of_the_fourbar() -> None:
         "links.coupler.centre.distance": 2.8, "links.coupler.centre.angle": 0.152, "links.rocker.centre.x": 1.5,
         "joints.B.pin.radius": 0.0075, "joints.B.friction.coefficient": 0.4, "joints.B.friction.pair_factor": 1.0,
         "drivers.A.speed": 10.0, "drivers.A.start": 0.0, "loads.work.force.y": -1000.0, "loads.brake.moment": -250.0,
-        "assembly.C.x": 3.9,
+        "assembly.C.x": 7.6,
     }  # fmt: skip
     assert {path: values[path] for path in expected} == expected
     assert all(isinstance(value, float) for value in values.values())

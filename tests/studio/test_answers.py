@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ from hypothesis import strategies as st
 import trunnion
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.studio.answers import answer, examples
+from trunnion.studio.answers import answer
 from trunnion.studio.message import packed, unpacked
 
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 FOURBAR = "durango-fourbar"
 
 
@@ -88,15 +91,15 @@ def test_masses_of_links_are_not_solved():
 
 
 def test_a_model_reads_no_other_file():
-    text = examples()[FOURBAR].replace("A: {speed: 10 rad/s}", "A: {law: table, file: secret.csv}")
+    text = EXAMPLES[FOURBAR].replace("A: {speed: 10 rad/s}", "A: {law: table, file: secret.csv}")
     found = ask(ask="model", text=text)
     assert not found["solved"]
     assert "secret.csv" in found["findings"][0]["what"]
 
 
 def test_the_cycle_is_that_of_analyse():
-    found = ask(ask="model", text=examples()[FOURBAR], ideal=True)
-    mechanism = Mechanism(**entries_of(examples()[FOURBAR])[0])
+    found = ask(ask="model", text=EXAMPLES[FOURBAR], ideal=True)
+    mechanism = Mechanism(**entries_of(EXAMPLES[FOURBAR])[0])
     result = trunnion.analyse(mechanism, 360)
     (driver,) = found["scene"]["drivers"]
     np.testing.assert_allclose(driver["effort"], result.drive_effort.values[0], rtol=6e-7)
@@ -111,14 +114,14 @@ def test_the_cycle_is_that_of_analyse():
 
 @pytest.mark.spread(6, "jansen", "rssr")
 def test_every_example_opens(example):
-    found = ask(ask="model", text=examples()[example])
+    found = ask(ask="model", text=EXAMPLES[example])
     assert "error" not in found
     why = [one["code"] for one in found["findings"] if one["severity"] == "error"]
     assert found["solved"] or set(why) <= {"mobility.redundant", "input.drivers", "input.tables"}, found["findings"]
 
 
 def test_a_margin_is_of_positions_that_there_are():
-    text = examples()[FOURBAR].replace("BC: 6.00 m", "BC: 3.00 m")
+    text = EXAMPLES[FOURBAR].replace("BC: 6.00 m", "BC: 3.00 m")
     found = ask(ask="model", text=text)
     status, margin = found["scene"]["status"], found["margin"]
     assert any(code > 5 for code in status)
@@ -128,7 +131,7 @@ def test_a_margin_is_of_positions_that_there_are():
 
 def pytest_generate_tests(metafunc):
     if "example" in metafunc.fixturenames:
-        metafunc.parametrize("example", sorted(examples()))
+        metafunc.parametrize("example", sorted(EXAMPLES))
 
 
 # ---- drawing -------------------------------------------------------------------------------------------------------
@@ -185,7 +188,7 @@ def test_what_is_deleted_takes_along_what_needs_it():
 
 
 def test_a_name_is_changed_wherever_it_stands():
-    text = examples()[FOURBAR]
+    text = EXAMPLES[FOURBAR]
     before = trunnion.analyse(Mechanism(**entries_of(text)[0]), 36)
     for what, new in ((["links", "coupler"], "rod"), (["joints", "C"], "K"), (["dimensions", "BC"], "length")):
         text, _ = edited(text, {}, {"do": "rename", "what": what, "to": new})
@@ -201,7 +204,7 @@ def test_a_name_is_changed_wherever_it_stands():
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 359), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
-    text = examples()[FOURBAR]
+    text = EXAMPLES[FOURBAR]
     scene = ask(ask="model", text=text)["scene"]
     was = {key: np.array([track["x"][index % len(track["x"])], track["y"][index % len(track["y"])]])
            for key, track in scene["points"].items()}  # fmt: skip
@@ -219,8 +222,29 @@ def test_what_is_dragged_goes_there_and_its_neighbours_stay(index, x, y):
     )
 
 
+@pytest.mark.parametrize("joint", ["U", "L", "K", "B", "G", "G2", "B2"])
+def test_links_of_three_joints_keep_the_others(joint):
+    """Jansen's leg: what is dragged goes there with the pins on its spot, the others stay where they are."""
+    text = EXAMPLES["jansen"]
+    scene, index = ask(ask="model", text=text)["scene"], 40
+    joints = {one["name"]: one["at"] for one in scene["joints"]}
+
+    def places(points):
+        series = {name: points[at] for name, at in joints.items()}
+        return {name: [one[axis][index % len(one[axis])] for axis in "xy"] for name, one in series.items()}
+
+    before = places(scene["points"])
+    to = np.add(before[joint], [0.01, -0.007])
+    found = ask(ask="drag", text=text, point=joint, index=index, to=list(to))
+    after = places(found["points"])
+    for name, place in before.items():
+        np.testing.assert_allclose(
+            after[name], to if place == pytest.approx(before[joint]) else place, atol=1e-6, err_msg=name
+        )
+
+
 def test_a_drop_writes_what_the_drag_showed():
-    text = examples()[FOURBAR]
+    text = EXAMPLES[FOURBAR]
     places = ask(ask="model", text=text)["places"]
     to = [4.0, 2.6]
     dragged = ask(ask="drag", text=text, point="C", index=0, to=to)
@@ -234,14 +258,14 @@ def test_a_drop_writes_what_the_drag_showed():
 
 
 def test_a_crank_follows_by_turning():
-    found = ask(ask="drag", text=examples()[FOURBAR], point="B", index=10, to=[0.0, 2.2])
+    found = ask(ask="drag", text=EXAMPLES[FOURBAR], point="B", index=10, to=[0.0, 2.2])
     track = found["points"]["crank.B"]
     assert found["index"] == 90
     assert (track["x"][90], track["y"][90]) == pytest.approx((0.0, 2.2), abs=1e-6)
 
 
 def test_a_guide_goes_across_and_the_rod_along():
-    text = examples()["slider-crank"]
+    text = EXAMPLES["slider-crank"]
     names = {one["type"]: one for one in ask(ask="model", text=text)["scene"]["joints"]}
     slide = names["prismatic"]["name"]
     before = ask(ask="model", text=text)["places"]
@@ -252,6 +276,35 @@ def test_a_guide_goes_across_and_the_rod_along():
     np.testing.assert_allclose(moved, [spot[0] + 0.001, spot[1] + 0.002], atol=1e-6)
 
 
+@pytest.mark.parametrize(("size", "unit", "factor"), [(1e-6, "µm", 1e-6), (0.1, "mm", 1e-3), (1e3, "m", 1.0)])
+def test_lengths_are_written_in_a_unit_that_suits_the_size(size, unit, factor):
+    text = (
+        f"trunnion: 1\nlinks:\n  ground: {{points: {{A: [0, 0]}}}}\n"
+        f"  bar: {{points: {{A: [0, 0], B: [{size}, 0]}}}}\njoints: {{A: {{type: revolute, links: [ground, bar]}}}}\n"
+    )
+    places = {"ground.A": [0, 0], "bar.A": [0, 0], "bar.B": [size, 0]}
+    text, places = edited(text, places, {"do": "link", "from": "bar.B", "to": [1.5 * size, 0]})
+    stated = entries_of(text)[0]["links"]["link1"]["points"]["C"][0]
+    number, written = stated.split()
+    assert (float(number) * factor, written) == (pytest.approx(0.5 * size), unit)
+    text, _ = edited(text, places, {"do": "add-point", "link": "bar", "at": [0.5 * size, 0.0]})
+    assert entries_of(text)[0]["links"]["bar"]["points"]["D"][0].endswith(f" {unit}")  # and so it stays
+
+
+def test_a_ground_without_joints_is_to_be_pinned():
+    text, _ = edited(
+        "", {}, {"do": "link", "from": [0, 0], "to": [1, 0]}, {"do": "link", "from": "link1.B", "to": [2, 1]}
+    )
+    told = {one["where"]: one["remedy"] for one in ask(ask="model", text=text)["findings"]}
+    assert told["links.ground"] == "pin another link to it"
+
+
+def test_a_step_says_what_a_value_was_set_to():
+    text, path = EXAMPLES[FOURBAR], ["dimensions", "BC"]
+    for value, said in (("5 m", "Set dimensions.BC to 5 m"), (None, "Remove dimensions.BC")):
+        assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
+
+
 def test_what_has_no_length_is_refused():
     text, places = drawn_four_bar()
     found = ask(ask="edit", text=text, places=places, gestures=[{"do": "move", "point": "B", "to": places["link1.A"]}])
@@ -259,7 +312,7 @@ def test_what_has_no_length_is_refused():
 
 
 def test_the_other_assembly_is_one_click_away():
-    text = examples()[FOURBAR]
+    text = EXAMPLES[FOURBAR]
     was = ask(ask="model", text=text)
     (other,) = ask(ask="assemblies", text=text)["others"]
     ghost = {key: (track["x"][0], track["y"][0]) for key, track in other["points"].items()}
@@ -271,7 +324,7 @@ def test_the_other_assembly_is_one_click_away():
 
 @pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "script", "gif"])
 def test_files(what):
-    found = ask(ask="export", text=examples()[FOURBAR], what=what, steps=36)
+    found = ask(ask="export", text=EXAMPLES[FOURBAR], what=what, steps=36)
     assert len(found["bytes"]) > 500
     assert found["name"].startswith("Four-bar-of-Durango")
     if what == "csv":

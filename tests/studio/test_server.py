@@ -7,22 +7,25 @@ import json
 import os
 import socket
 import threading
+from pathlib import Path
 
 import pytest
 import uvicorn
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from trunnion.studio.answers import examples
 from trunnion.studio.message import unpacked
 from trunnion.studio.server import Studio
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """A studio that runs, on a folder with a model, a text that is none, and a link that leads out."""
     folder = tmp_path_factory.mktemp("models")
-    (folder / "Räder.yaml").write_text(examples()["hoecken"], encoding="utf-8")
+    (folder / "Räder.yaml").write_text(EXAMPLES["hoecken"], encoding="utf-8")
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
     secret = tmp_path_factory.mktemp("elsewhere") / "secret.yaml"
     secret.write_text("trunnion: 1", encoding="utf-8")
@@ -92,7 +95,7 @@ def test_the_page_fetches_from_here_alone(served):
 def test_files_of_the_folder_alone(served):
     told = json.loads(fetched(served, "GET", "/files")[2])
     assert (told["open"], told["files"]) == ("Räder.yaml", ["Räder.yaml"])
-    assert fetched(served, "GET", "/file/R%C3%A4der.yaml")[2] == examples()["hoecken"]
+    assert fetched(served, "GET", "/file/R%C3%A4der.yaml")[2] == EXAMPLES["hoecken"]
 
 
 @pytest.mark.parametrize(
@@ -137,7 +140,7 @@ def socket_of(studio, origin=None, cookie=None):
 
 def test_questions_over_the_socket(served):
     with socket_of(served, f"http://127.0.0.1:{served.port}") as line:
-        line.send(json.dumps({"ask": "model", "revision": 3, "text": examples()["hoecken"]}))
+        line.send(json.dumps({"ask": "model", "revision": 3, "text": EXAMPLES["hoecken"]}))
         found = unpacked(line.recv())
         assert (found["revision"], found["solved"]) == (3, True)
         line.send("no question")

@@ -84,6 +84,8 @@ def _nominal(run: Run) -> tuple[FreeMotion, Tables | None]:
 
     def find() -> tuple[FreeMotion, Tables | None]:
         motion = FreeMotion.of(run)
+        if any(drive.clutched for drive in motion.drives.values()):  # whose slips are events of each motion alone
+            return motion, None
         return motion, tabulates(motion, places(motion))
 
     return run.once("motion in time", find)

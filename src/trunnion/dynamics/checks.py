@@ -110,6 +110,7 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
     yield from _of_several(mechanism)
     if len(free) < 2 and not playing:
         return
+    yield from _clutches(mechanism, free)
     yield from _contacts(mechanism, playing)
     if any(joint.contact.of.rigid for joint in mechanism.effective_joints.values() if joint.contact is not None):
         why = "joints stick one by one, which is not solved beside joints in play between rigid bodies"
@@ -124,6 +125,16 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
             why = f"{what} joint {joint}, which has more than one freedom, and {len(free)} coordinates are free"
             remedy = f"use a law that is smooth at rest: {', '.join(_smooth())}; or one free driver"
             yield Finding(why, where, remedy)
+
+
+def _clutches(mechanism: Mechanism, free: list[str]) -> Iterator[Finding]:
+    """Clutches beside several free coordinates."""
+    beside = "joints are in play" if len(free) < 2 else f"{len(free)} coordinates are free"
+    for name in free:
+        motor = mechanism.drivers[name].motor
+        if motor is not None and motor.clutch is not None:
+            what = f"a clutch that may slip is solved with one free coordinate, and {beside}"
+            yield Finding(what, f"drivers.{name}.motor.clutch", "remove it, or let this driver alone be free")
 
 
 def _smooth() -> list[str]:

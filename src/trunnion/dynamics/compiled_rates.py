@@ -67,8 +67,8 @@ def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
 
 
 def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
-    """The rates as machine code; None where they cannot be: losses in gears, brakes, friction with a memory or at rest
-    of one coordinate, an assembly that is followed, no llvmlite."""
+    """The rates as machine code; None where they cannot be: losses in gears, brakes, clutches, friction with a memory
+    or at rest of one coordinate, an assembly that is followed, no llvmlite."""
     resting = motion.sticking and len(motion.names) == 1
     if resting or motion.bristles or not compilable(motion):
         return None
@@ -77,8 +77,8 @@ def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
 
 
 def compilable(motion: FreeMotion) -> bool:
-    """Whether it may be: without losses in gears, brakes and an assembly that is followed, where llvmlite is there."""
-    lossy = any(drive.brake or drive.efficiency < 1.0 for drive in motion.drives.values())
+    """Whether it may be: without losses in gears, brakes, clutches and an assembly that is followed, with llvmlite."""
+    lossy = any(drive.brake or drive.clutched or drive.efficiency < 1.0 for drive in motion.drives.values())
     return not (lossy or motion.followed or find_spec("llvmlite") is None)
 
 

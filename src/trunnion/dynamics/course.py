@@ -80,7 +80,7 @@ class Courses:
             time = stretch.begin + (stretch.end - stretch.begin) * NODES
             rows = stretch.state(time)
             second = cls.slopes(rows[n : 2 * n]) / (stretch.end - stretch.begin)
-            at = solution.layout.moment(time, rows, stretch.sense, stretch.now)
+            at = solution.layout.moment(time, rows, stretch.sense, stretch.now, stretch.slips)
             effort = motion.given(at, 0.0 * second if stretch.resting else second)[i]
             found.append((np.zeros(1, np.intp), np.array([time, rows[i], rows[n + i], effort])[:, None]))
         return cls.of(1, found)

@@ -52,7 +52,7 @@ class Filling:
             joints = JointsInSpace(self.stated, motion.contacts, len(self.time))
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
-            at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now)
+            at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now, stretch.slips)
             at = at._replace(onsets=stretch.onsets, senses=stretch.senses)
             second, back, onsets = self._solved(at, stretch)
             seconds[:, lanes] = second
@@ -96,7 +96,7 @@ class Filling:
         def key(k: int) -> object:
             one = stretches[k]
             snapshot = None if one.snapshot is None else id(one.snapshot)
-            return one.sense, one.resting, one.now, one.onsets, one.senses, snapshot
+            return one.sense, one.resting, one.now, one.onsets, one.senses, one.slips, snapshot
 
         begin = 0
         for i in range(1, len(which) + 1):
@@ -115,6 +115,6 @@ class Filling:
         if not stretch.resting:
             found = self.motion.accelerate(at)
             return found.second, found.back, found.onsets
-        share = Rest(self.motion, self.solution.layout).shares(at)
+        share = Rest(self.motion, self.solution.layout, stretch.slips).shares(at)
         zero = np.zeros_like(at.q)
         return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share)), ()

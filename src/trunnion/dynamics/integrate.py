@@ -56,7 +56,7 @@ class Stretch(NamedTuple):
     """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
 
     sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
-    goes on, where it is followed; onsets, senses: of contacts and of joints that may stick, see `Moment`.
+    goes on, where it is followed; onsets, senses, slips: of contacts, joints that may stick and a clutch, see `Moment`.
     """
 
     begin: float
@@ -68,6 +68,7 @@ class Stretch(NamedTuple):
     snapshot: Snapshot | None = None
     onsets: tuple[Onset, ...] = ()
     senses: tuple[int, ...] = ()
+    slips: float = 0.0
 
 
 class Passing(NamedTuple):
@@ -146,7 +147,7 @@ class Integration:
         known = [time for drive in self.motion.drives.values() for time in drive.times]
         times = {time for time in (*known, *self.times) if 0 < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
-        self.turned_over, self.asked_for = 0.0, 0
+        self.turned_over, self.asked_for, self.slips = 0.0, 0, 0.0
         self.breaks = [*sorted(times), self.duration]
         self.rest = Rest(self.motion, self.layout) if self.sticks else None
 
@@ -175,6 +176,7 @@ class Integration:
                 return self.solution
             k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
             until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else 0.0))
+            self._couple(time, row, now)
             if self.rest is not None and row[self.layout.coordinates] == 0.0:
                 sense = self.rest.sense(time, row, now)
                 if sense == 0.0:
@@ -187,7 +189,10 @@ class Integration:
 
     def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
         """The state of a row."""
-        return self.layout.moment(np.array([time]), row[:, None], sense, now)
+        return self.layout.moment(np.array([time]), row[:, None], sense, now, self.slips)
+
+    def _couple(self, time: float, row: Array, now: float) -> None:
+        """Find what else changes at an event: nothing, without a clutch."""
 
     def _begins(self, row: Array) -> bool:
         """Whether there are accelerations at the start; they also tell what rates are typical."""

@@ -1,9 +1,9 @@
-"""The motors of the free drivers of a mechanism, with gear, rotor, switch and brake."""
+"""The motors of the free drivers of a mechanism, with gear, rotor, switch, brake and clutch."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,16 @@ __all__ = ["Drive", "drives", "switched"]
 
 Array = NDArray[np.float64]
 
+CARRIED = Motor(kind="constant")  # stands for what comes through a clutch that slips
+
 
 @dataclass(frozen=True)
 class Drive:
     """What drives one free coordinate; nothing if it has no motor.
 
     parameters: of the motor, SI; inertia: of the rotor as the motor sees it, kg m² or kg; ratio: motor speed over the
-    coordinate's; off_from, brake_from: times, s, from which the motor is off and the brake on.
+    coordinate's; off_from, brake_from: times, s, from which the motor is off and the brake on; clutch: effort that a
+    clutch between rotor and gear transmits at most, N m or N, engaged between two times, s.
     """
 
     motor: Motor | None
@@ -34,6 +37,9 @@ class Drive:
     off_from: float = np.inf
     brake: float = 0.0
     brake_from: float = np.inf
+    clutch: float = np.inf
+    clutch_from: float = 0.0
+    clutch_until: float = np.inf
 
     @property
     def controlled(self) -> bool:
@@ -41,9 +47,16 @@ class Drive:
         return self.motor is not None and self.motor.of.error is not None
 
     @property
+    def clutched(self) -> bool:
+        """Whether it has a clutch."""
+        return self.motor is not None and self.motor.clutch is not None
+
+    @property
     def times(self) -> list[float]:
         """Times, s, at which its effort jumps or bends."""
         found = [self.off_from, self.brake_from]
+        if self.clutched:
+            found += [self.clutch_from, self.clutch_until]
         if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
             found += list(self.parameters["points.place"])
         return [time for time in found if np.isfinite(time)]
@@ -65,6 +78,31 @@ class Drive:
         if self.motor is None or now >= self.off_from:
             return 0.0 * speed
         return self.motor.of.function(self.ratio * speed, time, self.parameters, integral)
+
+    def engaged(self, now: float) -> bool:
+        """Whether the clutch is engaged, if there is one."""
+        return self.clutch_from <= now < self.clutch_until
+
+    def loose(self, now: float, slips: float) -> bool:
+        """Whether the rotor turns by itself. slips: sense in which the clutch does, 0 while it holds."""
+        return self.clutched and (slips != 0.0 or not self.engaged(now))
+
+    def carried(self, now: float, slips: float) -> float:
+        """Effort through the clutch while the rotor turns by itself, on the motor's side."""
+        return slips * self.clutch if self.engaged(now) else 0.0
+
+    def seen(self, now: float, slips: float) -> Drive:
+        """What the coordinate is driven by: a constant effort without a rotor where that turns by itself."""
+        if not self.loose(now, slips):
+            return self
+        own = {"effort": self.carried(now, slips)}
+        return replace(self, motor=CARRIED, parameters=own, inertia=0.0, off_from=np.inf, clutch=np.inf)
+
+    def spin(self, time: Array, rotor: Array, integral: Array, now: float, slips: float) -> Array:
+        """Acceleration of a rotor that turns by itself, at its speed: J ω̇ = T(ω) less what goes through the clutch."""
+        shaft = self.shaft(time, rotor / self.ratio, integral, now)
+        found: Array = (shaft - self.carried(now, slips)) / self.inertia
+        return found
 
     def waiting(self, since: Array, integral: Array, now: float) -> Array:
         """The controller's integral after a time at rest, s."""
@@ -125,6 +163,7 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
         for key in ("place", "effort"):
             rows = range(len(motor.points or ()))
             parameters[f"points.{key}"] = np.array([float(own[f"points.{k}.{key}"]) for k in rows])
-        known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from")
+        known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
+                 "clutch", "clutch_from", "clutch_until")  # fmt: skip
         found[name] = Drive(motor, parameters, **{key: own[key] for key in known if key in own})
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from trunnion.dynamics.clutch_motion import ClutchMotion
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.integrate import INSIDE, Integration
 from trunnion.dynamics.rates import Dynamics, Walks
@@ -35,7 +36,8 @@ def integration_of(
     if motion.resisted:
         assert not isinstance(rates, TabulatedRates)  # which are of one coordinate
         return StickMotion(motion, rates, duration, tolerance, progress=progress, times=times)
-    return Integration(
+    kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration
+    return kind(
         motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
         TABLED if isinstance(rates, TabulatedRates) else INSIDE, times,
     )  # fmt: skip

@@ -14,7 +14,19 @@ from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
-__all__ = ["CONTACT", "WORKS", "Dynamics", "Layout", "Rates", "Seeing", "Seen", "Walks", "seen_of", "works_of"]
+__all__ = [
+    "CLUTCH",
+    "CONTACT",
+    "WORKS",
+    "Dynamics",
+    "Layout",
+    "Rates",
+    "Seeing",
+    "Seen",
+    "Walks",
+    "seen_of",
+    "works_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -22,11 +34,13 @@ Array = NDArray[np.float64]
 # friction, and of joints in play to the contacts
 WORKS = ("drive", "loads", "springs", "friction")
 CONTACT = "contact"
+CLUTCH = "clutch"  # lost in a clutch that slips
 
 
 class Rates(NamedTuple):
     """Second derivatives (coordinate,), rates of the controllers' integrals (coordinate,), of the deflections
-    (bristle,) and of the works, W. sound: whether there is one acceleration; locked: whether friction has no solution.
+    (bristle,), of the works, W, and of a clutch's slip, if there is one. sound: whether there is one acceleration;
+    locked: whether friction has no solution.
     """
 
     second: Array
@@ -35,6 +49,7 @@ class Rates(NamedTuple):
     works: Array
     sound: bool
     locked: bool = False
+    slip: Array = np.empty(0)
 
 
 class Dynamics(Protocol):
@@ -60,40 +75,50 @@ class Seeing(Dynamics, Protocol):
 
 
 class Layout(NamedTuple):
-    """Where what stands in a row: coordinates, rates, integrals of controllers, deflections, works."""
+    """Where what stands in a row: coordinates, rates, integrals of controllers, deflections, a clutch's slip, works."""
 
     coordinates: int
     bristles: int
     touching: bool = False
+    clutched: bool = False
 
     @classmethod
     def of(cls, motion: FreeMotion) -> Layout:
         """The row of a free motion."""
-        return cls(len(motion.names), len(motion.bristles), bool(motion.contacts.each))
+        clutched = any(drive.clutched for drive in motion.drives.values())
+        return cls(len(motion.names), len(motion.bristles), bool(motion.contacts.each), clutched)
 
     @property
     def works_named(self) -> tuple[str, ...]:
         """The works in a row."""
-        return (*WORKS, CONTACT) if self.touching else WORKS
+        return (*WORKS, *((CONTACT,) if self.touching else (CLUTCH,) if self.clutched else ()))
+
+    @property
+    def slip(self) -> int:
+        """Where the slip of a clutch stands, before the works."""
+        return 3 * self.coordinates + self.bristles
 
     @property
     def size(self) -> int:
-        return 3 * self.coordinates + self.bristles + len(self.works_named)
+        return self.slip + self.clutched + len(self.works_named)
 
-    def moment(self, time: Array, rows: Array, sense: float = 0.0, now: float = 0.0) -> Moment:
+    def moment(
+        self, time: Array, rows: Array, sense: float = 0.0, now: float = 0.0, slips: float = 0.0
+    ) -> Moment:  # fmt: skip
         """The state of lanes, (number, lane)."""
-        n = self.coordinates
+        n, slip = self.coordinates, self.slip
         return Moment(
-            time, rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n : 3 * n + self.bristles], sense, now
-        )
+            time, rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n : slip], sense, now,
+            slip=rows[slip : slip + self.clutched], slips=slips,
+        )  # fmt: skip
 
     def works(self, rows: Array) -> Array:
         """The works, (work, lane)."""
-        return rows[3 * self.coordinates + self.bristles :]
+        return rows[self.slip + self.clutched :]
 
     def row(self, rate: Array, rates: Rates) -> Array:
         """The derivative of a row."""
-        return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.works])
+        return np.concatenate([rate, rates.second, rates.integral, rates.bristles, rates.slip, rates.works])
 
 
 class Walks:

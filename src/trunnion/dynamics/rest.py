@@ -24,15 +24,17 @@ class Rest:
     """The one free coordinate of a mechanism at rest: all joints rest with it, unless others are driven.
 
     It stays while what drives it lies between the efforts that the walk demands at the brink of moving backward and
-    forward, every friction and resisting load against that motion, at its value for slip 0.
+    forward, every friction and resisting load against that motion, at its value for slip 0. slips: sense in which a
+    clutch of its motor slips meanwhile.
     """
 
     motion: FreeMotion
     layout: Layout
+    slips: float = 0.0
 
     def _moment(self, time: Array, row: Array, begin: float, sense: float, now: float) -> Moment:
         rows = self.held(begin, row, time)
-        return self.layout.moment(time, rows, sense, now)
+        return self.layout.moment(time, rows, sense, now, self.slips)
 
     def held(self, begin: float, row: Array, time: Array) -> Array:
         """The state at times of a rest that began at a time in a row: only controllers move on."""

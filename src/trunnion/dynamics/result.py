@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
-from trunnion.dynamics.integrate import Event, Solution
+from trunnion.dynamics.integrate import Event, Solution, Stretch
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
-from trunnion.dynamics.rates import WORKS
+from trunnion.dynamics.rates import CLUTCH, WORKS
+from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
 from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
@@ -46,6 +47,8 @@ MOTION: dict[str, Variable] = {
     "work_loads": Variable(("time",), "J", "work of the loads since the start, positive into the mechanism"),
     "work_springs": Variable(("time",), "J", "work of springs and dampers since the start, likewise"),
     "work_friction": Variable(("time",), "J", "work lost to friction since the start"),
+    "work_clutch": Variable(("time",), "J", "work lost in the clutch of a motor since the start"),
+    "rotor_speed": Variable(("driver", "time"), "rad/s", "speed of the motor's rotor behind its clutch"),
     "kinetic_energy": Variable(("time",), "J", "kinetic energy of the links"),
     "potential_energy": Variable(("time",), "J", "potential energy of the links in the field of gravity"),
     "energy_residual": Variable(("time",), "J", "works less changes of energy; 0 but for the errors of integration"),
@@ -53,6 +56,12 @@ MOTION: dict[str, Variable] = {
     "sticking": Variable(("joint", "time"), "1", "1 while the joint sticks; with several free coordinates", np.int8),
     "event_time": Variable(("event",), "s", "time of the event"),
 }
+
+
+WORDS = dict(zip((*WORKS, IN_CONTACTS, CLUTCH), (
+    "work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
+    "work lost in contacts", "work lost in the clutch",
+), strict=True))  # fmt: skip
 
 
 class Books(NamedTuple):
@@ -147,7 +156,8 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residua
     return {
         "drive_coordinate": coordinates,
         "drive_rate": rates,
-        **{f"work_{name}": work for name, work in zip(WORKS, books.works, strict=False)},
+        **{f"work_{name}": work for name, work in _works(solution, books).items() if name != IN_CONTACTS},
+        **_rotors(motion, names, books),
         "kinetic_energy": books.energies[0],
         "potential_energy": books.energies[1],
         "energy_residual": residual,
@@ -155,6 +165,20 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residua
         **({} if books.sticking is None else {"sticking": books.sticking}),
         "event_time": np.array([one.time for one in solution.events], float),
     }
+
+
+def _works(solution: Solution, books: Books) -> dict[str, Array]:
+    """The works at every row, by their names."""
+    return dict(zip(solution.layout.works_named, books.works, strict=True))
+
+
+def _rotors(motion: FreeMotion, names: Sequence[str], books: Books) -> dict[str, Array]:
+    """Speeds of the rotors behind clutches, (driver, time), where there are any."""
+    found = np.full((len(names), len(books.time)), np.nan)
+    for i, (name, drive) in enumerate(motion.drives.items()):
+        if drive.clutched:
+            found[names.index(name)] = books.at.slip[0] + drive.ratio * books.at.rate[i]
+    return {"rotor_speed": found} if len(books.at.slip) else {}
 
 
 def _note_switches(motion: FreeMotion, solution: Solution) -> None:
@@ -230,8 +254,8 @@ def motion_findings(
     rests = [one for one in solution.events if one.kind == "rest"]
     if rests and solution.stretches and solution.stretches[-1].resting:
         last = solution.stretches[-1]
-        given, needed = _holding(motion, solution, last.begin)
-        code = "stays_at_rest" if len(solution.stretches) == 1 else "rests"
+        given, needed = _holding(motion, solution, last)
+        code = "stays_at_rest" if all(one.resting for one in solution.stretches) else "rests"
         figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
         more: dict[str, Any] = {} if code == "stays_at_rest" else {"times": len(rests), "time": rests[-1].time}
         yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
@@ -265,10 +289,12 @@ def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Ite
                               stated=one.restitution, returned=returned)  # fmt: skip
 
 
-def _holding(motion: FreeMotion, solution: Solution, time: float) -> tuple[float, float]:
-    """Effort that acts at a time of rest, and the break-away effort: the way it acts, or the nearer one."""
+def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[float, float]:
+    """Effort that acts as a rest begins, and the break-away effort: the way it acts, or the nearer one."""
+    time = stretch.begin
     rows, _ = solution.at(np.array([time]))
-    rest, at = Rest(motion, solution.layout), solution.layout.moment(np.array([time]), rows, 1.0, time)
+    rest = Rest(motion, solution.layout, stretch.slips)
+    at = solution.layout.moment(np.array([time]), rows, 1.0, time, stretch.slips)
     given = float(motion.given(at._replace(sense=0.0), np.zeros_like(at.q))[0, 0])
     forward, backward = (float(one[0]) for one in rest.beyond(np.array([time]), rows[:, 0], time, time))
     ahead = given > 0 or (given == 0 and forward >= backward)
@@ -318,11 +344,9 @@ def _summary(
     if not np.any(np.isfinite(books.works[0])):  # it does not begin
         return found
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
-    words = ("work of the drivers", "work of the loads", "work of the springs", "work lost to friction",
-             "work lost in contacts")  # fmt: skip
-    for key, word, works in zip((*WORKS, "contact"), words, books.works, strict=False):
+    for key, works in _works(solution, books).items():
         if np.nanmax(np.abs(works)) > ROUNDING * turned_over:
-            found.append(Figure(f"work_{key}", word, works[done], "J"))
+            found.append(Figure(f"work_{key}", WORDS[key], works[done], "J"))
     worst = float(np.nanmax(np.abs(residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))
     return found

@@ -44,7 +44,9 @@ class Moment(NamedTuple):
     deflections of bristles (bristle, lane), m. sense: of the motion where the speed is 0, +1 or −1, of one coordinate;
     now: a time within the stretch, which says what is switched on; onsets: of each contact of joints in play its speed
     of approach, m/s, None while it does not touch; senses: where several coordinates are free, in which sense each
-    joint of `FreeMotion.resisted` slides, +1 or −1, 0 where it sticks; empty: it is as the speeds say.
+    joint of `FreeMotion.resisted` slides, +1 or −1, 0 where it sticks; empty: it is as the speeds say. slip: speed of
+    the rotor behind a clutch less that of the joint through the gear, (1, lane), rad/s or m/s; slips: sense in which
+    the clutch slips, +1 or −1, 0 while it holds or is open.
     """
 
     time: Array
@@ -56,6 +58,8 @@ class Moment(NamedTuple):
     now: float = 0.0
     onsets: tuple[Onset, ...] = ()
     senses: tuple[int, ...] = ()
+    slip: Array = np.empty((0, 1))
+    slips: float = 0.0
 
 
 class Accelerated(NamedTuple):
@@ -225,8 +229,8 @@ class FreeMotion:
         """What the motors give, less the brakes, (coordinate, lane). senses: shares of what resists the joints that
         stick, and senses of those that slide, where several coordinates are free."""
         found = []
-        for i, (name, drive) in enumerate(self.drives.items()):
-            rate = at.rate[i]
+        for i, (name, own) in enumerate(self.drives.items()):
+            rate, drive = at.rate[i], own.seen(at.now, at.slips)
             if at.senses and senses and name in senses:
                 found.append(drive.resisted(at.time, rate, second[i], at.integral[i], at.now, senses[name]))
                 continue

@@ -96,6 +96,9 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
             yield Finding("it does not go round, so it has no steady cycle", f"{where}.range", "leave --steady out")
         if motor is None:
             continue
+        if motor.clutch is not None:
+            what = "a clutch that may slip is not solved in a steady cycle"
+            yield Finding(what, f"{where}.motor.clutch", "remove it, or leave --steady out")
         for key in ("off_from", "brake_from"):
             if getattr(motor, key) is not None:
                 what = "a steady cycle knows no time at which something is switched"

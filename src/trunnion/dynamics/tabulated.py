@@ -33,7 +33,8 @@ class Forces(NamedTuple):
     """What does not depend on the accelerations: effort and components without friction, by friction, and the motor.
 
     matrix: (E and components, column); known: of the terms without q̈ and friction; per: friction of each contact per
-    normal load; shaft: effort of the motor; brake: with the sign of the motion; through: sign of the motion.
+    normal load; shaft: effort of the motor; brake: with the sign of the motion; through: sign of the motion; drive:
+    what drives, the motor itself unless a clutch slips.
     """
 
     matrix: Array
@@ -42,6 +43,7 @@ class Forces(NamedTuple):
     shaft: float
     brake: float
     through: float
+    drive: Drive
 
 
 @dataclass
@@ -122,12 +124,13 @@ class TabulatedRates:
     def _forces(self, at: Moment, speed: float, matrix: Array, slips: Array) -> Forces:
         through = at.sense or (1.0 if speed >= 0.0 else -1.0)
         known = matrix[:, 1] * (speed * speed) + matrix[:, 2] * speed + matrix[:, 3 if through > 0 else 4]
-        shaft = float(self.drive.shaft(at.time, at.rate[0], at.integral[0], at.now)[0])
-        brake = (np.sign(speed) if speed != 0.0 else at.sense) * self.drive.braking(at.now)
+        drive = self.drive.seen(at.now, at.slips)
+        shaft = float(drive.shaft(at.time, at.rate[0], at.integral[0], at.now)[0])
+        brake = (np.sign(speed) if speed != 0.0 else at.sense) * drive.braking(at.now)
         per = np.array([
             self._friction(k, rub, float(slips[k]), speed, at) for k, rub in enumerate(self.tables.rubs)
         ])  # fmt: skip
-        return Forces(matrix, known, per, shaft, float(brake), through)
+        return Forces(matrix, known, per, shaft, float(brake), through, drive)
 
     def _friction(self, k: int, rub: Rub, slip: float, speed: float, at: Moment) -> float:
         """Friction of a contact for a normal load of 1 N; at rest that of the motion about to begin."""
@@ -140,7 +143,7 @@ class TabulatedRates:
 
     def _solved(self, forces: Forces) -> tuple[float, Array] | None:
         """q̈ and the friction forces; None where walks are to be asked. The gear's loss goes by where power flows."""
-        matrix, drive, driving = forces.matrix, self.drive, True
+        matrix, drive, driving = forces.matrix, forces.drive, True
         for _ in range(3):
             gear = drive.ratio * (drive.efficiency if driving else 1.0 / drive.efficiency)
             mass = float(matrix[0, 0]) + gear * drive.inertia * drive.ratio

@@ -267,7 +267,7 @@ def _motor_kind(driver: Driver, entry: Entry, slides: bool) -> Kind:
     if key in ("proportional", "integral"):
         gain = "damping" if key == "proportional" else "stiffness"
         return KINDS[gain if slides else f"torsional {gain}"]
-    return effort if key in ("effort", "limit", "brake") or key.endswith("_effort") else entry.kind
+    return effort if key in ("effort", "limit", "brake", "clutch") or key.endswith("_effort") else entry.kind
 
 
 def _table_kind(mechanism: Fields, name: str) -> Kind:

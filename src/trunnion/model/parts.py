@@ -177,7 +177,8 @@ class Motor(Part):
 
     ratio: speed of the motor over that of the joint; efficiency: of that gear; inertia: of the rotor (mass of a linear
     motor), on the motor's side. off_from: time at which the motor is switched off; brake: effort that resists the joint
-    from the time brake_from on.
+    from the time brake_from on. clutch: effort that a clutch between rotor and gear transmits at most, on the motor's
+    side; it is engaged from the time clutch_from to clutch_until.
     """
 
     kind: Annotated[str, _check_motor, _schema_motor]
@@ -199,6 +200,9 @@ class Motor(Part):
     off_from: Time | None = None
     brake: ForceOrMoment | None = None
     brake_from: Time | None = None
+    clutch: ForceOrMoment | None = None
+    clutch_from: Time | None = None
+    clutch_until: Time | None = None
 
     @property
     def of(self) -> MotorKind:

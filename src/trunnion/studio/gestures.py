@@ -271,11 +271,13 @@ def _set(sketch: Sketch, given: Given) -> str:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
         if not isinstance(group, (dict, list)):
             raise _refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
-    if given.get("value") is not None:
-        group[last] = _typed(given["value"])
-    elif isinstance(group, dict):
+    stated, value = ".".join(map(str, given["path"])), given.get("value")
+    if value is not None:
+        group[last] = _typed(value)
+        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else value}"
+    if isinstance(group, dict):
         group.pop(last, None)
-    return f"Set {'.'.join(map(str, given['path']))}"
+    return f"Remove {stated}"
 
 
 def _typed(value: Any) -> Any:

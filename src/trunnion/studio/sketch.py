@@ -27,7 +27,7 @@ Entries = dict[str, Any]
 
 TOGETHER = 1e-9  # of the size: joints nearer than this lie on one spot
 FIGURES = 9
-LENGTH = re.compile(r"[\d.]\s*(mm|cm|m|in|ft)\b")
+LENGTH = re.compile(r"[\d.]\s*(mm|cm|µm|um|m|in|ft)\b")
 NAME = re.compile(r"\s*(-?)\s*([^\W\d]\w*)\s*")
 
 
@@ -250,8 +250,9 @@ class Sketch:
 
     @cached_property
     def unit(self) -> str:
-        """The unit that lengths are written in."""
-        return length_unit(self.entries)
+        """The unit that lengths are written in: that of the model, or one that suits its size."""
+        suiting = "mm" if len(self.places) < 2 or 1e-4 <= self.size <= 10.0 else "m" if self.size > 1.0 else "µm"
+        return length_unit(self.entries) or suiting
 
     def length(self, value: float) -> str:
         """A length as it is written."""
@@ -274,7 +275,7 @@ class Sketch:
 
 
 def length_unit(entries: Entries) -> str:
-    """The unit of lengths that a model states most often; mm if it states none."""
+    """The unit of lengths that a model states most often; nothing if it states none."""
     texts = str([entries.get("dimensions"), entries.get("links")])
     found = LENGTH.findall(texts)
-    return max(set(found), key=found.count) if found else "mm"
+    return max(set(found), key=found.count) if found else ""

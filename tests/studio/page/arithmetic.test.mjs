@@ -50,6 +50,14 @@ assert.ok(!geometry.assembled({ count: 2, points: { "a.P": { x: [null], y: [0] }
 assert.equal(fields.written(" 0.3 "), 0.3);
 assert.equal(fields.written("2 kg"), "2 kg");
 assert.equal(fields.written("  "), null);
+assert.equal(fields.written("60", "mm"), "60 mm"); // never 60 m for who leaves off the unit
+assert.equal(fields.written("0", "mm"), 0);
+assert.equal(fields.written("60 m", "mm"), "60 m");
+assert.equal(fields.unitOf({ value: "60 mm ± 0.05 mm", example: null }), "mm");
+assert.equal(fields.unitOf({ value: "0.004", example: "5 mm" }), ""); // a plain number was SI and stays it
+assert.equal(fields.unitOf({ value: null, example: "5 mm" }), "mm");
+assert.equal(fields.unitOf({ value: ["0", "-100 N"], example: null }, 0), "N");
+assert.equal(fields.unitOf({ value: "2 * AB", example: null }), "");
 assert.deepEqual(fields.numberOf("60 mm ± 0.05"), { value: 60, rest: "mm ± 0.05" });
 assert.deepEqual(fields.numberOf("2.5e-3"), { value: 0.0025, rest: "" });
 assert.equal(fields.numberOf("r / 3"), null);

@@ -156,9 +156,10 @@ def _absent(mechanism: Numbers) -> Iterator[Finding]:
     jointed = {name for joint in joints.values() for name in joint.links}
     for name in links:
         if name not in jointed:
-            yield Finding(
-                f"no joint connects the link '{name}'", f"links.{name}", "join it to another link or remove it"
+            remedy = (
+                "pin another link to it" if name == mechanism.fixed_link else "join it to another link or remove it"
             )
+            yield Finding(f"no joint connects the link '{name}'", f"links.{name}", remedy)
     if not mechanism.fixed_link:
         yield Finding(
             "no link is fixed", "ground", "name the fixed link 'ground' or 'frame', or state ground: <its name>"

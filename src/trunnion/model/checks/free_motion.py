@@ -13,7 +13,11 @@ from trunnion.model.parts import Driver
 __all__ = ["FREE", "free_motion", "motor_values"]
 
 FREE = ("free", "motor", "initial")  # keys of a driver that no motion law takes
-COMMON = ("kind", "ratio", "efficiency", "inertia", "off_from", "brake", "brake_from")  # of every kind of motor
+# of every kind of motor
+COMMON = (
+    *("kind", "ratio", "efficiency", "inertia", "off_from", "brake", "brake_from"),
+    *("clutch", "clutch_from", "clutch_until"),
+)
 EXAMPLES = {
     "effort": "4 N m",
     "stall_effort": "4 N m",
@@ -51,10 +55,19 @@ def free_motion(driver: Driver, where: str) -> Iterator[Finding]:
     for key, other in (("brake", "brake_from"), ("brake_from", "brake")):
         if getattr(motor, key) is not None and getattr(motor, other) is None:
             yield Finding(f"a brake needs '{other}'", f"{where}.motor.{key}", f"add {other}")
+    for key in ("clutch_from", "clutch_until"):
+        if getattr(motor, key) is not None and motor.clutch is None:
+            yield Finding("there is no clutch", f"{where}.motor.{key}", "add clutch: 5 N m, what it transmits at most")
+    if motor.clutch is not None and motor.inertia is None:
+        what = "a clutch needs the inertia of the rotor, which turns by itself while it slips"
+        yield Finding(what, f"{where}.motor.clutch", "add inertia: 0.02 kg m^2, on the motor's side")
 
 
-ABOVE_0 = ("breakdown_effort", "breakdown_slip", "limit", "efficiency")
-NOT_BELOW_0 = ("inertia", "brake", "proportional", "integral", "off_from", "brake_from")
+ABOVE_0 = ("breakdown_effort", "breakdown_slip", "limit", "efficiency", "clutch")
+NOT_BELOW_0 = (
+    *("inertia", "brake", "proportional", "integral"),
+    *("off_from", "brake_from", "clutch_from", "clutch_until"),
+)
 NOT_0 = ("ratio", "no_load_speed", "synchronous_speed")
 
 
@@ -70,6 +83,7 @@ def motor_values(driver: Driver, values: Mapping[str, float], where: str) -> Ite
         if values.get(f"{where}.{effort}", np.nan) * values.get(f"{where}.{speed}", np.nan) < 0:
             what = f"the motor drives away from its {speed}: their signs differ"
             yield Finding(what, f"{where}.{effort}", f"give {effort} and {speed} the same sign")
+    yield from _clutch_values(values, where)
     if values.get(f"{where}.efficiency", 1.0) > 1.0:
         what = f"is {values[f'{where}.efficiency']:g}, above 1"
         yield Finding(what, f"{where}.efficiency", "give a share of at most 1, such as 0.95")
@@ -80,3 +94,14 @@ def motor_values(driver: Driver, values: Mapping[str, float], where: str) -> Ite
             if places[k] <= places[k - 1]:
                 what = f"its {over} {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
                 yield Finding(what, f"{where}.points.{k}", f"sort the points by {over}")
+
+
+def _clutch_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:
+    """Whether a clutch has a rotor to hold, and engages before it opens."""
+    if f"{where}.clutch" in values and values.get(f"{where}.inertia") == 0.0:
+        what = "is 0, and a clutch needs a rotor that turns by itself while it slips"
+        yield Finding(what, f"{where}.inertia", "give a number above 0")
+    begin, end = values.get(f"{where}.clutch_from", 0.0), values.get(f"{where}.clutch_until", np.inf)
+    if end <= begin:
+        what = f"the clutch opens at {end:g} s, not after it engages at {begin:g} s"
+        yield Finding(what, f"{where}.clutch_until", "give a time after clutch_from")

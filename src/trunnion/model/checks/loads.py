@@ -81,6 +81,11 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
     what = f"'{source}' refers to '{name}', which is not one of the dimensions"
     if PLACED in name and section != "loads":
         return Finding(what, path, "motions of joints and points are for loads; give a number or a dimension")
+    if section == "loads" and name in mechanism.measures:
+        placed = [one for one, _ in _placed_dimensions(mechanism)]
+        shown = ", ".join(dict.fromkeys([placed[0], placed[-2]]))
+        remedy = f"name the motion of a joint or a point as the columns of a result do: {shown} …"
+        return Finding(f"'{source}' refers to the measure '{name}', which is not known to loads", path, remedy)
     if name not in MOTION and name not in mechanism.tables:
         remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
         return Finding(what, path, remedy)

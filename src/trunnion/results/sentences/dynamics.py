@@ -46,7 +46,7 @@ DYNAMICS: dict[str, Sentence] = {
     "simulate.not_round": Sentence(
         ERROR,
         "there is no steady cycle: {driver} makes {turns:.3g} turns in {time:~s} and does not go round at the end",
-        "look at the motion from its start, without --steady; give it more --time if it still starts",
+        "run it without --steady to see the start; give it more --time if it has not run up",
     ),
     "simulate.not_repeating": Sentence(
         ERROR,
@@ -57,13 +57,13 @@ DYNAMICS: dict[str, Sentence] = {
     "simulate.unstable": Sentence(
         WARNING,
         "the steady cycle is not stable: a difference from it grows by the factor {factor:.4g} with every cycle",
-        "look at the motion from its start, without --steady: it leaves this cycle",
+        "run it without --steady to see how it leaves this cycle",
     ),
     "simulate.cycle_differs": Sentence(
         ERROR,
         "the cycle takes efforts that differ from those of the motors by up to {share:.2g} of the largest: it is not "
         "the motion that was found",
-        "look at the motion from its start, without --steady",
+        "run it without --steady to see the motion from its start",
     ),
     "simulate.stopped": Sentence(WARNING, "stopped at {time:~s}: the motion until then is kept"),
     "simulate.locks": Sentence(

@@ -35,6 +35,11 @@ def times(result: xr.Dataset) -> list[Column]:
         for variable, name, own in (("drive_coordinate", "coordinate", moves), ("drive_rate", "rate", f"{moves}/s")):
             title, _, values = column(result, variable, f"{driver}.{name}", (i,))
             found.append((title, own, values))
+        if "rotor_speed" in result and np.any(np.isfinite(result["rotor_speed"].values[i])):
+            _, _, values = column(result, "rotor_speed", f"{driver}.rotor_speed", (i,))
+            found.append((f"{driver}.rotor_speed", f"{moves}/s", values))
+    if "work_clutch" in result:
+        found.append(column(result, "work_clutch", "work_clutch", ()))
     if "contact" in result.dims:
         for k, contact in enumerate(result["contact"].values):
             found += [column(result, name, f"{contact}.{name}", (k,)) for name in CONTACT]

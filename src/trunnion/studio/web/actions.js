@@ -11,7 +11,9 @@ const TYPING = 350; // ms of quiet before typed text is solved
 let link;
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
-export async function start() {
+export const start = () => counted(begun());
+
+async function begun() {
   link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
     state.connected.value = open;
     if (open && untracked(() => state.text.value)) solve();
@@ -211,6 +213,9 @@ export function save(name = state.fileName.value) {
 
 async function stored(name) {
   const content = state.text.value;
+  const there = name === state.fileName.value ? await fetch(`/file/${encodeURIComponent(name)}`) : null;
+  if (there?.ok && ![state.savedText.value, content].includes(await there.text()))
+    return state.say(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`, true);
   const reply = await fetch(`/file/${encodeURIComponent(name)}`, { method: "PUT", body: content });
   const told = await reply.json().catch(() => ({ error: `${name} could not be saved.` }));
   if (told.error) return state.say(told.error, true);

@@ -50,14 +50,22 @@ function starts(path, other) {
 }
 
 function labelOf(path) {
-  return path.filter((key) => key !== "points").join(" ").replaceAll("_", " ");
+  const words = path.filter((key) => key !== "points" && key !== "joint_defaults").join(" ").replaceAll("_", " ");
+  return path[0] === "joint_defaults" ? `${words} of all joints` : words;
 }
 
-/** What is written for typed letters: a number stays a number, nothing takes the entry away. */
-export function written(typed) {
+/** What is written for typed letters: a number stays a number, or takes the unit; nothing takes the entry away. */
+export function written(typed, unit = "") {
   const plain = typed.trim();
   if (plain === "") return null;
-  return Number.isFinite(Number(plain)) ? Number(plain) : plain;
+  const number = Number(plain);
+  return Number.isFinite(number) ? (unit && number !== 0 ? `${plain} ${unit}` : number) : plain;
+}
+
+/** The unit that a bare number typed for a row takes: that of the value that was there, of its list, or of the example. */
+export function unitOf({ value, example }, order = 0) {
+  const there = [value ?? example].flat();
+  return [there[order], ...there].map((one) => numberOf(one ?? "")?.rest.split("±")[0].trim()).find(Boolean) ?? "";
 }
 
 /** A number with what follows it, {value, rest}, or null where it is an expression. */

@@ -10,18 +10,23 @@ import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, typedLen
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const WRITES = "input:not([type=range]), textarea, select, dialog, [contenteditable]";
 
+/** The field whose letters are not taken over yet. */
+let letters = null;
+
 export function listenToKeys(target) {
   target.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.isComposing) return;
     if (withControl(event) || ordinary(event)) event.preventDefault();
   });
   target.addEventListener("focusout", () => state.settle());
+  target.addEventListener("input", (event) => (letters = event.target)); // not taken over yet
+  for (const kind of ["change", "focusout"]) target.addEventListener(kind, () => (letters = null));
 }
 
 function withControl(event) {
   if (!(event.ctrlKey || event.metaKey) || event.altKey) return false;
   const key = event.key.toLowerCase();
-  const writes = event.target.closest?.("input:not([type=range])"); // a field undoes its own letters
+  const writes = event.target === letters && event.target.matches("input:not([type=range])"); // undoes its own letters
   if (key === "s") actions.save();
   else if (key === "o") state.dialog.value = "open";
   else if (key === "z" && !writes) event.shiftKey ? actions.redo() : actions.undo();

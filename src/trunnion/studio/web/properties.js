@@ -2,7 +2,7 @@
 
 import { useRef, useState } from "preact/hooks";
 import { edit, setValue } from "./actions.js";
-import { findingsOf, numberOf, rowsOf, written } from "./fields.js";
+import { findingsOf, numberOf, rowsOf, unitOf, written } from "./fields.js";
 import { dictionary } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
@@ -45,8 +45,11 @@ function Name({ kind, name }) {
   const take = (event) => {
     const to = event.target.value.trim();
     if (to === name || !to) return (event.target.value = name);
+    const { target } = event;
     edit([{ do: "rename", what: [kind, name], to }]).then(() => {
-      if (dictionary(state.answer.value?.entries?.[kind])[to] !== undefined) state.selection.value = { kind, name: to };
+      const there = dictionary(state.answer.value?.entries?.[kind]);
+      if (there[name] !== undefined) target.value = name; // it was refused
+      else if (there[to] !== undefined) state.selection.value = { kind, name: to };
     });
   };
   return html`<input class="name-of-part" aria-label="Name" value=${name} onChange=${take} />`;
@@ -64,7 +67,8 @@ function Row({ row, findings }) {
   const list = Array.isArray(value ?? example);
   if (fixed) return html`<div class="row"><span class="label">${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
   const parts = list ? (value ?? example.map(() => "")) : [value ?? ""];
-  const put = (order) => (event) => take(row, parts, list, order, event.target.value);
+  const sound = { ...row, value: wrong.length ? null : value }; // a unit that is refused goes with its number
+  const put = (order) => (event) => take(sound, parts, list, order, event.target.value);
   return html`<div class="row">
     <label class="label" for=${`${id}-0`}>${label}</label>
     <span class="values">
@@ -76,9 +80,11 @@ function Row({ row, findings }) {
   </div>`; // prettier-ignore
 }
 
-function take({ path, example }, parts, list, order, typed) {
-  if (!list) return setValue(path, written(typed));
-  const next = parts.map((one, place) => written(place === order ? typed : one));
+function take(row, parts, list, order, typed) {
+  const { path, example } = row;
+  const own = written(typed, unitOf(row, order));
+  if (!list) return setValue(path, own);
+  const next = parts.map((one, place) => (place === order ? own : written(one)));
   if (next.every((one) => one === null)) return setValue(path, null);
   return setValue(path, next.map((one, place) => one ?? written(String(example?.[place] ?? "0"))));
 }

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["MOST_EVENTS", "report"]
 
 MOST_EVENTS = 200  # rows of the table
-LOST = ("work_friction", "work_contact")
+LOST = ("work_friction", "work_contact", "work_clutch")
 HELD = (
     "kinetic_energy",
     "potential_energy",

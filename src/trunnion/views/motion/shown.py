@@ -18,7 +18,7 @@ __all__ = ["ENERGIES", "Happening", "Shown", "as_positions", "drivers_of", "ener
 Array = NDArray[np.float64]
 WORDS = {
     "break-away": "starts", "rest": "rests", "stick": "sticks", "lock": "locks", "motor-off": "motor off",
-    "brake": "brake on",
+    "brake": "brake on", "clutch-slips": "clutch slips", "clutch-holds": "clutch holds", "clutch-opens": "clutch opens",
 }  # fmt: skip
 ENERGIES = (
     ("work_drive", "work of the drivers"),
@@ -26,6 +26,7 @@ ENERGIES = (
     ("work_springs", "work of the springs"),
     ("work_friction", "lost to friction"),
     ("work_contact", "lost in contacts"),
+    ("work_clutch", "lost in the clutch"),
     ("contact_energy", "elastic energy of contacts"),
     ("kinetic_energy", "kinetic energy"),
     ("potential_energy", "potential energy"),

@@ -1,0 +1,217 @@
+"""Integration of a motion whose motor drives through a clutch: open, slipping or holding.
+
+While the clutch is open or slips the rotor turns by itself, J ω̇ = T(ω) − σ C, with the capacity C and the sense σ of
+the slip s = ω − i q̇; the coordinate is driven by σ C through the gear. While it holds, s = 0 and the rotor is part of
+what the coordinate moves. It slips on from where it would have to carry more than C. The sense is stated of every
+stretch, so that forces are smooth beyond its end, and the end is found on the dense output to rounding.
+
+Source: Ch. Glocker, F. Pfeiffer, Multibody Dynamics with Unilateral Contacts, Wiley, 1996 (stick and slip as a
+complementarity); of one contact of given normal force the cases are tried one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from trunnion.dynamics.integrate import Integration, Stretch
+from trunnion.dynamics.motor import Drive
+from trunnion.dynamics.rates import Dynamics, Rates
+from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.tabulated import TabulatedRates
+
+__all__ = ["ClutchMotion"]
+
+Array = NDArray[np.float64]
+
+LOOKED = 8  # parts of a step at whose ends slip and carried effort are looked at
+LANES = ("time", "q", "rate", "integral", "bristles", "slip")
+EXACT = 1e-14  # of the time: to which an event is located
+
+
+def _drive(motion: FreeMotion) -> Drive:
+    """That of the one free coordinate."""
+    (found,) = motion.drives.values()
+    return found
+
+
+class ClutchRates:
+    """The rates of a motion with those of the slip and of what is lost in it beside them."""
+
+    def __init__(self, drive: Drive, inner: Dynamics) -> None:
+        self.drive, self.inner = drive, inner
+
+    def __call__(self, at: Moment) -> Rates:
+        """The rates; one lane."""
+        return self._with_rotor(at, self.inner(at))
+
+    def resting(self, at: Moment) -> Rates:
+        """Those while the coordinate rests: the rotor alone moves; one lane."""
+        n = len(at.q)
+        return self._with_rotor(at, Rates(np.zeros(n), np.zeros(n), np.zeros(len(at.bristles)), np.zeros(4), True))
+
+    def _with_rotor(self, at: Moment, rates: Rates) -> Rates:
+        drive = self.drive
+        if not drive.loose(at.now, at.slips):
+            return rates._replace(slip=np.zeros(1), works=np.append(rates.works, 0.0))
+        rotor = at.slip[0] + drive.ratio * at.rate[0]
+        spin = drive.spin(at.time, rotor, at.integral[0], at.now, at.slips)
+        lost = drive.carried(at.now, at.slips) * at.slip[0]
+        error = drive.error(at.time, rotor / drive.ratio, at.integral[0], at.now)
+        works = np.append(rates.works, lost)
+        works[0] += lost[0]  # the motor's, of which the joint gets the rest
+        return rates._replace(slip=spin - drive.ratio * rates.second, integral=error, works=works)
+
+
+class _Changed(Exception):  # noqa: N818 (it is no error)
+    """The clutch slips, or its slip has become 0, at a time within a step."""
+
+    def __init__(self, time: float, row: Array) -> None:
+        super().__init__()
+        self.time, self.row = time, row
+
+
+class ClutchMotion(Integration):
+    """One motion, of one free coordinate, whose motor has a clutch."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.drive = _drive(self.motion)
+        self.rates = ClutchRates(self.drive, self.dynamics)
+        self.dynamics = self.rates
+        self.resting = False  # whether the rotor alone moves
+        self.let_go = 0.0  # sense in which a clutch that held begins to slip
+        self.known = "holds" if self.drive.engaged(0.0) else "opens"
+
+    # ---- how the clutch is --------------------------------------------------------------------------------------
+
+    def _couple(self, time: float, row: Array, now: float) -> None:
+        """Whether the clutch is open, slips or holds from here on."""
+        slip, engaged = float(row[self.layout.slip]), self.drive.engaged(now)
+        self.slips = float(np.sign(slip)) if engaged else 0.0
+        if engaged and slip == 0.0:
+            self.slips = self.let_go or self._overloaded(time, row, now)
+        self.let_go = 0.0
+        if self.rest is not None:
+            self.rest = replace(self.rest, slips=self.slips)
+        found = "opens" if not engaged else "slips" if self.slips else "holds"
+        if found != self.known:
+            turns = self.motion.system.turns(self.motion.names[0])
+            figure = (slip, "rad/s" if turns else "m/s") if found == "slips" else (np.nan, "")
+            self._note(time, f"clutch-{found}", *figure)
+            self.known = found
+
+    def _overloaded(self, time: float, row: Array, now: float) -> float:
+        """The sense in which a clutch without slip begins to slip, 0 if it holds."""
+        n = self.layout.coordinates
+        sense, rests = (float(np.sign(row[n])) if self.sticks else 0.0), False
+        if self.rest is not None and row[n] == 0.0:
+            sense = Rest(self.motion, self.layout).sense(time, row, now)
+            rests = sense == 0.0
+        at = self.layout.moment(np.array([time]), row[:, None], sense, now)
+        carried = float(self._carried(at, rests)[0])
+        return float(np.sign(carried)) if abs(carried) > self.drive.clutch else 0.0
+
+    def _carried(self, at: Moment, rests: bool) -> Array:
+        """Effort through a clutch that holds, (lane,): the motor's, less what the rotor takes."""
+        second = 0.0 * at.rate[0] if rests else self._second(at)
+        shaft = self.drive.shaft(at.time, at.rate[0], at.integral[0], at.now)
+        found: Array = shaft - self.drive.inertia * self.drive.ratio * second
+        return found
+
+    def _second(self, at: Moment) -> Array:
+        """Accelerations, (lane,): from tables lane by lane, by walks all at once."""
+        if not isinstance(self.rates.inner, TabulatedRates):
+            found: Array = self.motion.accelerate(at).second[0]
+            return found
+        return np.array([
+            self.rates.inner(at._replace(**{key: getattr(at, key)[..., [i]] for key in LANES})).second[0]
+            for i in range(len(at.time))
+        ])  # fmt: skip
+
+    # ---- where that changes -------------------------------------------------------------------------------------
+
+    def _add(self, stretch: Stretch) -> None:
+        """Add a step, up to where the slip becomes 0 or a clutch that holds carries its capacity."""
+        stretch = stretch._replace(slips=self.slips, resting=stretch.resting or self.resting)
+        times = np.linspace(stretch.begin, stretch.end, LOOKED + 1)
+        left = self._left(stretch, times)
+        over = np.flatnonzero(left[1:] < 0.0)
+        if not len(over):
+            super()._add(stretch)
+            return
+        low, high = float(times[over[0]]), float(times[over[0] + 1])
+        if left[over[0]] > 0.0:
+            low = brentq(lambda t: float(self._left(stretch, np.array([t]))[0]), low, high, xtol=EXACT * high)
+        super()._add(stretch._replace(end=low))
+        row = stretch.state(np.array([low]))[:, 0]
+        if self.slips:
+            row[self.layout.slip] = 0.0
+        else:
+            at = self._held(stretch, np.array([high]))
+            self.let_go = float(np.sign(self._carried(at, stretch.resting)[0]))
+        raise _Changed(low, row)
+
+    def _left(self, stretch: Stretch, times: Array) -> Array:
+        """What is left of the slip, or of the capacity of a clutch that holds; below 0 it has changed."""
+        if self.slips:
+            slip: Array = self.slips * stretch.state(times)[self.layout.slip]
+            return slip
+        if not self.drive.engaged(stretch.now):
+            return np.ones_like(times)
+        left: Array = self.drive.clutch - np.abs(self._carried(self._held(stretch, times), stretch.resting))
+        return left
+
+    def _held(self, stretch: Stretch, times: Array) -> Moment:
+        return self.layout.moment(times, stretch.state(times), stretch.sense, stretch.now)
+
+    # ---- the steps ----------------------------------------------------------------------------------------------
+
+    def _move(
+        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
+    ) -> tuple[float, Array, float | None]:
+        try:
+            return super()._move(time, row, until, sense, now, step)
+        except _Changed as changed:
+            self._follow(changed.time, changed.row, sense, now)
+            return changed.time, changed.row, None
+
+    def _rest(self, time: float, row: Array, until: float, now: float) -> tuple[float, Array]:
+        """Stay; the rotor goes on where the clutch is open or slips."""
+        if not self.drive.loose(now, self.slips):
+            try:
+                return super()._rest(time, row, until, now)
+            except _Changed as changed:
+                return changed.time, changed.row
+        assert self.rest is not None
+        if not self.solution.stretches or not self.solution.stretches[-1].resting:
+            self._note(time, "rest")
+        end = self.rest.until(time, row, until, now)
+        self.resting = True
+        time, row, _ = self._move(time, row, end, 0.0, now, None)
+        self.resting = False
+        return time, row
+
+    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
+        if not self.resting:
+            return super()._rate(sense, now, between)
+
+        def rate(moment: float, numbers: Array) -> Array:
+            self.solution.asked += 1
+            return self.layout.row(np.zeros(1), self.rates.resting(self.moment(moment, numbers, 0.0, now)))
+
+        return rate
+
+    def _failed(
+        self, time: float, row: Array, sense: float, now: float, message: str | None
+    ) -> tuple[float, Array, None]:
+        """As without a clutch; of a mechanism that locks the rotor keeps its speed."""
+        speed = float(row[self.layout.coordinates])
+        time, row, _ = super()._failed(time, row, sense, now, message)
+        row[self.layout.slip] += self.drive.ratio * (speed - float(row[self.layout.coordinates]))
+        return time, row, None

@@ -7,19 +7,16 @@ from __future__ import annotations
 
 import re
 import shutil
-import socket
-import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
-import uvicorn
 from playwright.sync_api import sync_playwright
 
 import trunnion
+from served import served
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
-from trunnion.studio.server import Studio
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
@@ -39,16 +36,8 @@ PEAK = 1e-6  # of the peak: how near a torque must be
 def studio(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
     (folder / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], encoding="utf-8")
-    bound = socket.socket()
-    bound.bind(("127.0.0.1", 0))
-    own = Studio(folder, "four-bar.yaml", bound.getsockname()[1])
-    server = uvicorn.Server(uvicorn.Config(own.app(), log_level="error", ws="websockets-sansio"))
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]}, daemon=True)
-    thread.start()
-    yield own
-    server.should_exit = True
-    thread.join(10)
-    bound.close()
+    with served(folder, "four-bar.yaml") as own:
+        yield own
 
 
 @pytest.fixture(scope="module")

@@ -5,17 +5,14 @@ from __future__ import annotations
 import http.client
 import json
 import os
-import socket
-import threading
 from pathlib import Path
 
 import pytest
-import uvicorn
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from served import served as serving
 from trunnion.studio.message import unpacked
-from trunnion.studio.server import Studio
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
@@ -30,18 +27,8 @@ def served(tmp_path_factory):
     secret = tmp_path_factory.mktemp("elsewhere") / "secret.yaml"
     secret.write_text("trunnion: 1", encoding="utf-8")
     (folder / "out.yaml").symlink_to(secret)
-    bound = socket.socket()
-    bound.bind(("127.0.0.1", 0))
-    studio = Studio(folder, "Räder.yaml", bound.getsockname()[1])
-    server = uvicorn.Server(uvicorn.Config(studio.app(), log_level="error", ws="websockets-sansio"))
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]}, daemon=True)
-    thread.start()
-    while not server.started:
-        thread.join(0.01)
-    yield studio
-    server.should_exit = True
-    thread.join(10)
-    bound.close()
+    with serving(folder, "Räder.yaml") as studio:
+        yield studio
 
 
 def fetched(studio, method, path, body=None, cookie=True, **headers):

@@ -23,6 +23,7 @@ from trunnion.dynamics.compiled_rates import (
     Kinds,
     columns_of,
     compilable,
+    eliminated,
     errors_of,
     missing_of,
     works_recorded,
@@ -114,15 +115,16 @@ def _closed(motion: FreeMotion, at: Moment, unit: Sequence[float], force: float)
         own: list[Number] = [(one - rest) / force for one, rest in zip(pushed, zero, strict=True)]
         columns.append(own + [0.0] * (len(closed) + len(sticks)))
     right = [*missing_of(motion, free, nothing), *_kept(motion, motion.walk(free, nothing), closed, sticks)]
-    numbers, sound = _eliminated([list(row) for row in zip(*columns, strict=True)], [-one for one in right])
+    numbers, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], [-one for one in right])
     second: Any = numbers[: len(nothing)]
     onsets = motion.forced(at.onsets, numbers[len(nothing) :], closed, sticks)
     done = at._replace(onsets=motion.shared(onsets, sticks))
     found = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
     touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
     seen = [one[i] for i in range(len(Seen._fields)) for one in touches]
-    xp = namespace(sound)
-    second = [xp.where(sound > 0.0, one, np.nan) for one in second]
+    xp = namespace(pivots[0])
+    least = functools.reduce(xp.minimum, pivots)
+    second = [xp.where(least > 0.0, one, np.nan) for one in second]
     back = motion.solve(done, second, sliding=True)
     return [*second, *errors_of(motion, at), *works_recorded(motion, done, back), *seen, 0.0]
 
@@ -144,21 +146,3 @@ def _kept(motion: ClosedMotion, walk: Forward, closed: Sequence[int], sticks: Se
     """Accelerations that closed contacts keep at 0: of gaps, and of slips of those that stick."""
     moved = {k: motion.contacts.each[k].accelerations(walk) for k in closed}
     return [*(moved[k][0] for k in closed), *(moved[k][1] for k in sticks)]
-
-
-def _eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], Number]:
-    """x of A x = b, masses first and then forces; and the least pivot, of masses and of forces that have a solution
-    all positive."""
-    count, least = len(right), matrix[0][0]
-    xp = namespace(least)
-    for k in range(count):
-        least = xp.minimum(least, matrix[k][k])
-        for i in range(k + 1, count):
-            share = matrix[i][k] / matrix[k][k]
-            matrix[i] = [a - share * b for a, b in zip(matrix[i], matrix[k], strict=True)]
-            right[i] = right[i] - share * right[k]
-    found: list[Number] = [0.0] * count
-    for i in reversed(range(count)):
-        rest = sum((matrix[i][j] * found[j] for j in range(i + 1, count)), 0.0)
-        found[i] = (right[i] - rest) / matrix[i][i]
-    return found, least

@@ -37,6 +37,7 @@ __all__ = [
     "columns_of",
     "compilable",
     "compiled_rates",
+    "eliminated",
     "errors_of",
     "missing_of",
     "works_recorded",
@@ -245,7 +246,7 @@ def _by_rounds(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> tuple[l
             ahead = DIFFERENCE * np.maximum(np.abs(second[k]), 1e-2 * size)
             tried = [one + ahead if i == k else one for i, one in enumerate(second)]
             columns.append([(a - b) / ahead for a, b in zip(missing_of(motion, at, tried), missed, strict=True)])
-        change = _eliminated([list(row) for row in zip(*columns, strict=True)], missed)
+        change, _ = eliminated([list(row) for row in zip(*columns, strict=True)], missed)
         return [*(one - part for one, part in zip(second, change, strict=True)), *change]
 
     begin = [0.0 * rate for rate in at.rate]
@@ -261,7 +262,7 @@ def _affine(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Numbe
     """Accelerations where efforts are affine in them."""
     nothing: Any = [0.0] * len(motion.names)
     matrix = [list(row) for row in zip(*columns_of(motion, at, unit), strict=True)]
-    return _eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])
+    return eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])[0]
 
 
 def columns_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[list[Number]]:
@@ -313,10 +314,12 @@ def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     return [*(one[i] for i in range(len(Seen._fields)) for one in parts), 0.0]
 
 
-def _eliminated(matrix: list[list[Number]], right: list[Number]) -> list[Number]:
-    """x of A x = b for a mass matrix, which is symmetric and positive: no pivots are needed."""
-    count = len(right)
+def eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], list[Number]]:
+    """x of A x = b and the pivots, without exchange of rows: all positive of a mass matrix, and of one with the forces
+    of contacts behind it where these have a solution."""
+    count, pivots = len(right), list[Number]()
     for k in range(count):
+        pivots.append(matrix[k][k])
         for i in range(k + 1, count):
             share = matrix[i][k] / matrix[k][k]
             matrix[i] = [a - share * b for a, b in zip(matrix[i], matrix[k], strict=True)]
@@ -325,4 +328,4 @@ def _eliminated(matrix: list[list[Number]], right: list[Number]) -> list[Number]
     for i in reversed(range(count)):
         rest = sum((matrix[i][j] * found[j] for j in range(i + 1, count)), 0.0)
         found[i] = (right[i] - rest) / matrix[i][i]
-    return found
+    return found, pivots

@@ -1,0 +1,29 @@
+"""A studio that runs on a folder while something is tried."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import uvicorn
+
+from trunnion.studio.server import Studio
+
+
+@contextmanager
+def served(folder: Path, opened: str) -> Iterator[Studio]:
+    """On a port that is free, until it is left."""
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        studio = Studio(folder, opened, bound.getsockname()[1])
+        server = uvicorn.Server(uvicorn.Config(studio.app(), log_level="error", ws="websockets-sansio"))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]}, daemon=True)
+        thread.start()
+        while not server.started:
+            thread.join(0.01)
+        yield studio
+        server.should_exit = True
+        thread.join(10)

@@ -103,7 +103,7 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
             remedy = f"see {odd.channel} in {odd.condition}, whose residual stands out"
         phrases = {"times_told": _times(times), "remedy": remedy}
         yield finding_for("fit.conditions_disagree", where, severity=severity, phrases=phrases, times=times)
-    single = [block for block in problem.blocks if block.fitted and not block.repeats]
+    single = [block for block in problem.blocks if block.fitted and not block.known]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
         yield finding_for("fit.not_repeated", "data")
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
@@ -408,7 +408,7 @@ def _exact(judged: Assessment) -> Iterator[Finding]:
     for one in judged.problem.blocks:
         accuracy = one.course.accuracy
         if one.fitted:
-            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain)
+            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain or accuracy.stated)
             known[one.channel] = known.get(one.channel, False) or stated
     bare = [channel for channel, stated in known.items() if not stated]
     forces = [channel for channel in bare if not measures[channel].of_motion]

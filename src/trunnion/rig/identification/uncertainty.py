@@ -337,6 +337,11 @@ def lack_of_fit(problem: FitProblem, x: Array) -> Test:
         mean += float(np.mean(each)) + sum(float(np.mean(one[1])) for one in found if len(one[1]) != turns)
         least = sum(one[2] for one in found)
         variance += max(float(np.var(each, ddof=1)), least) * (1 + 1 / turns)
+    stated = [k for k, one in enumerate(problem.blocks) if one.fitted and one.stated and np.any(problem.masks[k])]
+    if stated:  # of normal errors of these sizes: χ² of as many
+        weighed = [problem.misses(x, k, problem.blocks[k].mean)[0] / problem.blocks[k].unresolved for k in stated]
+        value, mean = value + float(np.sum(np.square(weighed))), mean + len(stated)
+        variance += 2 * len(stated) * (1 - min(problem.count / mean, 0.5))
     mean -= min(float(problem.count), 0.5 * mean)
     if mean <= 0 or variance <= 0:
         return Test(float("nan"), float("nan"), float("nan"))
@@ -384,7 +389,7 @@ def _left_over(problem: FitProblem, x: Array, inverse: Array, again: bool) -> tu
     pieces, gaps = 0.0, []
     for k, block in enumerate(problem.blocks):
         mask = problem.masks[k]
-        if not block.fitted or block.repeats != again or not np.any(mask):
+        if not block.fitted or block.known != again or not np.any(mask):
             continue
         gap = np.where(mask, problem.misses(x, k, block.mean), 0.0)
         power = _smooth(_powers(gap))

@@ -102,7 +102,7 @@ def test_repetitions_lessen_the_scatter_and_not_what_is_stated(stated: float) ->
 
 def test_a_course_over_time_comes_back() -> None:
     """The speed, with the same inertia over stall torque: the stated stall torque tells the two apart."""
-    time = np.arange(40) / 60 * 6.0
+    time = np.arange(60) / 60 * 6.0
     result = found([curve("a", speed(time)[None], 6.0)], J, M)
     np.testing.assert_allclose(result["estimate"], [INERTIA, LOSS], rtol=1e-7)
     torque = STALL * (1 - speed(time) / IDLE)
@@ -152,7 +152,7 @@ def test_intervals_of_values_cover() -> None:
 @pytest.mark.parametrize("repetitions", [1, 8])
 def test_intervals_of_courses_cover(repetitions: int) -> None:
     random, true = np.random.default_rng(6), [INERTIA, LOSS]
-    time, inside = np.arange(40) / 60 * 6.0, []
+    time, inside = np.arange(60) / 60 * 6.0, []
     for _ in range(25):
         turns = speed(time) + random.normal(size=(repetitions, 60))
         result = found([curve("a", turns, 6.0)], J, M)
@@ -213,7 +213,7 @@ positions: 240
         ({"starts": [{"set": {M0: "4 N m"}}]}, "nothing was measured"),
         ({"starts": [{"file": "a.csv"}]}, "when the start begins in the file"),
         ({"starts": [{"measured": {"steady_speed:A": {"values": "3 s", "uncertainty": "1 s"}}}]}, "do not give"),
-        ({"starts": [{"measured": {"starting_time:A": {"values": "3 s"}}}]}, "how far the value may be off"),
+        ({"starts": [{"measured": {"starting_time:A": {"values": "3 s"}}}]}, "the uncertainty of the value is unknown"),
         ({"starts": [{"measured": {"starting_time:A": {"values": "3 s", "uncertainty": "0 s"}}}]}, "not above zero"),
         ({"files": [{"file": "a.csv"}]}, "is of cycles"),
         ({"starts": [], "files": [{"file": "a.csv"}]}, "'channels' is missing"),

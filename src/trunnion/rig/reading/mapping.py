@@ -281,7 +281,7 @@ class Measured(Part):
             raise problem("the standard uncertainty is not above zero", "write one such as 10 ms")
         if self.uncertainty is None and len({one.value for one in self.values}) < 2:
             remedy = "state the standard uncertainty of a value, uncertainty: 10 ms, or the values of several starts"
-            raise problem("nothing tells how far the value may be off", remedy)
+            raise problem("the uncertainty of the value is unknown", remedy)
         return self
 
 

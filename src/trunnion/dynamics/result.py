@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
-from trunnion.dynamics.integrate import Event, Solution, Stretch
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
+from trunnion.dynamics.solution import Event, Solution, Stretch
 from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
 from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trunnion.dynamics.course import STARTED, Courses
-from trunnion.dynamics.integrate import Solution
+from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.state import FreeMotion
 from trunnion.results.figure import Figure
 

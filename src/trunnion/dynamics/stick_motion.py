@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.dynamics.contact_motion import ContactMotion, Crossing, Dense
-from trunnion.dynamics.integrate import Event
+from trunnion.dynamics.solution import Event
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.sticking import StickingMotion
 

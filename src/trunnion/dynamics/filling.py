@@ -110,9 +110,9 @@ class Filling:
         return found
 
     def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
-        """Accelerations and the walk; at rest with the share of the friction that holds it."""
+        """Accelerations and the walk; at rest with the shares of the friction that hold it."""
         self.motion.begin(stretch.snapshot)
-        if not stretch.resting:
+        if not stretch.resting or self.motion.resisted:
             found = self.motion.accelerate(at)
             return found.second, found.back, found.onsets
         share = Rest(self.motion, self.solution.layout, stretch.slips).shares(at)

@@ -23,7 +23,7 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.rates import Dynamics, Layout
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
@@ -384,13 +384,26 @@ class Integration:
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
         causes = [self._cause(time, one, sense, now) for one in (row, ahead)]
         if self.rest is not None and "locked" in causes:
-            energy = self._kinetic(time, row, sense, now)
-            self._note(time, "lock", energy, "J")
-            row[n] = 0.0
+            self._note(time, "lock", self._stopped(time, row, np.zeros(n), sense, now), "J")
             return time, row, None
         code = next((one for one in causes if one != "locked" and one), "step")
         self._stop(code, time, row)
         return time, row, None
+
+    def _stopped(self, time: float, row: Array, rates: Array, sense: float, now: float) -> float:
+        """Change rates at once, by friction: the energy lost, J, of rotors too, which is work of friction."""
+        n, works = self.layout.coordinates, self.layout.size - len(self.layout.works_named)
+        before, known = self._kinetic(time, row, sense, now), row[n : 2 * n].copy()
+        rotors = sum(
+            0.5 * drive.inertia * drive.ratio**2 * (old * old - new * new)
+            for drive, old, new in zip(self.motion.drives.values(), known, rates, strict=True)
+            if not drive.clutched
+        )
+        row[n : 2 * n] = rates
+        lost = before - self._kinetic(time, row, sense, now) + float(rotors)
+        row[works + WORKS.index("drive")] += float(rotors)
+        row[works + WORKS.index("friction")] += lost
+        return lost
 
     def _stop(self, code: str, time: float, row: Array) -> None:
         figures = {"coordinate": float(row[0]), "rate": float(row[self.layout.coordinates])}

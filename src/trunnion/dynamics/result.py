@@ -248,23 +248,48 @@ def motion_findings(
     yield from (finding_for(code, "joints", **figures) for code, figures in solution.notes.items())
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
-    for event in solution.events:
-        if event.kind == "lock":
-            yield finding_for("simulate.locks", f"drivers.{event.of}", time=event.time, energy=event.figure)
-    rests = [one for one in solution.events if one.kind == "rest"]
-    if rests and solution.stretches and solution.stretches[-1].resting:
-        last = solution.stretches[-1]
-        given, needed = _holding(motion, solution, last)
-        code = "stays_at_rest" if all(one.resting for one in solution.stretches) else "rests"
-        figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
-        more: dict[str, Any] = {} if code == "stays_at_rest" else {"times": len(rests), "time": rests[-1].time}
-        yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
+    yield from _locks(motion, solution)
+    yield from _rests(motion, solution, name, effort)
     if solution.ended is not None:
         ended = solution.ended
         unit: dict[str, Any] = (
             {"unit": "rad" if turns else "m", "driver": name} if ended.code == "simulate.range" else {}
         )
         yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
+
+
+def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
+    """What locks as it runs."""
+    locks = [one for one in solution.events if one.kind == "lock"]
+    if not motion.resisted:
+        for event in locks:
+            yield finding_for("simulate.locks", f"drivers.{event.of}", time=event.time, energy=event.figure)
+    elif locks:
+        joints, energy = list(dict.fromkeys(one.of for one in locks)), float(np.nansum([one.figure for one in locks]))
+        times = len({one.time for one in locks})
+        yield finding_for("simulate.joints_lock", f"joints.{joints[0]}", joints=joints, count=len(joints), times=times,
+                          time=locks[0].time, energy=energy)  # fmt: skip
+
+
+def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> Iterator[Finding]:
+    """What holds it where it rests at the end."""
+    rests = [one for one in solution.events if one.kind == "rest"]
+    if not (rests and solution.stretches and solution.stretches[-1].resting):
+        return
+    last, stays = solution.stretches[-1], all(one.resting for one in solution.stretches)
+    more: dict[str, Any] = {} if stays else {"times": len(rests), "time": rests[-1].time}
+    if motion.resisted:
+        at = solution.layout.moment(np.array([last.begin]), solution.at(np.array([last.begin]))[0], now=last.now)
+        shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
+        worst = int(np.argmax(shares))
+        code = "none_starts" if stays else "all_rest"
+        joint = motion.resisted[worst]
+        yield finding_for(f"simulate.{code}", f"joints.{joint}", joint=joint, share=float(shares[worst]), **more)
+        return
+    given, needed = _holding(motion, solution, last)
+    figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
+    code = "stays_at_rest" if stays else "rests"
+    yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
 
 
 def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:

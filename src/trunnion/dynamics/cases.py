@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.state import Accelerated, Moment
-from trunnion.dynamics.sticking import RANK, StickingMotion, repeated
+from trunnion.dynamics.sticking import FAR, RANK, StickingMotion, repeated
 
 __all__ = ["Case", "Cases", "Lock", "Senses"]
 
@@ -32,7 +32,6 @@ SOON = 1e-3  # of a typical time: how far ahead one looks for the sense of what 
 IDLE = 1e-7  # of a typical speed for a typical rate: what moves a joint as little does not, now
 MOST_CASES = 729  # of joints that stick or slide, which are tried one after the other
 INSTANT = 1e-12  # of a typical time: in which a joint locks
-FAR = 1e6  # times what is typical: an acceleration at which inertia is all there is
 APART = 1e-6  # of the accelerations: those that differ by as much are two
 
 
@@ -161,16 +160,19 @@ class Cases:
             stopping = at._replace(senses=tuple(own))
             guess = (self.free.stopped(at, sticks)[:, None] - at.rate) / instant
             found = self.free.accelerate(stopping, guess, -speeds[sticks] / instant)
-            if not np.all(found.converged) or not np.all(np.isfinite(found.second)):
-                return None
             assert found.shares is not None
-            over = [k for k in sticks if abs(found.shares[k, 0]) > 1.0 + SLACK]
-            if set(over) & set(joints):
+            if np.all(found.converged) and np.all(np.isfinite(found.second)):
+                torn = {k: found.shares[k, 0] for k in sticks if abs(found.shares[k, 0]) > 1.0 + SLACK}
+                if not torn:
+                    return self._after(at, found, tuple(own), joints, instant)
+            else:  # as nothing to speak of resists some, they go on as if they had not stuck
+                loose = at._replace(rate=self.free.stopped(at, joints)[:, None])
+                torn = {k: one for k, one in enumerate(self.free.ways(loose)[1]) if abs(one) > MEET and k in sticks}
+            torn = {k: one for k, one in torn.items() if k not in joints}  # they stuck until now
+            if not torn:
                 return None
-            if not over:
-                return self._after(at, found, tuple(own), joints, instant)
-            for k in over:  # it stuck, and is torn away
-                own[k] = int(np.sign(found.shares[k, 0]))
+            for k, one in torn.items():
+                own[k] = int(np.sign(one))
         return None
 
     def _after(
@@ -195,8 +197,7 @@ class Cases:
         away, where more of some acceleration takes less effort there."""
         count = len(self.free.names)
         known = self.free.accelerate(at).second
-        far = FAR * np.maximum(self.free.unit, np.max(np.abs(known), axis=1))[:, None]
-        starts = far * np.concatenate([np.eye(count), -np.eye(count)], axis=1)
+        starts, far = self.free.far(known), FAR * np.maximum(self.free.unit, np.max(np.abs(known), axis=1))[:, None]
         ends = np.array(list(itertools.product((1.0, -1.0), repeat=len(may)))).T
         if 3 ** len(may) > MOST_CASES or not np.any(
             self.free.turning(at, np.repeat(starts, ends.shape[1], axis=1), may, np.tile(ends, (1, 2 * count)))
@@ -204,7 +205,7 @@ class Cases:
             return False
         many = repeated(at, 2 * count)
         for case in self._every(at.senses, may):
-            found = self.free.accelerate(many._replace(senses=case), starts)
+            found = self.free.searched(many._replace(senses=case), starts)
             apart = np.max(np.abs(found.second - known) / far, axis=0) * FAR > APART
             if np.any(self._agrees(found, case, may) & (found.turned | apart)):
                 return True

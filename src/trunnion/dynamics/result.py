@@ -194,7 +194,8 @@ def _note_switches(motion: FreeMotion, solution: Solution) -> None:
 
 def _energy(books: Books) -> tuple[Array, float]:
     """What works and energies differ by at every row, J, and the energy turned over, J."""
-    drive, loads, springs, *lost = books.works  # to friction, and to contacts
+    # to friction, and to contacts; from the first row on, which is that after a stop at the start
+    drive, loads, springs, *lost = books.works - books.works[:, :1]
     energy = books.energies.sum(axis=0)
     residual = drive + loads + springs - sum(lost) - (energy - energy[0])
     sizes = [np.nanmax(np.abs(one), initial=0.0) for one in (*books.works, *(books.energies - books.energies[:, :1]))]

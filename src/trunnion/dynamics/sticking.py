@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 RANK = 1e-9  # of the largest: singular values below are 0
 NOTHING = 1e-12  # of the inertia: what resists a joint, and is none
+FAR = 1e6  # times what is typical: an acceleration at which inertia is all there is
 HELD = 1e-8  # of the accelerations: a joint that sticks has none but for rounding
 
 
@@ -68,7 +69,31 @@ class StickingMotion(FreeMotion):
     def accelerate(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
         """The accelerations, with the shares that hold what sticks; NaN where there are none. pulls: relative
         accelerations that the joints that stick are to have, (joint that sticks, 1), rad/s² or m/s²; none if not given.
+
+        Where the search ends on a side of where a reaction turns round on which there is no answer, or on which more
+        acceleration takes less effort, it is begun from far away on other sides.
         """
+        found = self.searched(at, guess, pulls)
+        left = found.turned | (~found.converged & (found.shares is None))
+        if not np.any(left):
+            return found
+        second = np.nan_to_num(found.second)
+        for start in self.far(second).T:
+            other = self.searched(at, np.where(left, start[:, None], second), pulls)
+            better = left & other.converged & ~other.turned
+            second = np.where(better, other.second, second)
+            left &= ~better
+            if not np.any(left):
+                return self.searched(at, second, pulls)
+        return found
+
+    def far(self, second: Array) -> Array:
+        """Accelerations far beyond some, one coordinate at a time, (coordinate, lane)."""
+        size = FAR * np.maximum(self.unit, np.max(np.abs(second), axis=1))
+        return np.hstack([np.diag(size), -np.diag(size)])
+
+    def searched(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
+        """See `accelerate`, from one place."""
         sticks = [k for k, sense in enumerate(at.senses) if sense == 0]
         if not sticks:
             return super().accelerate(at, guess)

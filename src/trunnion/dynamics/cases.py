@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.state import Accelerated, Moment
-from trunnion.dynamics.sticking import FAR, RANK, StickingMotion, repeated
+from trunnion.dynamics.sticking import RANK, StickingMotion, repeated
 
 __all__ = ["Case", "Cases", "Lock", "Senses"]
 
@@ -195,18 +195,18 @@ class Cases:
     def several(self, at: Moment, may: Sequence[int] = ()) -> bool:
         """Whether friction allows other accelerations than those of the senses of `at`. They are looked for, from far
         away, where more of some acceleration takes less effort there."""
-        count = len(self.free.names)
-        known = self.free.accelerate(at).second
-        starts, far = self.free.far(known), FAR * np.maximum(self.free.unit, np.max(np.abs(known), axis=1))[:, None]
+        count, starts = len(self.free.names), self.free.far(np.zeros_like(at.q))
         ends = np.array(list(itertools.product((1.0, -1.0), repeat=len(may)))).T
         if 3 ** len(may) > MOST_CASES or not np.any(
             self.free.turning(at, np.repeat(starts, ends.shape[1], axis=1), may, np.tile(ends, (1, 2 * count)))
         ):
             return False
+        known = self.free.accelerate(at).second
+        size = np.maximum(self.free.unit[:, None], np.max(np.abs(known)))
         many = repeated(at, 2 * count)
         for case in self._every(at.senses, may):
             found = self.free.searched(many._replace(senses=case), starts)
-            apart = np.max(np.abs(found.second - known) / far, axis=0) * FAR > APART
+            apart = np.max(np.abs(found.second - known) / size, axis=0) > APART
             if np.any(self._agrees(found, case, may) & (found.turned | apart)):
                 return True
         return False

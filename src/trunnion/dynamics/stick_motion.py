@@ -26,6 +26,7 @@ __all__ = ["StickMotion"]
 Array = NDArray[np.float64]
 
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
+FEW = 8  # steps after which one looks for other accelerations
 SEVERAL = "simulate.several_accelerations"
 
 
@@ -41,6 +42,7 @@ class StickMotion(ContactMotion):
         self._crossed: int | None = None
         self._slow = np.sqrt(self.free.typical)
         self._resting = False  # whether nothing moves
+        self._steps = 0
 
     def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
         """The state of a row, with contacts and joints as they are."""
@@ -166,7 +168,10 @@ class StickMotion(ContactMotion):
             self.solution.notes[SEVERAL] = {"time": time}
 
     def _held(self, solver: OdeSolver, row: Array) -> None:
-        """Look for other accelerations at the end of a step."""
+        """Look for other accelerations at the end of every few steps."""
         super()._held(solver, row)
+        self._steps += 1
+        if self._steps % FEW:
+            return
         with np.errstate(all="ignore"):
             self._others(float(solver.t), row, Case(self.senses, (), self.senses))

@@ -28,7 +28,6 @@ __all__ = ["StickingMotion", "least_shares", "repeated"]
 Array = NDArray[np.float64]
 
 RANK = 1e-9  # of the largest: singular values below are 0
-NOTHING = 1e-12  # of the inertia: what resists a joint, and is none
 FAR = 1e6  # times what is typical: an acceleration at which inertia is all there is
 HELD = 1e-8  # of the accelerations: a joint that sticks has none but for rounding
 
@@ -212,7 +211,7 @@ def _step(slopes: _Slopes, efforts: Array, pulls: Array, shares: Array) -> tuple
     E − T leaves to them outside the columns of ∂E/∂q̈ Z, so that ∂E/∂q̈ itself may be singular. A joint that nothing
     resists, as nothing presses on it, is not held.
     """
-    able = np.max(np.abs(slopes.shares), axis=0) > NOTHING * np.max(np.abs(slopes.mass))
+    able = np.max(np.abs(slopes.shares), axis=0) > 0.0
     left, sizes, right = np.linalg.svd(slopes.ways * able[:, None])
     rank, count = int(np.sum(sizes > RANK)), len(efforts)
     known = -right[:rank].T @ ((left[:, :rank].T @ (pulls * able)) / sizes[:rank])

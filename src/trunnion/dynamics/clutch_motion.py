@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from trunnion.dynamics.integrate import Integration, Stretch
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.rates import Dynamics, Rates
 from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tabulated import TabulatedRates
 

@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from trunnion.dynamics.integrate import Solution
+    from trunnion.dynamics.solution import Solution
     from trunnion.dynamics.state import FreeMotion
 
 __all__ = ["FEWEST", "NODES", "STARTED", "STEADY", "Courses"]

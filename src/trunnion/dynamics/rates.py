@@ -132,6 +132,8 @@ class Walks:
         """The rates; one lane."""
         motion = self.motion
         found = motion.accelerate(at, self._last)
+        if self._last is not None and not np.all(found.converged & ~found.turned):
+            found = motion.accelerate(at)  # the last ones may lie on the wrong side of where a reaction turns round
         if np.all(np.isfinite(found.second)):
             self._last = found.second
         integral = np.array([

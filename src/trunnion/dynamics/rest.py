@@ -147,16 +147,15 @@ class Meanwhile:
     def powers(self, time: Array) -> Array:
         """Powers, W, (work, time)."""
         panel, place = self._place(time)
-        found: Array = chebyshev.chebval(place, self.through[:, :, panel], tensor=False)
-        return found
+        return np.asarray(chebyshev.chebval(place, self.through[:, :, panel], tensor=False), np.float64)
 
     def works(self, time: Array) -> Array:
         """Works since the begin, J, (work, time)."""
         panel, place = self._place(time)
         half = 0.5 * (self.edges[1] - self.edges[0])
         integrals: Array = np.asarray(half * chebyshev.chebint(self.through, lbnd=-1), np.float64)
-        before: Array = np.asarray(np.cumsum(integrals.sum(axis=0), axis=1), np.float64)  # every polynomial is 1 at 1
-        before = before - integrals.sum(axis=0)
+        each = integrals.sum(axis=0)  # every polynomial is 1 at 1
+        before = np.cumsum(each, axis=1) - each
         found: Array = before[:, panel] + chebyshev.chebval(place, integrals[:, :, panel], tensor=False)
         return found
 

@@ -115,6 +115,5 @@ class Filling:
         if not stretch.resting or self.motion.resisted:
             found = self.motion.accelerate(at)
             return found.second, found.back, found.onsets
-        share = Rest(self.motion, self.solution.layout, stretch.slips).shares(at)
-        zero = np.zeros_like(at.q)
-        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share)), ()
+        rest = Rest(self.motion, self.solution.layout, stretch.slips)
+        return np.zeros_like(at.q), rest.back(at), ()

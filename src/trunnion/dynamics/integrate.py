@@ -166,10 +166,14 @@ class Integration:
         assert self.rest is not None
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
-        end = self.rest.until(time, row, until, now)
+        rest, end = self.rest, self.rest.until(time, row, until, now)
+        meanwhile = rest.meanwhile(time, row, end, now)
 
         def held(moments: Array) -> Array:
-            return self.rest.held(time, row, moments) if self.rest else np.empty(0)
+            rows = rest.held(time, row, moments)
+            if meanwhile:
+                self.layout.works(rows)[: len(WORKS)] += meanwhile.works(moments)
+            return rows
 
         self._add(Stretch(time, end, held, 0.0, True, now))
         return end, held(np.array([end]))[:, 0]

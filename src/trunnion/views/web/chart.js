@@ -87,7 +87,7 @@ function draw(chart, width) {
   const right = width - MARGIN.right;
   const x = (value) => MARGIN.left + ((value - x0) / (x1 - x0)) * (right - MARGIN.left);
   const words = labels(scene, x, right);
-  const top = MARGIN.top + LINE * Math.max(0, ...words.map(({ row }) => row + 1));
+  const top = MARGIN.top + LINE * Math.max(0, ...words.map((one) => (one ? one.row + 1 : 0)));
   const height = Math.round(Math.min(Math.max(width * 0.46, 190), 270)) + top - MARGIN.top;
   const bottom = height - MARGIN.bottom;
   const frame = {
@@ -131,12 +131,16 @@ function draw(chart, width) {
   moveCursor(chart);
 }
 
-/** The words of the events, above the curves: each in the lowest row where it meets no other; none of many. */
+/**
+ * The words of the events, above the curves: each in the lowest row where it meets no other. None of many, and none of
+ * quiet ones, as of impacts, which the curves show: null.
+ */
 function labels(scene, x, right) {
   const list = scene.motion?.events ?? [];
-  if (list.length > MOST_LINES) return [];
+  const loud = list.filter((one) => !one.quiet).length;
   const ends = []; // of what stands in each row
-  return list.map(({ at, word }) => {
+  return list.map(({ at, word, quiet }) => {
+    if (quiet || loud > MOST_LINES) return null;
     const wide = 6 * word.length + 6;
     const left = Math.max(MARGIN.left, Math.min(x(at) - wide / 2, right - wide));
     let row = ends.findIndex((end) => end <= left);
@@ -146,19 +150,20 @@ function labels(scene, x, right) {
   });
 }
 
-/** The events of a motion in time: a dashed line each; of many, which would hide the curves, a mark on the axis. */
+/** The events of a motion in time: a dashed line each; of those without a word, which would hide the curves, a mark on the axis. */
 function events(scene, frame, words) {
-  const list = scene.motion?.events ?? [];
-  const many = list.length > MOST_LINES;
   const baseline = (row) => frame.top - 4 - LINE * row;
-  const lines = list.map(({ at, word }, order) => {
+  const lines = (scene.motion?.events ?? []).map(({ at, word }, order) => {
     const x = frame.x(at);
-    const y1 = many ? frame.bottom - 7 : baseline(words[order].row) + 2;
-    const line = svg("line", { class: many ? "event many" : "event", x1: x, x2: x, y1, y2: frame.bottom });
+    const y1 = words[order] ? frame.top - 2 : frame.bottom - 7;
+    const line = svg("line", { class: words[order] ? "event" : "event many", x1: x, x2: x, y1, y2: frame.bottom });
     line.append(svg("title", {}, word));
     return line;
   });
-  return [...lines, ...words.map(({ word, row, middle }) => svg("text", { class: "mark middle", x: middle, y: baseline(row) }, word))];
+  const texts = words
+    .filter(Boolean)
+    .map(({ word, row, middle }) => svg("text", { class: "mark middle", x: middle, y: baseline(row) }, word));
+  return [...lines, ...texts];
 }
 
 /** A dotted line up through the chart. */

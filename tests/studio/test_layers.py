@@ -204,10 +204,10 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
     found, rows = compared(before, after)
     results = [analysed(one) for one in (before, after)]
     peaks = [float(np.abs(one["drive_effort"]).max()) for one in results]
-    (effort,) = [row for label, row in rows.items() if label.startswith("peak force of ")]
+    (effort,) = [row for label, row in rows.items() if label.startswith("peak force")]
     assert [effort["a"], effort["b"]] == pytest.approx(peaks, rel=1e-12)
     assert effort["texts"][2] == f"+{100 * (peaks[1] / peaks[0] - 1):.1f} %".replace("+-", "−")
-    for label, name in (("efficiency of the cycle", "efficiency"), ("locking margin, least", "locking_margin")):
+    for label, name in (("efficiency", "efficiency"), ("least locking margin", "locking_margin")):
         values = [float(one[name].min()) for one in results]
         assert [rows[label]["a"], rows[label]["b"]] == pytest.approx(values, rel=1e-12)
     least = [float(one["locking_margin"].min()) for one in results]
@@ -226,8 +226,8 @@ def test_the_same_without_friction():
     found, rows = compared(text, text, friction=("off", "stated"))
     free = analysed(text, friction=False)
     near(found["scene"]["drivers"][0]["effort"], free["drive_effort"].values[0])
-    assert rows["friction power, mean"]["a"] == 0
-    assert rows["locking margin, least"]["texts"] == ["—", "> 10", "—"]
+    assert rows["mean friction power"]["a"] == 0
+    assert rows["least locking margin"]["texts"] == ["—", "> 10", "—"]
     assert found["margin"] is None
 
 
@@ -252,7 +252,7 @@ def test_another_drive_is_not_laid_over():
     found, rows = compared(EXAMPLES["drawing-press"], EXAMPLES[FOURBAR])
     assert found["scene"] is None
     assert "cannot be laid over" in found["why"]
-    assert rows["peak torque of A"]["texts"][0] == "—"
+    assert rows["peak torque, drive A"]["texts"][0] == "—"
 
 
 def test_a_variant_without_an_answer_says_why():

@@ -134,8 +134,7 @@ def _model(asked: Asked) -> dict[str, Any]:
     }
     if result is None:
         return head
-    ideal = state.result(steps, False) if asked.get("ideal") and friction else None
-    shown = scene(result, ideal, max_positions=MOST_STEPS)
+    shown = scene(result, max_positions=MOST_STEPS)
     return head | {
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},

@@ -49,12 +49,17 @@ class Figure:
         if not np.isfinite(change) or self.beyond or before.beyond:
             return "—"
         if self.unit == "%":
-            return f"{_signed(100 * change)} points"
+            return f"{_percent(100 * change)} points"
         if self.unit == "1":
             return _signed(change)
         if before.value == 0:
             return f"{'+' if change > 0 else ''}{quantity(change, self.unit)}"
-        return f"{_signed(100 * change / abs(before.value))} %"
+        return f"{_percent(100 * change / abs(before.value))} %"
+
+
+def _percent(value: float) -> str:
+    text = f"{value:+.0f}" if abs(value) >= 100 else f"{value:+.1f}"
+    return "0" if float(text) == 0 else text.replace("-", "−")
 
 
 def _signed(value: float) -> str:
@@ -67,14 +72,15 @@ def figures(result: xr.Dataset, rubs: bool) -> Iterator[Figure]:
     units = attribute(result, "driver_units")
     for driver, of in zip(names(result, "driver"), units, strict=False):
         effort = result["drive_effort"].sel(driver=driver).values
-        yield Figure(f"peak {'force' if of == 'N' else 'torque'} of {driver}", _most(np.abs(effort)), of)
+        yield Figure(f"peak {'force' if of == 'N' else 'torque'}, drive {driver}", _most(np.abs(effort)), of)
     efficiency = column(result, "efficiency")
-    yield Figure("efficiency of the cycle", float("nan") if efficiency is None else float(efficiency), "%")
+    works = efficiency is not None and efficiency != 0  # where useful loads do no net work there is nothing to share
+    yield Figure("efficiency", float(efficiency) if works and efficiency is not None else float("nan"), "%")
     least = margin_of(result, rubs)["margin_least"] or {"value": float("nan"), "beyond": False}
-    yield Figure("locking margin, least", least["value"], "1", least["beyond"])
+    yield Figure("least locking margin", least["value"], "1", least["beyond"])
     force = np.asarray(result["reaction_force"].transpose("axis", ...))
     yield Figure("largest reaction", _most(np.linalg.norm(force, axis=0)), "N")
-    yield Figure("friction power, mean", float(result["friction_power_mean"].sum()), "W")
+    yield Figure("mean friction power", float(result["friction_power_mean"].sum()), "W")
     known = np.count_nonzero(result["status"].values < Status.NOT_CONVERGED)
     yield Figure("positions with an answer", float(known), "")
 

@@ -1,0 +1,49 @@
+// What can be shown over the mechanism: its names, and what of it is asked of Python when it is wanted.
+
+import { computed, effect, signal, untracked } from "@preact/signals";
+import { askOf } from "./actions.js";
+import * as state from "./state.js";
+
+/** Layers of the sheet and their names, in the order of the menu. */
+export const LAYERS = [
+  ["reactions", "Reactions"],
+  ["values", "Values of the reactions"],
+  ["curves", "Paths of points"],
+  ["velocity", "Velocity of the chosen point"],
+  ["acceleration", "Acceleration of the chosen point"],
+  ["centres", "Instant centres against the ground"],
+  ["relative", "Instant centres between links"],
+  ["circles", "Friction circles"],
+  ["transmission", "Transmission angles"],
+  ["variant", "Variant A as a ghost"],
+  ["names", "Names"],
+  ["grid", "Grid"],
+  ["others", "Other assemblies"],
+];
+
+/** The key of the chosen point or joint, "link.point", or null. */
+export const watched = computed(() => {
+  const { kind, name } = state.selection.value ?? {};
+  if (kind === "points") return name;
+  return kind === "joints" ? (state.answer.value?.scene?.joints.find((one) => one.name === name)?.at ?? null) : null;
+});
+
+/** {scene, point, centres, circles, transmission} of the scene that is shown, as far as it is wanted; or null. */
+export const laid = signal(null);
+
+/** Ask for them whenever they are wanted and there is a new answer. */
+export function keepLayers() {
+  const wanted = computed(() => {
+    const { centres, relative, circles, transmission } = state.layers.value;
+    return Object.entries({ centres: centres || relative, circles, transmission }).filter(([, shown]) => shown).map(([name]) => name).join(" ");
+  }); // prettier-ignore
+  effect(() => {
+    const [names, point] = [wanted.value, watched.value];
+    const scene = state.solved.value ? state.answer.value.scene : null;
+    untracked(() => {
+      if (laid.value?.scene !== scene) laid.value = null;
+      if (!scene || (!names && !point)) laid.value = null;
+      else askOf("layers", { point, wanted: names.split(" ") }).then((found) => found && (laid.value = { ...found, scene }));
+    });
+  });
+}

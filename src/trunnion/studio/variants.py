@@ -82,7 +82,7 @@ def figures(result: xr.Dataset, rubs: bool) -> Iterator[Figure]:
     yield Figure("largest reaction", _most(np.linalg.norm(force, axis=0)), "N")
     yield Figure("mean friction power", float(result["friction_power_mean"].sum()), "W")
     known = np.count_nonzero(result["status"].values < Status.NOT_CONVERGED)
-    yield Figure("positions with an answer", float(known), "")
+    yield Figure("positions solved", float(known), "")
 
 
 def _most(values: Any) -> float:
@@ -92,7 +92,7 @@ def _most(values: Any) -> float:
 def compared(before: xr.Dataset, rubbed: bool, after: xr.Dataset, rubs: bool) -> list[dict[str, Any]]:
     """Rows of the table: label, SI values a and b, their texts and that of the change; None of a figure one lacks.
 
-    Positions with an answer are told only where one lacks some.
+    Positions solved are told only where they are not all.
     """
     was = {one.label: one for one in figures(before, rubbed)}
     rows = []
@@ -116,7 +116,7 @@ def overlaid(state: Loaded, friction: bool, steps: int, present: xr.Dataset, rub
         result = state.result(steps, friction)
     except MechanismError as error:
         found = error.findings[0]
-        return {"scene": None, "why": f"has no answer: {found.where} {found.what}".strip(), "rows": []}
+        return {"scene": None, "why": f"cannot be solved: {found.where} {found.what}".strip(), "rows": []}
     rubbed = friction and bool(rubbing(state.run.system))
     rows = compared(result, rubbed, present, rubs)
     own, over = abscissa(result), abscissa(present)

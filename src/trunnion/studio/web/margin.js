@@ -9,8 +9,9 @@ const MEANING = "So many times the friction may grow before the position locks; 
 
 export function Margin() {
   const { margin, margin_least: least, margin_why: why } = state.answer.value ?? {};
-  const words = state.live.value ? "… while it is dragged" : state.solved.value ? (why ?? told(margin, least, state.index.value)) : "—";
-  const near = !state.live.value && least && !least.beyond && least.value < FEW;
+  const dragged = state.live.value; // the search for locking would take longer than a hand waits
+  const words = !state.solved.value ? "—" : (why ?? (dragged ? "follows on release" : told(margin, least, state.index.value)));
+  const near = !dragged && least && !least.beyond && least.value < FEW;
   return html`<span class=${near ? "margin near" : "margin"} title=${MEANING} aria-label=${`Locking margin: ${words}`} role="group">
     <b>Locking margin</b> ${words}</span>`;
 }

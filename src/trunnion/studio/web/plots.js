@@ -29,7 +29,7 @@ export function Plots() {
     <${Curves} class="charts" listOf=${curves} />
     <${Polars} />
     <${Figures} />
-    ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism has an answer.</p>`}
+    ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism is solved.</p>`}
   </div>`;
 }
 

@@ -67,6 +67,23 @@ def test_a_point_that_is_not_known_has_no_motion():
     assert ask("layers", EXAMPLES[FOURBAR])["point"] is None
 
 
+def test_any_place_on_a_link_moves_as_a_point_there():
+    text, index = EXAMPLES[FOURBAR], 50
+    result = analysed(text)
+    own = {
+        name: result[f"point_{name}"].sel(point="coupler.E").values for name in ("position", "velocity", "acceleration")
+    }
+    at = [float(row[index]) for row in own["position"]]
+    found = ask("layers", text, place={"link": "coupler", "at": at, "index": index})["point"]
+    for name, rows in own.items():
+        for axis, row in zip("xy", rows, strict=True):
+            near(found[name][axis], row)
+    longer = text.replace("BC: 6.00 m", "BC: 6.20 m")  # and it stays on its link when the model changes
+    again = ask("layers", longer, place={key: found[key] for key in ("link", "start", "local")})["point"]
+    near(again["position"]["x"], analysed(longer)["point_position"].sel(point="coupler.E", axis="x"))
+    assert ask("layers", text, place={"link": "none", "at": at, "index": index})["point"] is None
+
+
 def test_in_space_there_is_the_motion_of_a_point_alone():
     found = ask("layers", EXAMPLES["rssr"], wanted=["centres", "circles", "transmission"])
     assert not {"centres", "circles", "transmission"} & set(found)

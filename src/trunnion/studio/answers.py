@@ -33,7 +33,7 @@ from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.margin import margin_of
 from trunnion.studio.message import packed
-from trunnion.studio.overlays import centres, circles, column, point_motion, transmission
+from trunnion.studio.overlays import centres, circles, column, place_motion, point_motion, transmission
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
 from trunnion.studio.variants import overlaid
@@ -270,6 +270,8 @@ def _layers(asked: Asked) -> dict[str, Any]:
     found: dict[str, Any] = {"point": point_motion(result, point) if point in result["point"].values else None}
     if state.run.system.mechanism.space != "planar":
         return found
+    if asked.get("place"):
+        found["point"] = place_motion(result, asked["place"])
     if "circles" in wanted:
         found["circles"] = circles(result, rubbing(state.run.system))
     if wanted & {"centres", "transmission"}:

@@ -4,7 +4,7 @@ transmission angles; each for every position of the cycle, SI and rad.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,11 +18,13 @@ from trunnion.studies.design import instant_centre
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["centres", "circles", "column", "point_motion", "transmission"]
+__all__ = ["centres", "circles", "column", "place_motion", "point_motion", "transmission"]
 
 Array = NDArray[np.float64]
 
 MOST_LINKS = 12  # whose centres against each other are told; of more only those against the ground
+MOTION = ("position", "velocity", "acceleration")
+RATES = ("", "_velocity", "_acceleration")
 FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
 DYADS = (rrr.RRRPose, rrp.RRPPose, rpr.RPRPose, prp.PRPPose, rpp.RPPPose)
 AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
@@ -35,9 +37,48 @@ def column(number: Any, steps: int) -> Array:
 
 def point_motion(result: xr.Dataset, point: str) -> dict[str, Any]:
     """Velocity, m/s, and acceleration, m/s², of a point "link.point" by axis; KeyError for one that is not known."""
-    rows = {name: result[f"point_{name}"].sel(point=point) for name in ("velocity", "acceleration")}
-    parts = {name: {str(axis): row.sel(axis=axis).values for axis in row["axis"].values} for name, row in rows.items()}
-    return {"key": point, **parts}
+    axes = [str(axis) for axis in result["axis"].values]
+    rows = {name: _rows(result[f"point_{name}"].sel(point=point)) for name in MOTION[1:]}
+    return {"key": point, **{name: dict(zip(axes, row, strict=True)) for name, row in rows.items()}}
+
+
+def place_motion(result: xr.Dataset, place: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The same of any place on a link in the plane, with its path x, y, m, as that of a rigid body.
+
+    place: `link` and where it is `at` (x, y), m, in position `index`; or `start`, a point of the link, and `local`,
+    from there in the link's axes, m, which the answer tells: they hold when the model has changed. None where there is
+    no such link, or it stands nowhere at that position. With d from the known point, turned with the link:
+    v = v₀ + ω × d, a = a₀ + α × d − ω² d.
+    """
+    link = str(place["link"])
+    start = str(place.get("start") or next((str(key) for key in result["point"].values if _link(key) == link), ""))
+    if start not in result["point"].values or _link(start) != link:
+        return None
+    known = [_rows(result[f"point_{name}"].sel(point=start)) for name in MOTION]
+    angle, turn, second = (result[f"link_angle{name}"].sel(link=link).values for name in RATES)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    if "local" in place:
+        u, v = (float(part) for part in place["local"])
+    else:
+        index = int(place["index"]) % len(angle)
+        dx, dy = (float(part) - float(own[index]) for part, own in zip(place["at"], known[0], strict=True))
+        u, v = (float(one[index]) for one in (cosine * dx + sine * dy, cosine * dy - sine * dx))
+    if not np.isfinite(u + v):
+        return None
+    d = np.array([cosine * u - sine * v, sine * u + cosine * v])
+    across = np.array([-d[1], d[0]])
+    found = known[0] + d, known[1] + turn * across, known[2] + second * across - turn**2 * d
+    parts = {name: dict(zip("xy", rows, strict=True)) for name, rows in zip(MOTION, found, strict=True)}
+    return {"key": f"a place on {link}", "link": link, "start": start, "local": [u, v], **parts}
+
+
+def _rows(vector: xr.DataArray) -> Array:
+    """(axis, position)."""
+    return np.asarray(vector.transpose("axis", "position"), float)
+
+
+def _link(key: Any) -> str:
+    return str(key).rpartition(".")[0]
 
 
 @np.errstate(all="ignore")

@@ -96,6 +96,8 @@ async function carryOut(gestures, merge) {
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
+  const added = gestures.some((one) => one.do === "add-point") && Object.keys(done.places).find((key) => !(key in before.places));
+  if (added) state.selection.value = { kind: "points", name: added }; // and so its velocity and acceleration are shown
   if (done.select) state.selection.value = { kind: done.select[0], name: done.select[1] };
   state.say(sentence(done.says));
   if (state.live.value) state.live.value = { ...state.live.value, text: null };

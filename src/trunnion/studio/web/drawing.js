@@ -194,7 +194,8 @@ export function drawTracks(view) {
   layers.tracks.replaceChildren(...moving.map(([key, free]) => svg("path", { class: free ? "track free" : "track", d: trackPath(scene, key) })));
 }
 
-function trackPath(scene, key) {
+/** The path of a point in metres. */
+export function trackPath(scene, key) {
   let path = "";
   let pen = "M";
   for (let index = 0; index < scene.count + (scene.abscissa.closed ? 1 : 0); index += 1) {

@@ -5,7 +5,7 @@ import { arrow } from "../web/arrow.js";
 import { at, hull, magnitude, peak, place } from "../web/data.js";
 import { svg } from "../web/dom.js";
 import { quantity, roundBelow, stated } from "../web/format.js";
-import { KEY, perNewton } from "./drawing.js";
+import { KEY, perNewton, trackPath } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
 import { shown } from "./sheet.js";
@@ -76,10 +76,12 @@ function keyed({ frame }, wide, text, drawn) {
 
 function motion(view, point, wanted, key) {
   const { frame, index, scene } = view;
-  const found = place(scene, point.key, index);
+  const scenery = point.position ? { ...scene, points: { [point.key]: point.position } } : scene;
+  const found = place(scenery, point.key, index);
   if (!found) return [];
   const [x, y] = frame.to(found);
-  return VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
+  const path = point.position ? [curve(view, scenery, point), svg("circle", { class: "clicked-place", cx: x, cy: y, r: 4 })] : [];
+  return path.concat(VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
     const parts = point[name];
     const sizes = magnitude(parts, scene.count);
     const scale = (0.2 * Math.min(frame.width, frame.height)) / peak(sizes);
@@ -88,9 +90,16 @@ function motion(view, point, wanted, key) {
     key.push(keyed(view, one * scale, `${name} ${stated(one, unit)}`, (left, low) => svg("path", { class: `motion ${name}`, d: arrow(left, low, one * scale, 0) })));
     const [dx, dy] = [at(parts.x, index), at(parts.y, index)];
     if (dx === null || dy === null) return [];
-    const path = svg("path", { class: `motion ${name}`, d: arrow(x, y, dx * scale, -dy * scale) });
-    return [path, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(sizes[index], unit, peak(sizes))}`)];
-  });
+    const vector = svg("path", { class: `motion ${name}`, d: arrow(x, y, dx * scale, -dy * scale) });
+    return [vector, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(sizes[index], unit, peak(sizes))}`)];
+  }));
+}
+
+/** The path of a place that was clicked; it is drawn in metres once. */
+function curve({ frame }, scenery, point) {
+  point.path ??= trackPath(scenery, point.key);
+  const transform = `matrix(${frame.scale},0,0,${-frame.scale},${frame.left},${frame.foot})`;
+  return svg("path", { class: "track free", d: point.path, transform, "vector-effect": "non-scaling-stroke" });
 }
 
 // ---- instant centres ------------------------------------------------------------------------------------------------

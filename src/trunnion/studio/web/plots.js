@@ -3,15 +3,16 @@
 import { effect, signal, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { lineChart } from "../web/chart.js";
-import { full, magnitude } from "../web/data.js";
+import { at, full, magnitude } from "../web/data.js";
 import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";
-import { laid } from "./layers.js";
+import { edit } from "./actions.js";
+import { clicked, laid } from "./layers.js";
 import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
 import { tabled } from "./tables.js";
-import { html } from "./ui.js";
+import { Button, html } from "./ui.js";
 import { Variants, compared } from "./variants.js";
 
 const MOST = 24; // joints whose reactions are drawn
@@ -26,6 +27,7 @@ const plane = signal("x–y");
 export function Plots() {
   return html`<div class="plots">
     <${Variants} />
+    <${Place} />
     <${Curves} class="charts" listOf=${curves} />
     <${Polars} />
     <${Figures} />
@@ -95,6 +97,23 @@ function ofPoint({ key, velocity, acceleration }) {
     const axes = Object.entries(parts).map(([axis, values], order) => ({ label: axis, values: full(values, count), kind: `k${order} d${order + 1}` }));
     return { title: `${word} of ${key}`, unit, series: [{ label: "magnitude", values: magnitude(parts, count), kind: "ink" }, ...axes] };
   }); // prettier-ignore
+}
+
+/** A place that was clicked: it can become a point of its link. A link chosen otherwise offers its middle. */
+function Place() {
+  const { kind, name } = state.selection.value ?? {};
+  if (kind !== "links" || !state.solved.value || state.spatial.value) return null;
+  const { scene } = state.answer.value;
+  const here = (track) => ["x", "y"].map((axis) => at(track[axis], state.index.peek()));
+  const point = laid.value?.scene === scene && laid.value.point?.link === name ? laid.value.point : null;
+  const keep = () => edit([{ do: "add-point", link: name, at: here(point.position) }]);
+  const middle = () => {
+    const spots = scene.links.find((one) => one.name === name).points.map((key) => here(scene.points[key]));
+    clicked.value = { link: name, at: [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length), index: state.index.peek() };
+  };
+  return html`<p class="row-of-buttons of-place">${point
+    ? html`<span>The place clicked on ${name}.</span> <${Button} label="Make it a point" onClick=${keep} />`
+    : html`<span>Click ${name} on the sheet: the place there draws its curve.</span> <${Button} label="Its middle" onClick=${middle} />`}</p>`;
 }
 
 /** Polar diagrams of the reactions: the force vector of each joint as a closed curve. */

@@ -6,7 +6,7 @@ import { set, svg } from "../web/dom.js";
 import { build, drawTracks, drawing, pose } from "./drawing.js";
 import { gridStep, lengthText, lengthUnit } from "./geometry.js";
 import { others, poseGhosts } from "./ghosts.js";
-import { laid } from "./layers.js";
+import { laid, listenToPlaces } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
 import { compared } from "./variants.js";
 import { markChosen, poseHandles } from "./handles.js";
@@ -39,6 +39,7 @@ function mount(holder) {
   const stop = [
     watchSize(holder, view),
     listenToPointer(root, view),
+    listenToPlaces(root, view),
     effect(() => show(view)),
     effect(() => {
       state.selection.value;

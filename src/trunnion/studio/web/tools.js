@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { edit } from "./actions.js";
 import { lengthOf, lengthUnit } from "./geometry.js";
-import { pending, places, say, selection, tool } from "./state.js";
+import { pending, say, selection, tool } from "./state.js";
 
 const TURN = Math.PI / 12; // guides turn by 15°
 
@@ -104,11 +104,7 @@ function drive({ kind, name }) {
 
 function addPoint({ at }, { part }) {
   if (part?.kind !== "links") return say("Click a link: the point belongs to it.", true);
-  const before = places.value;
-  edit([{ do: "add-point", link: part.name, at }]).then(() => {
-    const added = Object.keys(places.value).find((key) => !(key in before) && key.startsWith(`${part.name}.`));
-    if (added) selection.value = { kind: "points", name: added }; // and so its velocity and acceleration are shown
-  });
+  edit([{ do: "add-point", link: part.name, at }]);
 }
 
 function load({ kind, key }) {

@@ -39,6 +39,14 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     def variant(user, words):
         return user.page.evaluate(f'import("/studio/variants.js").then(v => {words})')
 
+    def until(user, module, words):
+        """Wait for what a module knows."""
+        for _ in range(400):
+            if user.page.evaluate(f'import("/studio/{module}.js").then(m => Boolean({words}))'):
+                return user.idle()
+            user.page.wait_for_timeout(25)
+        return pytest.fail(f"never: {words}")
+
     def written(user, text):
         user.page.evaluate("content => import('/studio/actions.js').then(a => a.takeText(content, 'Edit'))", text)
         user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
@@ -57,10 +65,14 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
 
     @pytest.mark.slow
     def test_one_click_on_a_link_gives_the_curve_of_the_place_with_its_velocity_and_acceleration(user):
+        until(user, "sheet", "m.sheet.view.sized && !m.sheet.view.fresh")
+        user.page.wait_for_timeout(300)  # the page may ask for its first answer twice
+        user.idle()
         (bx, by), (cx, cy) = user.handle("B"), user.handle("C")
         tracks = user.page.locator(".track.free").count()
         user.page.mouse.click(0.5 * (bx + cx), 0.5 * (by + cy) - 10)
-        user.page.wait_for_function("import('/studio/layers.js').then(l => l.laid.value?.point)")
+        until(user, "layers", "m.laid.value?.point?.link === 'coupler'")
+        user.page.wait_for_selector(".overlay .track.free")
         assert user.page.locator(".track.free").count() == tracks + 1
         user.page.click("role=tab[name=Plots]")
         assert "Velocity of a place on coupler" in user.page.locator(".chart .title").all_inner_texts()
@@ -69,7 +81,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.until("s.selection.value?.kind === 'points' && s.solved.value")
         key = user.state("s.selection.value.name")
         assert key.startswith("coupler.")
-        user.page.wait_for_function(f"import('/studio/layers.js').then(l => l.laid.value?.point?.key === '{key}')")
+        until(user, "layers", f"m.laid.value?.point?.key === '{key}'")
         result = analysed(user.state("s.text.value"))
         go(user, 60)
         told = {words[0]: number(words[4:]) for words in laid_words(user) if words[1:4] == " = "}

@@ -218,8 +218,8 @@ def compared(before, after, friction=("stated", "stated"), **rest):
 def test_a_table_of_two_variants_is_that_of_two_analyses():
     before, after = EXAMPLES["drawing-press"], EXAMPLES["drawing-press"].replace("friction: 0.1", "friction: 0.15")
     assert before != after
-    found, rows = compared(before, after)
-    results = [analysed(one) for one in (before, after)]
+    found, rows = compared(before, after, steps=60)
+    results = [analysed(one, steps=60) for one in (before, after)]
     peaks = [float(np.abs(one["drive_effort"]).max()) for one in results]
     (effort,) = [row for label, row in rows.items() if label.startswith("peak force")]
     assert [effort["a"], effort["b"]] == pytest.approx(peaks, rel=1e-12)
@@ -288,8 +288,8 @@ def test_a_variant_without_an_answer_says_why():
 
 def test_the_margin_is_there_with_locking():
     text = EXAMPLES["drawing-press"].replace("friction: 0.1", "friction: 0.4")
-    found, result = ask("model", text), analysed(text)
-    assert np.count_nonzero(result["status"] == Status.LOCKED) > 10
+    found, result = ask("model", text, steps=60), analysed(text, steps=60)
+    assert np.count_nonzero(result["status"] == Status.LOCKED) > 5
     near(found["margin"], np.minimum(result["locking_margin"], 10))
     assert found["margin_least"]["value"] == pytest.approx(float(result["locking_margin"].min()), rel=1e-6)
     assert found["margin_least"]["value"] < 1

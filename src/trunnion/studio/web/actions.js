@@ -52,11 +52,11 @@ export function solve() {
 async function answered() {
   const sent = state.text.value;
   const friction = state.friction.value;
-  const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated", ideal: friction === "compare" };
+  const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated" };
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
-  state.answer.value = { ...found, text: sent };
+  state.answer.value = { ...found, text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
   const count = found.scene?.count ?? 1;
   if (state.index.value >= count) state.index.value = 0;
@@ -96,6 +96,8 @@ async function carryOut(gestures, merge) {
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
+  const added = gestures.some((one) => one.do === "add-point") && Object.keys(done.places).find((key) => !(key in before.places));
+  if (added) state.selection.value = { kind: "points", name: added }; // and so its velocity and acceleration are shown
   if (done.select) state.selection.value = { kind: done.select[0], name: done.select[1] };
   state.say(sentence(done.says));
   if (state.live.value) state.live.value = { ...state.live.value, text: null };
@@ -119,6 +121,22 @@ export function setValue(path, value, merge = null) {
 /** Where the mechanism would be with a point at another place. */
 export function drag(fields) {
   return link.ask("drag", { text: state.text.value, steps: STEPS, ...fields });
+}
+
+/** Ask something else of the mechanism that is shown; null where it has changed meanwhile or there is no answer. */
+export async function askOf(kind, fields) {
+  const { text, friction, scene } = state.answer.value;
+  const found = await counted(link.ask(kind, { text, friction, steps: scene.count, ...fields }));
+  if (found?.error) state.say(found.error, true);
+  return found && !found.error && state.answer.value?.scene === scene ? found : null;
+}
+
+/** Take another text as a step to undo. */
+export function takeText(content, name) {
+  const before = present();
+  state.commit(name, before, { text: content, places: before.places });
+  state.say(`${name}.`);
+  return solve();
 }
 
 /** The other assemblies of the present text. */

@@ -1,6 +1,8 @@
 // The bars around the sheet: file, undo, friction and export above; tools at the left; readiness and margin below.
 
 import { exported, openText, redo, save, undo } from "./actions.js";
+import { LAYERS } from "./layers.js";
+import { Margin } from "./margin.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { nextTheme, theme } from "./theme.js";
@@ -8,7 +10,6 @@ import { TOOLS, choose, hint } from "./tools.js";
 import { Button, Icon, Menu, html } from "./ui.js";
 
 const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["gif", "Animation (GIF)"], ["report", "Report (HTML)"], ["script", "Python script"]]; // prettier-ignore
-const LAYERS = [["reactions", "Reactions"], ["curves", "Paths of points"], ["names", "Names"], ["grid", "Grid"], ["others", "Other assemblies"]];
 
 export function TopBar() {
   const { past, future, fileName, unsaved, dialog } = state;
@@ -79,15 +80,4 @@ export function BottomBar() {
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore
-}
-
-/** How many times the friction may grow until it locks. */
-function Margin() {
-  const { margin_least: least } = state.answer.value ?? {};
-  if (!state.solved.value) return html`<span class="margin"><b>Locking margin</b> —</span>`;
-  if (!least) return html`<span class="margin" title="Nothing rubs, so nothing locks"><b>Locking margin</b> no friction</span>`;
-  const told = `${least.beyond ? "> " : ""}${Number(least.value).toPrecision(3).replace(/\.?0+$/, "")}`;
-  const near = !least.beyond && least.value < 2;
-  const words = "So many times the friction may grow before this position locks; at 1 it locks.";
-  return html`<span class=${near ? "margin near" : "margin"} title=${words}><b>Locking margin</b> ${told}${least.at && !least.beyond ? ` at ${least.at}` : ""}</span>`;
 }

@@ -31,7 +31,10 @@ export const past = signal([]);
 export const future = signal([]);
 /** "stated", "compare" (and without) or "off". */
 export const friction = signal("stated");
-export const layers = signal({ curves: true, reactions: true, names: true, grid: true, others: false });
+export const layers = signal({
+  curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
+  transmission: false, variant: true, names: true, grid: true, others: false,
+}); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
 export const dialog = signal(null);

@@ -9,10 +9,12 @@ const LINE = 12; // height of a row of their words
 const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
- * A chart of `series` [{label, values, kind, quiet}] in one unit; `kind` is a class that colours the curve.
+ * A chart of `series` [{label, values, kind, quiet, unlisted}] in one unit; `kind` is a class that colours the curve, `quiet`
+ * has no dot, `unlisted` no line in the legend.
  * `breaks` of a series are positions that no line leads to, `marks` positions that are marked in all of the chart.
  * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
- * `pick(index, firm)` is called when the reader points.
+ * `pick(index, firm)` is called when the reader points. Beside {element, show(index)} it tells the {factor, unit} it shows
+ * values in, and the largest of them, which decides on their decimals.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
   const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
@@ -20,7 +22,7 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   const scale = prefixed(scope, unit);
   const most = scope * scale.factor;
   const cut = !limits && scope < peak(...columns);
-  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : note;
+  const remark = [cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : "", note].filter(Boolean).join(" ");
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(
@@ -52,6 +54,8 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   listen(chart, pick);
   return {
     element,
+    scale,
+    most,
     show(index) {
       chart.index = index;
       moveCursor(chart);
@@ -64,8 +68,8 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
 }
 
 function legend(series, values, band) {
-  const items = series.map((one, order) =>
-    html("li", {}, swatch(one.kind), html("span", { class: "label" }, one.label), values[order]),
+  const items = series.flatMap((one, order) =>
+    one.unlisted ? [] : [html("li", {}, swatch(one.kind), html("span", { class: "label" }, one.label), values[order])],
   );
   if (band)
     items.push(html("li", {}, html("span", { class: `swatch area ${band.kind}` }), html("span", {}, band.label)));

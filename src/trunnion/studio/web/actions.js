@@ -3,7 +3,7 @@
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
-import { connection } from "./socket.js";
+import { connection, decode } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
@@ -18,13 +18,9 @@ async function begun() {
     state.connected.value = open;
     if (open && untracked(() => state.text.value)) solve();
   });
-  const [about, files] = await Promise.all([link.ask("start", {}), fetch("/files").then((reply) => reply.json())]);
-  if (about && !about.error) state.about.value = about;
+  const files = await fetch("/files").then((reply) => reply.json());
   state.folder.value = { folder: files.folder, names: files.files };
-  const last = state.lastSheet();
-  const again = last?.folder === files.folder ? last.name : files.open;
-  if (again && (files.open === again || files.files.includes(again))) await openFile(again);
-  else openSheet({ name: null, saved: "", content: "" });
+  if (!sheets) await opened(files);
   const left = state.kept(null);
   if (state.fileName.value !== null && left && left.text !== left.saved) state.waiting.value = left.time;
   state.keepSteps();
@@ -32,6 +28,16 @@ async function begun() {
     state.friction.value; // another friction is another answer
     untracked(solve);
   });
+  const about = await link.ask("start", {}); // not before the picture, for it takes the whole of Python
+  if (about && !about.error) state.about.value = about;
+}
+
+/** What is to be opened first: the sheet of this tab, else that of the command line, else an empty one. */
+async function opened(files) {
+  const last = state.lastSheet();
+  const again = last?.folder === files.folder ? last.name : files.open;
+  if (again && (files.open === again || files.files.includes(again))) await openFile(again);
+  else openSheet({ name: null, saved: "", content: "" });
 }
 
 /** A promise that counts as work until it is settled. */
@@ -151,11 +157,18 @@ function after(words) {
   solve();
 }
 
-/** Open a sheet with a text; its steps, and work that was left of it unsaved, are taken up again. */
-export function openSheet({ name, saved, content }) {
+let sheets = 0; // that were opened or asked for: the latest is the one that is shown
+
+/**
+ * Open a sheet with a text; its steps, and work that was left of it unsaved, are taken up again.
+ * `first` has what it is drawn of before it is solved.
+ */
+export function openSheet({ name, saved, content, first = null }) {
+  sheets += 1;
   const left = state.kept(name);
   const found = left && (name === null || left.text === saved || left.text !== left.saved) ? left : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
+  if (first?.tracks && first.text === state.text.value) showFirst(first);
   state.dialog.value = null;
   return solve();
 }
@@ -179,10 +192,17 @@ export function openFile(name) {
 }
 
 async function fetched(name) {
-  const reply = await fetch(`/file/${encodeURIComponent(name)}`);
+  const mine = (sheets += 1);
+  const reply = await fetch(`/first/${encodeURIComponent(name)}`);
   if (!reply.ok) return state.say(`${name} could not be read.`, true);
-  const content = await reply.text();
-  await openSheet({ name, saved: content, content });
+  const first = decode(await reply.arrayBuffer());
+  if (mine === sheets) await openSheet({ name, saved: first.text, content: first.text, first });
+}
+
+/** Draw a mechanism by where its points go, until its answer is there. */
+function showFirst({ text, entries, numbers, tracks }) {
+  state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
+  state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };
 }
 
 /** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo. */
@@ -200,8 +220,9 @@ export function openExample(example) {
 }
 
 async function shipped({ name, title }) {
+  const mine = (sheets += 1);
   const found = await link.ask("example", { name });
-  if (!found) return;
+  if (!found || mine !== sheets) return;
   if (found.error) return state.say(found.error, true);
   await openText(found.text, `Example ${title || name} opened`);
 }

@@ -35,7 +35,8 @@ function fill(holder) {
     if (!scene) {
       crank.player?.pause();
       crank.player = null;
-      holder.replaceChildren(element("p", { class: "calm" }, "The mechanism moves as soon as it is whole and has a driver."));
+      const words = state.answer.value?.tracks ? "The cycle is being solved …" : "The mechanism moves as soon as it is whole and has a driver.";
+      holder.replaceChildren(element("p", { class: "calm" }, words));
       return;
     }
     const figures = readout(scene);

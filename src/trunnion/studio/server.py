@@ -57,9 +57,10 @@ class Studio:
         routes = [
             Route("/", self._guarded(self._page)),
             Route("/files", self._guarded(self._files)),
-            Route("/file/{name}", self._guarded(self._read)),
-            Route("/first/{name}", self._guarded(self._first)),
-            Route("/file/{name}", self._guarded(self._write), methods=["PUT"]),
+            Route("/file/{name:path}", self._guarded(self._read)),
+            Route("/first/{name:path}", self._guarded(self._first)),
+            Route("/thumbnail/{name}", self._guarded(_thumbnail)),
+            Route("/file/{name:path}", self._guarded(self._write), methods=["PUT"]),
             Route("/{place:str}/{name:path}", self._guarded(self._asset)),
             WebSocketRoute("/socket", self._socket),
         ]
@@ -195,6 +196,26 @@ class Studio:
                 question = await socket.receive_text()
                 async with turn:
                     await socket.send_bytes(await run_in_threadpool(_answered, question))
+
+
+async def _thumbnail(request: Request) -> Response:
+    """The small picture of an example, as an answer to a question."""
+    from trunnion.studio.answers import examples
+
+    text = examples().get(request.path_params["name"])
+    if text is None:
+        return PlainTextResponse("There is no such example.", status_code=404)
+    headers = {"Cache-Control": "max-age=3600"}
+    content = await run_in_threadpool(_small, text)
+    return Response(content, media_type="application/octet-stream", headers=headers)
+
+
+def _small(text: str) -> bytes:
+    from trunnion.studio.message import packed
+    from trunnion.studio.thumbnails import thumbnail
+
+    with ANSWERING:
+        return packed(thumbnail(text))
 
 
 def _look(text: str) -> None:

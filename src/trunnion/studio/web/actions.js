@@ -3,6 +3,8 @@
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
+import { carries, linkOf, textOf } from "./links.js";
+import { forgetPhoto } from "./photo.js";
 import { connection, decode } from "./socket.js";
 
 const STEPS = 360; // positions of a run
@@ -11,7 +13,10 @@ const TYPING = 350; // ms of quiet before typed text is solved
 let link;
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
-export const start = () => counted(begun());
+export function start() {
+  addEventListener("hashchange", () => carries(location.hash) && counted(openLink(location.hash)));
+  return counted(begun());
+}
 
 async function begun() {
   link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
@@ -32,8 +37,9 @@ async function begun() {
   if (about && !about.error) state.about.value = about;
 }
 
-/** What is to be opened first: the sheet of this tab, else that of the command line, else an empty one. */
+/** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
 async function opened(files) {
+  if (carries(location.hash) && (await openLink(location.hash))) return;
   const last = state.lastSheet();
   const again = last?.folder === files.folder ? last.name : files.open;
   if (again && (files.open === again || files.files.includes(again))) await openFile(again);
@@ -178,6 +184,7 @@ export function takeWaiting(open) {
   state.waiting.value = null;
   if (open) return openSheet({ name: null, saved: "", content: "" });
   state.forget(null);
+  forgetPhoto(null);
   return null;
 }
 
@@ -207,12 +214,39 @@ function showFirst({ text, entries, numbers, tracks }) {
 
 /** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo. */
 export function openText(content, words) {
-  const left = state.fileName.value === null && state.unsaved.value ? { name: words, ...present() } : null;
+  const kept = state.kept(null);
+  const before = state.fileName.value === null && state.unsaved.value ? present() : kept?.text !== kept?.saved ? kept : null;
+  const left = before && { name: words, text: before.text, places: before.places ?? {} };
   state.forget(null);
+  forgetPhoto(null);
   const opened = openSheet({ name: null, saved: content, content });
   if (left) state.past.value = [left];
   state.say(`${words}.`);
   return opened;
+}
+
+/** Open the model of a link, and take it out of the address; whether there was one. */
+export async function openLink(address) {
+  const mine = (sheets += 1);
+  history.replaceState(null, "", location.pathname);
+  try {
+    const content = await textOf(address);
+    if (mine === sheets) await openText(content, "The model of the link opened");
+    return true;
+  } catch (problem) {
+    state.say(problem.message, true);
+    return false;
+  }
+}
+
+/** The model as a link in the clipboard. */
+export async function copyLink() {
+  try {
+    await navigator.clipboard.writeText(await linkOf(state.text.value, `${location.origin}/`));
+    state.say("The link is in the clipboard. It holds the model itself; whoever opens it needs a studio of their own.");
+  } catch (problem) {
+    state.say(problem.message, true);
+  }
 }
 
 export function openExample(example) {
@@ -227,7 +261,7 @@ async function shipped({ name, title }) {
   await openText(found.text, `Example ${title || name} opened`);
 }
 
-/** Save under the name, or ask for one. */
+/** Save under the name, or ask for one; why it was refused, or "". */
 export function save(name = state.fileName.value) {
   return name ? counted(stored(name)) : void (state.dialog.value = "save");
 }
@@ -236,10 +270,10 @@ async function stored(name) {
   const content = state.text.value;
   const there = name === state.fileName.value ? await fetch(`/file/${encodeURIComponent(name)}`) : null;
   if (there?.ok && ![state.savedText.value, content].includes(await there.text()))
-    return state.say(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`, true);
+    return unsaved(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`);
   const reply = await fetch(`/file/${encodeURIComponent(name)}`, { method: "PUT", body: content });
   const told = await reply.json().catch(() => ({ error: `${name} could not be saved.` }));
-  if (told.error) return state.say(told.error, true);
+  if (told.error) return unsaved(told.error);
   if (told.saved !== state.fileName.value) state.forget(state.fileName.value);
   state.fileName.value = told.saved;
   state.savedText.value = content;
@@ -248,6 +282,12 @@ async function stored(name) {
   const { folder, names } = state.folder.value;
   state.folder.value = { folder, names: [...new Set([...names, told.saved])].sort() };
   state.say(`Saved as ${told.saved}.`);
+  return "";
+}
+
+function unsaved(words) {
+  state.say(words, true);
+  return words;
 }
 
 /** Export and hand the file to the browser. */

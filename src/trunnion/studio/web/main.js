@@ -6,6 +6,7 @@ import { App } from "./app.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";
 import { listenToKeys } from "./keys.js";
+import { keepPhotos } from "./photo.js";
 import { keepTheme } from "./theme.js";
 import { html } from "./ui.js";
 
@@ -15,3 +16,4 @@ listenToKeys(document);
 listenToDrops(document);
 start();
 keepOthers();
+keepPhotos();

@@ -34,6 +34,8 @@ export const sheet = {
   /** @type {ReturnType<typeof drawing> | null} */
   view: null,
   after: () => {},
+  /** Puts the picture behind the grid where it belongs. */
+  photo: () => {},
   fit() {
     const { width, height } = sheet.view.frame;
     const { scene } = shown.peek() ?? {};
@@ -70,5 +72,6 @@ function middle() {
 
 function look(frame) {
   reframe(sheet.view, frame);
+  sheet.photo();
   sheet.after();
 }

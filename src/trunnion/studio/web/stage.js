@@ -9,6 +9,7 @@ import { others, poseGhosts } from "./ghosts.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
+import { watchPhoto } from "./photo.js";
 import * as state from "./state.js";
 import { pointer, typedLength } from "./tools.js";
 import { html } from "./ui.js";
@@ -34,6 +35,7 @@ function mount(holder) {
   };
   const stop = [
     watchSize(holder, view),
+    watchPhoto(view),
     listenToPointer(root, view),
     effect(() => show(view)),
     effect(() => {

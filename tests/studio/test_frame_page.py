@@ -28,7 +28,8 @@ ROOT = Path(__file__).resolve().parents[2]
 FOURBAR = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
 MOST_GIF = 3.0  # s
 
-FOREIGN = """<!doctype html><title>evil</title><iframe src="{address}"></iframe><img src="{home}/studio/main.js"><script>
+FOREIGN = """<!doctype html><title>evil</title><iframe src="{address}"></iframe><img src="{home}/studio/main.js">
+<script>
 const tried = {{}};
 const fetched = (name, path, asked) => fetch("{home}" + path, asked).then((reply) => reply.text()).then(
   (text) => (tried[name] = text), () => (tried[name] = null));
@@ -142,7 +143,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert "#" not in other.page.url
         assert not other.wrong
         other.page.evaluate("hash => location.hash = hash", f"#m={encoded(FOURBAR.encode())}")
-        other.until("s.text.value.endsWith('mm\\n') || !s.text.value.includes('Ö')")
+        other.until("!s.text.value.includes('Ö')")
         assert other.state("s.text.value") == FOURBAR
 
     @pytest.mark.slow
@@ -192,7 +193,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert photo["pixel"] == pytest.approx(3 * 0.0254 / 100, rel=0.02)  # 100 of its 400 px; clicks are whole px
         assert user.state("s.past.value.length") == 0  # no click reached the mechanism
         user.page.locator(".photo-card input[type=range]").fill("0.8")
-        left, _ = np.array(user.page.locator(".layer.photo image").bounding_box()["x"]), None
+        left = user.page.locator(".layer.photo image").bounding_box()["x"]
         user.page.click("button:has-text('Move')")
         user.page.mouse.click(700, 200)
         user.page.mouse.click(740, 200)
@@ -305,7 +306,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert time.perf_counter() - begin < 20
         waited = user.page.evaluate(
-            "new Promise(done => { const from = performance.now(); setTimeout(() => done(performance.now() - from), 0); })"
+            "new Promise(done => { const from = performance.now(); setTimeout(() => done(performance.now() - from)); })"
         )
         assert waited < 1000  # ms
         user.page.evaluate("text => import('/studio/actions.js').then(a => a.typed(text))", FOURBAR)

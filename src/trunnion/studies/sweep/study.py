@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, references
+from trunnion.cycle.summary import effort_units, inputs, references
 from trunnion.deprecation import renamed
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
@@ -150,6 +150,7 @@ def _dataset(
         **origin(mechanism, run.system.plan.formula, swept=names, steps=points.steps),
         "method": points.method.name,
         **cited(references(mechanism)),
+        "inputs": inputs(mechanism),
         "driver_units": effort_units(run.system),
         "findings": finding_rows(findings),
     }

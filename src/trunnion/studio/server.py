@@ -16,7 +16,7 @@ import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Lock
+from threading import Event, Lock
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -35,6 +35,7 @@ MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
 MOST_FILES = 500
 PACE = 1e-3  # s that loading runs before files of the page are served between; Python's own 5 ms add up over them
+PATIENCE = 1.0  # s that the rest waits for the page
 ANSWERING = Lock()  # one after another: the second about a text finds what was read for the first
 
 
@@ -46,6 +47,7 @@ class Studio:
     opened: str | None
     port: int
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    seen: Event = field(default_factory=Event)  # that the page has what its first picture is drawn of
 
     @property
     def address(self) -> str:
@@ -73,9 +75,10 @@ class Studio:
         sys.setswitchinterval(PACE)
         with contextlib.suppress(ValueError, OSError):
             text = self._text(self.opened or "")
-        warming = asyncio.get_running_loop().run_in_executor(None, _look, text)
+        warming = asyncio.get_running_loop().run_in_executor(None, _look, text, self.seen)
         warming.add_done_callback(lambda _: sys.setswitchinterval(pace))
         yield
+        self.seen.set()
         await warming
 
     # ---- who may ask ----------------------------------------------------------------------------------------------
@@ -170,7 +173,9 @@ class Studio:
             text = self._text(request.path_params["name"])
         except (ValueError, OSError) as error:
             return JSONResponse({"error": _reason(error)}, status_code=404)
-        return Response(await run_in_threadpool(_placed, text), media_type="application/octet-stream")
+        content = await run_in_threadpool(_placed, text)
+        self.seen.set()
+        return Response(content, media_type="application/octet-stream")
 
     async def _write(self, request: Request) -> Response:
         try:
@@ -218,9 +223,10 @@ def _small(text: str) -> bytes:
         return packed(thumbnail(text))
 
 
-def _look(text: str) -> None:
+def _look(text: str, seen: Event) -> None:
     """Load what answers, the first picture before the rest, and have the model solved before the page asks for it."""
     _placed(text)
+    seen.wait(PATIENCE)  # to load the rest beside would hold up the page
     import trunnion.studio.answers  # noqa: F401  # not while answers are being made: the page may ask for the picture
 
     _answered(json.dumps({"ask": "model", "text": text}))

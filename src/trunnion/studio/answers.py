@@ -15,9 +15,7 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import entries_of, text_of
@@ -25,7 +23,6 @@ from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.exports import exported
@@ -33,7 +30,8 @@ from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.margin import margin_of
 from trunnion.studio.message import packed
-from trunnion.studio.overlays import centres, circles, column, place_motion, point_motion, transmission
+from trunnion.studio.overlays import centres, circles, place_motion, point_motion, transmission
+from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
 from trunnion.studio.variants import overlaid
@@ -43,7 +41,6 @@ from trunnion.views.cycle.scene import scene
 __all__ = ["ANSWERS", "answer", "examples"]
 
 Asked = Mapping[str, Any]
-Array = NDArray[np.float64]
 
 STEPS = 360
 MOST_STEPS = 3600
@@ -123,7 +120,7 @@ def _model(asked: Asked) -> dict[str, Any]:
             found = state.placed(tuple(findings_of(result))) or found
         except MechanismError as error:
             found += state.placed(error.findings)
-    numbers = _plain(state.mechanism.parameters()) if state.mechanism else {}
+    numbers = plain(state.mechanism.parameters()) if state.mechanism else {}
     head = {
         "findings": [_row(one) for one in found],
         "entries": state.entries,
@@ -153,10 +150,6 @@ def _row(one: Finding) -> dict[str, Any]:
     return {"severity": one.severity.value} | {key: getattr(one, key) for key in keys}
 
 
-def _plain(numbers: Mapping[str, Any]) -> dict[str, float]:
-    return {path: float(np.ravel(primal(value))[0]) for path, value in numbers.items()}
-
-
 # ---- dragging -----------------------------------------------------------------------------------------------------
 
 
@@ -180,8 +173,8 @@ def _drag(asked: Asked) -> dict[str, Any]:
 
 def _shown(state: Loaded, steps: int, index: int) -> Sketch:
     """The sketch of a model at a position of its cycle."""
-    tracks = _columns(_walked(state, {}, steps), steps)["points"]
-    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in tracks.items()}
+    paths = tracks(_walked(state, {}, steps).walk, steps)
+    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
     if any(not np.isfinite(part) for place in places.values() for part in place):
         what = "cannot be assembled at the position that is shown"
         raise MechanismError(Finding(what, remedy="go to another position"))
@@ -201,19 +194,9 @@ def _walked(state: Loaded, values: Mapping[str, float], steps: int) -> Backward:
 def _columns(back: Backward, steps: int) -> dict[str, Any]:
     """What the page draws of a walk in the plane."""
     walk, whole = back.walk, partial(column, steps=steps)
-    points = _tracks(walk, steps)
+    points = tracks(walk, steps)
     angles = {link: whole(np.arctan2(one.frame.s, one.frame.c)) for link, one in walk.motions.items()}
     return {"points": points, "angles": angles, "efforts": {name: whole(one) for name, one in back.efforts.items()}}
-
-
-def _tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
-    """Where the points of the links are over the cycle."""
-    return {
-        f"{link}.{name}": {
-            axis: column(part, steps) for axis, part in zip("xy", walk.point(link, name).place, strict=True)
-        }
-        for link, name in walk.system.points
-    }
 
 
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
@@ -253,7 +236,7 @@ def _assemblies(asked: Asked) -> dict[str, Any]:
     if state.run.system.mechanism.space != "planar":
         return {"others": []}
     found = other_assemblies(state.run, state.entries or {}, steps)
-    rows = [{"name": name, "gestures": gestures, "points": _tracks(walk, steps)} for name, gestures, walk in found]
+    rows = [{"name": name, "gestures": gestures, "points": tracks(walk, steps)} for name, gestures, walk in found]
     return {"others": rows}
 
 

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.groups import prp, rpp, rpr, rrp, rrr
 from trunnion.solve.forward import Forward
 from trunnion.studies.design import instant_centre
+from trunnion.studio.placed import column
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["centres", "circles", "column", "place_motion", "point_motion", "transmission"]
+__all__ = ["centres", "circles", "place_motion", "point_motion", "transmission"]
 
 Array = NDArray[np.float64]
 
@@ -28,11 +28,6 @@ RATES = ("", "_velocity", "_acceleration")
 FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
 DYADS = (rrr.RRRPose, rrp.RRPPose, rpr.RPRPose, prp.PRPPose, rpp.RPPPose)
 AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
-
-
-def column(number: Any, steps: int) -> Array:
-    """A number of a walk at each position."""
-    return np.broadcast_to(np.asarray(primal(number), float), (steps,))
 
 
 def point_motion(result: xr.Dataset, point: str) -> dict[str, Any]:

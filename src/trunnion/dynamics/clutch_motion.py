@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 LOOKED = 8  # parts of a step at whose ends slip and carried effort are looked at
 LANES = ("time", "q", "rate", "integral", "bristles", "slip")
 EXACT = 1e-14  # of the time: to which an event is located
-ROUNDING = 1e-12  # of the capacity: a clutch that carries just that holds, though rounding lifts what it carries above it
+ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
 
 
 def _drive(motion: FreeMotion) -> Drive:

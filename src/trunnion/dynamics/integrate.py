@@ -201,7 +201,7 @@ class Integration:
             if len(marks) > CREEPING and before - marks[-CREEPING] < CREPT * self.duration:
                 return self._failed(before, row, sense, now, "")
             near = self._near(row, between, self._next(solver, until), rate, before)
-            solver, failed = (solver, None) if near else self._step(solver, rate, absolute)
+            solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
                 return self._failed(before, row, sense, now, failed)
             passed = near or self._passed(row, np.array(solver.y), sense, between)
@@ -249,10 +249,10 @@ class Integration:
             first = 1e-12 * abs(end - begin)  # SciPy would look for one without end; so the first step fails
         return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first)
 
-    def _step(
+    def _stepped(
         self, solver: OdeSolver, rate: Callable[[float, Array], Array], absolute: Array
     ) -> tuple[OdeSolver, str | None]:
-        """One step, and why there is none. LSODA does not get over a rate that is not known: it begins anew, shorter."""
+        """One step, and why there is none. LSODA does not get over an unknown rate: it begins anew, shorter."""
         begin, state, failed = float(solver.t), np.array(solver.y), solver.step()
         for k in range(1, RETRIES + 1 if self.motion.bristles else 0):
             if solver.status != "failed" and np.all(np.isfinite(solver.y)):
@@ -329,7 +329,7 @@ class Integration:
         solver = self._solver(by_number, begin, state, to.value, absolute)
         while solver.status == "running":
             last, held = float(solver.t), np.array(solver.y)
-            solver, failed = self._step(solver, by_number, absolute) if last == begin else (solver, solver.step())
+            solver, failed = self._stepped(solver, by_number, absolute) if last == begin else (solver, solver.step())
             wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), held.copy()
             before[k] = last
             if wrong and k == 0 and before[n] != 0.0:  # it turns round before the place

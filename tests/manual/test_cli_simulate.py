@@ -27,7 +27,9 @@ def test_a_duration_is_a_number_of_seconds_or_has_a_unit(program: Run, tmp_path:
 
 
 def test_a_steady_cycle_is_written_as_a_cycle(program: Run, tmp_path: Path) -> None:
-    assert program("simulate", PRESS, "--steady", "--steps", 36, "--out", "c.csv", "--report", "c.html").code == 0
+    files = ["--out", "c.csv", "--report", "c.html", "--out", "c.svg", "--kind", "speed"]
+    assert program("simulate", PRESS, "--steady", "--steps", 36, *files).code == 0
+    assert (tmp_path / "c.svg").stat().st_size > 5_000
     assert len((tmp_path / "c.csv").read_text().splitlines()) == 37
     assert program("simulate", PRESS, "--steady", "--kind", "phase", "--out", "c.png").code == 2
 

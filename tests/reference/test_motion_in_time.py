@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from timed import LINEAR, mass_on_a_belt, pulled_mass, slider_crank, three_posts, wheel
-from trunnion import analyse, read, simulate
+from trunnion import MechanismError, analyse, read, simulate
 from trunnion.joints.motors import control_at_rest, control_error
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, summary_of
@@ -228,6 +228,17 @@ def test_a_feed_works_on_the_spring_of_a_carriage_at_rest(clutch: bool) -> None:
     assert np.all(result["resting"] == 1)
     assert result["work_drive"].values == pytest.approx(20.0 * way + 0.5 * 40e3 * way**2, rel=1e-9, abs=1e-12)
     assert result["work_springs"].values == pytest.approx(-result["work_drive"].values, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("speed", [1e-3, 0.1])
+def test_the_stated_speed_of_a_free_driver_is_nothing_to_its_motion(speed: float) -> None:
+    """Its range then lasts another time than that of the prescribed nut, which `analyse` refuses."""
+    data = read(EXAMPLES / "stick-slip-drive.yaml").data()
+    data["drivers"]["S"] |= {"speed": speed}
+    feed = Mechanism(**data)
+    with pytest.raises(MechanismError, match="use the same duration"):
+        analyse(feed, 12)
+    assert simulate(feed, 0.19, 1)["work_drive"].values[-1] == pytest.approx(20.0 * 0.95e-3 + 0.5 * 40e3 * 0.95e-3**2)
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ __all__ = [
 
 IMAGES = (".png", ".svg", ".pdf", ".jpg", ".jpeg")
 PLOT_KINDS = (
-    "torque, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta, locking or measures"
+    "torque, speed, friction-power, reactions, polar, power, mechanism, motion, error, seat, beta, locking or measures"
 )
 
 File = Annotated[Path, typer.Argument(help="Model file: YAML, JSON or TOML.", show_default=False)]

@@ -80,7 +80,7 @@ def simulated(
 ) -> Result:
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
-    run = prepare(mechanism)
+    run = prepare(mechanism, free=True)
     playing = in_play(mechanism)
     if not playing:
         refuse_undetermined(run)
@@ -108,7 +108,7 @@ def _with_play(
     """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
-    rigid, loose = is_rigid(run.system.mechanism), prepare(bare.mechanism)
+    rigid, loose = is_rigid(run.system.mechanism), prepare(bare.mechanism, free=True)
     refuse_undetermined(loose, in_play(run.system.mechanism))
     motion = (ClosedMotion if rigid else StickingMotion).of(loose, contacts)
     row = initial_row(motion)

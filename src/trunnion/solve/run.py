@@ -150,26 +150,29 @@ class Run:
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
-def prepare(mechanism: Mechanism) -> Run:
+def prepare(mechanism: Mechanism, free: bool = False) -> Run:
     """Decompose a mechanism and choose its assembly. Raises MechanismError if its structure is not determined.
 
-    Done once for each mechanism, which does not change.
+    Done once for each mechanism, which does not change. free: the motion of its free drivers is to be found, so that
+    their ranges may last as long as they like.
     """
-    known: Run | None = mechanism.worked_out.get("run")
+    free = free and len(mechanism.drivers) > 1  # else it is all the same
+    key = "run of free drivers" if free else "run"
+    known: Run | None = mechanism.worked_out.get(key)
     if known is None or known.system.mechanism is not mechanism:  # of one that this is a copy of
-        known = mechanism.worked_out["run"] = _prepared(mechanism)
+        known = mechanism.worked_out[key] = _prepared(mechanism, free)
     return known
 
 
-def _prepared(mechanism: Mechanism) -> Run:
+def _prepared(mechanism: Mechanism, free: bool) -> Run:
     keep_pages()
     system = build(mechanism)
     values = mechanism.parameters()
-    cycle = system.cycle(values)
+    cycle = system.cycle(values, None, free)
     run = Run(system, values, cycle, choose(system, values, cycle))
     turns = _unknown_turns(run)
     if any(turns.values()):
-        cycle = system.cycle(values, turns)
+        cycle = system.cycle(values, turns, free)
         run = Run(system, values, cycle, choose(system, values, cycle))
     return run
 

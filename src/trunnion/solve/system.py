@@ -343,11 +343,12 @@ class System:
                 widest = np.maximum(widest, np.hypot(x - places[0][0], y - places[0][1]))
         return np.where(widest > 0, widest, 1.0)
 
-    def cycle(self, values: Values, turns: Mapping[str, float] | None = None) -> Cycle:
+    def cycle(self, values: Values, turns: Mapping[str, float] | None = None, free: bool = False) -> Cycle:
         """How long the drivers take: the longest that ends, or the least time in which all make whole periods.
 
         So do joints behind gear pairs. turns: whole turns, in one period of the drivers, of joints that a gear pair
-        starts from and that are neither driven nor geared; none if not given.
+        starts from and that are neither driven nor geared; none if not given. free: what free drivers take counts only
+        where all are free, for their motion is to be found.
         Where it is over COMMON_TURNS periods of the slowest, the cycle is its one period and not periodic.
         Raises MechanismError where a range runs against its speed or two drivers do not fit one cycle.
         """
@@ -362,10 +363,18 @@ class System:
                 speed = nominal[f"drivers.{name}.speed"]
                 what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {speed:g} (SI)"
                 findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
-        longest = float(max(span.duration for span in spans.values()))
+        found = {name for name, driver in drivers.items() if free and driver.found}
+        longest = float(
+            max(span.duration for name, span in spans.items() if name not in found or len(found) == len(spans))
+        )
         ending = [name for name, span in spans.items() if not span.periodic]
         for name in ending:
-            if not findings and not spans[name].rests and abs(spans[name].duration - longest) > 1e-9 * longest:
+            if (
+                not findings
+                and name not in found
+                and not spans[name].rests
+                and abs(spans[name].duration - longest) > 1e-9 * longest
+            ):
                 what = f"its range lasts {spans[name].duration:g} s, the whole cycle lasts {longest:g} s"
                 findings.append(Finding(what, f"drivers.{name}", "use the same duration for all drivers with a range"))
         if findings:

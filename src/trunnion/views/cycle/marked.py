@@ -20,7 +20,18 @@ if TYPE_CHECKING:
 __all__ = ["OVER_DRIVE", "mark", "position_at"]
 
 # kinds of figures all of whose panels are over the drive
-OVER_DRIVE = ("torque", "friction-power", "reactions", "power", "motion", "error", "beta", "locking", "measures")
+OVER_DRIVE = (
+    "torque",
+    "speed",
+    "friction-power",
+    "reactions",
+    "power",
+    "motion",
+    "error",
+    "beta",
+    "locking",
+    "measures",
+)
 LONGEST = 1.5  # steps: a place further from every position is not one of the cycle
 KIND_OF = {"°": KINDS["angle"], "mm": KINDS["length"], "s": KINDS["time"]}
 

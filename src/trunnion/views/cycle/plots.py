@@ -57,6 +57,7 @@ from trunnion.views.cycle.marked import OVER_DRIVE, mark, position_at
 from trunnion.views.cycle.measures_plot import drawn, measures
 from trunnion.views.cycle.seat_curves import beta, described
 from trunnion.views.cycle.seat_plot import seat
+from trunnion.views.cycle.speed import speed, varying
 from trunnion.views.space import figure as space_figure
 from trunnion.views.space import plots as space_plots
 from trunnion.views.space.bodies import is_spatial, without_noise
@@ -386,6 +387,7 @@ def _rates(
 
 PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
     "torque": torque,
+    "speed": speed,
     "friction-power": friction_power,
     "reactions": reactions,
     "polar": polar,
@@ -400,6 +402,7 @@ PLOTS: dict[str, Callable[[xr.Dataset, xr.Dataset | None], Figure]] = {
 }
 # whether a result has what a figure needs that not all results have
 READY: dict[str, Callable[[xr.Dataset], bool]] = {
+    "speed": lambda result: bool(varying(result)),
     "error": lambda result: has(result, "errors"),
     "seat": lambda result: has(result, "seats"),
     "beta": described,

@@ -16,6 +16,7 @@ from trunnion.views.common.cycle import abscissa, column, intervals, layout, nam
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.deviations import losses
 from trunnion.views.cycle.deviations_scene import built
+from trunnion.views.cycle.speed import varying
 from trunnion.views.space.bodies import is_spatial, without_noise
 from trunnion.views.space.scene import space_scene
 
@@ -27,6 +28,7 @@ __all__ = ["scene"]
 FORMAT = 1
 SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
         "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
+DRIVEN = ("efficiency_instant",)  # of a steady cycle it says nothing: the flywheel does the work at each position
 
 
 def scene(
@@ -43,7 +45,7 @@ def scene(
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     picked = _picked(count, max_positions) if picked is None else picked
-    over = abscissa(result)
+    over, steady = abscissa(result), "steady" in result.attrs
     kept = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
     stated = layout(result)
@@ -69,7 +71,7 @@ def scene(
         "springs": _springs(stated, points),
         "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
         "drivers": _drivers(kept, other, stated),
-        "sums": {name: series(column(kept, name)) for name in SUMS if name in kept},
+        "sums": {name: series(column(kept, name)) for name in SUMS if name in kept and not (steady and name in DRIVEN)},
         "efficiency": _single(result, "efficiency"),
         "built": built(kept, _lost(result, picked)),
     }  # fmt: skip
@@ -171,6 +173,7 @@ def _springs(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, A
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:
     """Drivers with effort (an interval where friction leaves it open), power, and effort without friction."""
     units = attribute(result, "driver_units")
+    speeds = {} if result.attrs.get("kind") == "motion" else varying(result)
     rows = []
     for index, name in enumerate(names(result, "driver")):
         values = {key: series(column(result, f"drive_{key}", driver=name))
@@ -178,5 +181,6 @@ def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any
         free = None if ideal is None else series(column(ideal, "drive_effort", driver=name))
         unit = units[index] if index < len(units) else "N m"
         kind = stated["joints"].get(name, {}).get("type", "revolute")
+        values["speed"] = series(speeds[name][0]) if name in speeds else []
         rows.append({"name": name, "unit": unit, "type": kind, "ideal": free, **values})
     return rows

@@ -32,7 +32,7 @@ export function charts(scene, kinds) {
   const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost)];
   const list = motion
     ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...reactions, ...losses, ...power]
-    : [...efforts, ...losses, ...reactions, ...power];
+    : [...efforts, ...drivers.flatMap((driver) => rateChart(scene, driver)), ...losses, ...reactions, ...power];
   if (sums.efficiency_instant) list.push(efficiencyChart(scene));
   return [...list, ...errorCharts(scene, kinds)];
 }
@@ -54,7 +54,7 @@ function lossChart(scene, kinds, lost) {
 function efficiencyChart(scene) {
   const values = full(scene.sums.efficiency_instant, scene.count).map((value) => (value === null ? null : 100 * value));
   const whole = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}. `;
-  const far = peak(values) > 100 ? "Values beyond ±100 %, near zero drive power, are not shown." : "";
+  const far = peak(values) > 100 ? "Values beyond ±100 % are not shown: the drive power is near zero there, or masses and springs give work." : "";
   return {
     title: "Efficiency at each position",
     unit: "%",
@@ -96,6 +96,13 @@ function effortChart(scene, driver) {
   const open = low.some((value, index) => value !== null && high[index] - value > 0.002 * usualPeak(scene, low, high));
   const band = open ? { low, high, kind: "k0", label: "range, friction at rest" } : null;
   return { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band };
+}
+
+/** The speed of a driver over the cycle, where it varies. */
+function rateChart({ count }, { name, unit, speed }) {
+  if (!speed.length) return [];
+  const series = [{ label: "speed", values: full(speed, count), kind: "k0" }];
+  return [{ title: `Speed ${name}`, unit: unit === "N" ? "m/s" : "rad/s", series }];
 }
 
 function reactionChart(scene, kinds) {

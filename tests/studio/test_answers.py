@@ -146,7 +146,7 @@ def test_a_four_bar_drawn_from_nothing_is_that_of_analyse():
     text, _ = edited(
         text, places,
         {"do": "set", "path": ["joint_defaults"], "value": {"pin": {"radius": "5 mm"}, "friction": 0.1}},
-        {"do": "load", "link": "link3", "at": "C", "force": ["-100 N", "0 N"]},
+        {"do": "load", "at": "C", "force": ["-100 N", "0 N"]},
     )  # fmt: skip
     shown = ask(ask="model", text=text)["scene"]["drivers"][0]["effort"]
     result = trunnion.analyse(Mechanism(**entries_of(text)[0]), 360)
@@ -301,7 +301,9 @@ def test_a_ground_without_joints_is_to_be_pinned():
 
 def test_a_step_says_what_a_value_was_set_to():
     text, path = EXAMPLES[FOURBAR], ["dimensions", "BC"]
-    for value, said in (("5 m", "Set dimensions.BC to 5 m"), (None, "Remove dimensions.BC")):
+    assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": "5 m"}])["says"] == "Set BC to 5 m"
+    path = ["links", "crank", "mass"]
+    for value, said in (("2 kg", "Set mass of link crank to 2 kg"), (None, "Remove mass of link crank")):
         assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
 
 

@@ -32,8 +32,10 @@ from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.message import packed
+from trunnion.studio.missing import missing
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
+from trunnion.studio.words import spoken
 from trunnion.version import __version__
 from trunnion.views.common.cycle import abscissa
 from trunnion.views.cycle.scene import scene
@@ -68,7 +70,7 @@ def answer(request: bytes) -> bytes:
 
 def _sentence(finding: Finding) -> str:
     return " ".join(
-        part for part in (finding.where, finding.what, f"— {finding.remedy}" if finding.remedy else "") if part
+        part for part in (spoken(finding.where), finding.what, f"— {finding.remedy}" if finding.remedy else "") if part
     )
 
 
@@ -122,13 +124,15 @@ def _model(asked: Asked) -> dict[str, Any]:
             found = state.placed(tuple(findings_of(result))) or found
         except MechanismError as error:
             found += state.placed(error.findings)
-    numbers = _plain(state.mechanism.parameters()) if state.mechanism else {}
+    drawn = Sketch(copy.deepcopy(dict(state.entries or {})))
+    lacks = missing(drawn, found) if result is None else []
     head = {
         "findings": [_row(one) for one in found],
+        "missing": lacks,
         "entries": state.entries,
-        "numbers": numbers,
+        "numbers": _numbers(state, drawn),
         "solved": result is not None,
-        "ready": readiness(state.mechanism, result, found),
+        "ready": readiness(state.mechanism, result, found, lacks),
         "scene": None,
     }
     if result is None:
@@ -150,7 +154,17 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 def _row(one: Finding) -> dict[str, Any]:
     keys = ("code", "what", "where", "remedy", "line")
-    return {"severity": one.severity.value} | {key: getattr(one, key) for key in keys}
+    return {"severity": one.severity.value, "place": spoken(one.where)} | {key: getattr(one, key) for key in keys}
+
+
+def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
+    """Every number in SI, by path; of what is half drawn those that can be read."""
+    if state.mechanism:
+        return _plain(state.mechanism.parameters())
+    try:
+        return _plain(drawn.numbers)
+    except MechanismError:
+        return {}
 
 
 def _plain(numbers: Mapping[str, Any]) -> dict[str, float]:
@@ -175,6 +189,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
     sketch = _shown(state, steps, index)
+    sketch.locked = set(map(str, asked.get("locked") or ()))
     point = str(asked["point"])
     changes = sketch.moved(point, to)
     back = _walked(state, {change.path: change.value for change in changes}, steps)
@@ -251,14 +266,20 @@ def _edit(asked: Asked) -> dict[str, Any]:
         else {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     )
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
-    sketch = Sketch(entries, places)
+    sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())))
     says = [done(sketch, given) for given in asked["gestures"]]
-    empty = ("drivers", "loads", "springs", "assembly", "dimensions", "joints")
+    empty = ("drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
     known = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
     kept = {key: place for key, place in sketch.places.items() if key in known}
-    return {"text": changed, "places": {key: list(place) for key, place in kept.items()}, "says": ", ".join(says)}
+    return {
+        "text": changed,
+        "places": {key: list(place) for key, place in kept.items()},
+        "locked": sorted(sketch.locked & (known | set(sketch.joints))),
+        "says": ", ".join(says),
+        "made": sketch.made,
+    }
 
 
 def _assemblies(asked: Asked) -> dict[str, Any]:

@@ -71,19 +71,19 @@ function solveSoon() {
   typing = setTimeout(solve, TYPING);
 }
 
-/** Text and places of the mechanism as it is shown: what a gesture starts from. */
+/** Text, places and locks of the mechanism as it is shown: what a gesture starts from. */
 export function present() {
   const { scene } = state.answer.value ?? {};
   const fresh = state.solved.value && state.answer.value.text === state.text.value && !state.spatial.value;
   const places = fresh ? { ...state.places.value, ...placesAt(scene, posedAt(scene, state.index.value)) } : state.places.value;
-  return { text: state.text.value, places };
+  return { text: state.text.value, places, locked: state.locked.value };
 }
 
 let queue = Promise.resolve();
 
 /**
  * Carry out gestures as one step to undo; one after the other, for each starts from what the one before left.
- * Steps in a row with the same `merge` are undone as one.
+ * Steps in a row with the same `merge` are undone as one. Whether it could be done.
  */
 export function edit(gestures, merge = null) {
   queue = queue.then(() => carryOut(gestures, merge)).catch((problem) => refuse(String(problem.message ?? problem)));
@@ -96,10 +96,11 @@ async function carryOut(gestures, merge) {
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
-  if (done.select) state.selection.value = { kind: done.select[0], name: done.select[1] };
+  if (done.made) state.selection.value = { kind: done.made[0], name: done.made[1] };
   state.say(sentence(done.says));
   if (state.live.value) state.live.value = { ...state.live.value, text: null };
   await solve();
+  return true;
 }
 
 function sentence(words, end = ".") {
@@ -108,7 +109,8 @@ function sentence(words, end = ".") {
 
 function refuse(words) {
   state.live.value = null;
-  state.say(words, true);
+  state.say(/[.!?]$/.test(words) ? words : `${words}.`, true);
+  return false;
 }
 
 /** Write one value of the file. */
@@ -118,7 +120,7 @@ export function setValue(path, value, merge = null) {
 
 /** Where the mechanism would be with a point at another place. */
 export function drag(fields) {
-  return link.ask("drag", { text: state.text.value, steps: STEPS, ...fields });
+  return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, ...fields });
 }
 
 /** The other assemblies of the present text. */
@@ -130,7 +132,7 @@ export async function assemblies() {
 /** Take typed text; words typed in one go are one step. */
 export function typed(content) {
   const before = present();
-  state.commit("Edit text", before, { text: content, places: before.places }, "typing");
+  state.commit("Edit text", before, { ...before, text: content }, "typing");
   solveSoon();
 }
 

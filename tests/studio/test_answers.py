@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
+from studio.asking import ask, edited
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
@@ -19,19 +19,6 @@ from trunnion.studio.message import packed, unpacked
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 FOURBAR = "durango-fourbar"
-
-
-def ask(**question):
-    return unpacked(answer(json.dumps(question | {"revision": 1}).encode()))
-
-
-def edited(text, places, *gestures):
-    """Text and places after some gestures, one question each."""
-    for gesture in gestures:
-        found = ask(ask="edit", text=text, places=places, gestures=[gesture])
-        assert "error" not in found, found
-        text, places = found["text"], found["places"]
-    return text, places
 
 
 def drawn_four_bar():

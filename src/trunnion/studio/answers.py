@@ -28,6 +28,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
+from trunnion.studio.ends import held
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
@@ -47,6 +48,7 @@ Array = NDArray[np.float64]
 
 STEPS = 360
 MOST_STEPS = 3600
+KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 MARGIN_KNOWN = 10.0  # a larger one is told as this
 
 
@@ -200,7 +202,18 @@ def _drag(asked: Asked) -> dict[str, Any]:
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
+    if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
+        near = index
     return columns | {"solved": True, "index": near, "changes": _told(sketch, changes)}
+
+
+def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
+    """Whether locked joints and points are where they were, to the fineness of the positions."""
+    keys = [".".join(held(sketch, name)) for name in sketch.locked if name in sketch.joints or name in points]
+    gone = (
+        np.hypot(*(points[key][axis][index] - sketch.places[key][i] for i, axis in enumerate("xy"))) for key in keys
+    )
+    return all(far <= KEPT * sketch.size for far in gone)
 
 
 def _shown(state: Loaded, steps: int, index: int) -> Sketch:

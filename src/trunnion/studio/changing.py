@@ -106,6 +106,7 @@ def delete(sketch: Sketch, given: Given) -> str:
         raise refused("is not there", f"{section}.{name}", "choose what is drawn")
     if section == "links" and name == sketch.ground:
         raise refused("is the ground", name, "delete its joints")
+    blocks = [one for one in sketch.of("links") if one != sketch.ground and _block(sketch, one)]
     del sketch.section(section)[name]
     gone = [name] if section == "joints" else []
     if section == "links":
@@ -115,16 +116,11 @@ def delete(sketch: Sketch, given: Given) -> str:
         _drop(sketch, "springs", lambda spring: any(end.startswith(f"{name}.") for end in spring.get("between") or ()))
     for joint in gone:
         _without_joint(sketch, joint)
-    _drop_blocks(sketch)
-    return f"Delete {SECTIONS[section]} {name}"
-
-
-def _drop_blocks(sketch: Sketch) -> None:
-    """Blocks that slide no longer, or that nothing is pinned to, go."""
-    for block in [name for name in sketch.of("links") if name != sketch.ground and _block(sketch, name)]:
-        on = {name: one for name, one in sketch.joints.items() if block in one["links"]}
-        if len({one.get("type", "revolute") for one in on.values()}) < 2:
+    for block in blocks:
+        types = {one.get("type", "revolute") for one in sketch.joints.values() if block in one["links"]}
+        if len(types) < 2 and block in sketch.of("links"):  # slides no longer, or nothing is pinned to it
             delete(sketch, {"what": ["links", block]})
+    return f"Delete {SECTIONS[section]} {name}"
 
 
 def _block(sketch: Sketch, link: str) -> bool:

@@ -27,7 +27,9 @@ def readiness(
     lacks: what is not drawn yet.
     """
     rows = zip(
-        ("motion", "forces", "friction", "play", "tolerance", "time"), _said(mechanism, result, findings, lacks), strict=True
+        ("motion", "forces", "friction", "play", "tolerance", "time"),
+        _said(mechanism, result, findings, lacks),
+        strict=True,
     )
     return [{"what": what, "ok": ok, "why": why} for what, (ok, why) in rows]
 

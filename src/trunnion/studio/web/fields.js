@@ -6,11 +6,12 @@ import { dictionary } from "./geometry.js";
 const USUAL = {
   links: [["mass", "2 kg"], ["inertia", "0.01 kg m^2"], ["centre", ["50 mm", "0"]]],
   joints: [["friction.coefficient", "0.1"], ["pin.radius", "5 mm"], ["pin.clearance", "0.02 mm"]],
+  slides: [["friction.coefficient", "0.1"], ["guide.length", "40 mm"], ["guide.clearance", "0.02 mm"]],
   drivers: [["speed", "60 rpm"], ["range", ["0 deg", "90 deg"]], ["start", "0 deg"]],
   loads: [["force", ["0 N", "-100 N"]], ["moment", "1 N m"]],
   springs: [["stiffness", "1 N/mm"], ["free_length", "50 mm"], ["preload", "0 N"]],
   gears: [["ratio", "-1/2"], ["phase", "0 deg"]],
-  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"]],
+  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"], ["joint_defaults.guide.length", "40 mm"]],
 }; // prettier-ignore
 
 const FIXED = new Set(["type", "links", "link", "at", "between", "joint", "joints"]); // drawn, not typed
@@ -25,7 +26,7 @@ export function rowsOf(entries, kind, name) {
   const from = kind === "model" ? [] : [kind, name];
   const there = leaves(part, from).map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const missing = (USUAL[kind] ?? [])
+  const missing = (USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [])
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false }))
     .filter(({ path }) => !known(path));
   return [...there, ...missing].map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)) }));
@@ -104,5 +105,5 @@ export function findingsOf(findings, path) {
 /** The part that a finding is about, {kind, name}, or null. */
 export function partOf({ where }, entries) {
   const [kind, name] = String(where ?? "").split(".");
-  return kind in USUAL && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
+  return kind in USUAL && kind !== "slides" && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
 }

@@ -29,9 +29,7 @@ export function snap(spots, at, { near, step }) {
     const far = Math.hypot(one.at[0] - at[0], one.at[1] - at[1]);
     if (far < least) [best, least] = [one, far];
   }
-  if (best) return { ...best, end: best.name };
-  const free = at.map((value) => onGrid(value, step));
-  return { kind: null, at: free, end: free };
+  return best ?? { kind: null, at: at.map((value) => onGrid(value, step)) };
 }
 
 /** The place on a line through two of some spots that is nearest to a place within their reach; the place itself beyond `near`. */
@@ -189,9 +187,9 @@ export function extentOf(scene) {
 
 const UNITS = { "": null, mm: 1e-3, cm: 1e-2, dm: 0.1, m: 1, km: 1e3, in: 0.0254, ft: 0.3048, um: 1e-6, µm: 1e-6 };
 
-/** A typed length in m ("60", "60 mm", "2.5in"); a bare number is in `unit`. Null if it is none. */
+/** A typed length in m ("60", "60 mm", "2.5in"); a bare number is in `unit`. Null if it is none, or may be a thousand. */
 export function lengthOf(typed, unit) {
-  const found = /^\s*(\d*[.,]?\d+|\d+[.,])\s*([a-zµ]*)\s*$/i.exec(typed);
+  const found = /^\s*(?!\d+,\d{3}(?!\d))(\d*[.,]?\d+|\d+[.,])\s*([a-zµ]*)\s*$/i.exec(typed);
   if (!found || !(found[2] in UNITS)) return null;
   const value = Number(found[1].replace(",", ".")) * (UNITS[found[2]] ?? UNITS[unit]);
   return value > 0 ? value : null;

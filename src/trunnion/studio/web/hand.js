@@ -67,14 +67,17 @@ function pull(view, held, at) {
   if (!held.moved) takeHold(view, held);
   held.moved = true;
   if (held.joint) dragTo(held.joint, view.frame.from(at), gridStep(view.frame.scale) / 10);
-  else if (held.panning || state.tool.value === "select") sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
+  else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
 
 function takeHold(view, held) {
   const { kind, name, key } = held.part ?? {};
   if (held.panning || state.tool.value !== "select" || (kind !== "joints" && kind !== "points")) return;
-  if (state.locked.value.includes(name)) return state.say(`${name} is locked where it is; unlock it first (K).`, true);
+  if (state.locked.value.includes(name)) {
+    held.locked = true;
+    return state.say(`${name} is locked where it is; unlock it first (K).`, true);
+  }
   const base = present();
   const { sketched } = shown.peek();
   held.joint = { name, key, index: view.posed, asked: false, wanted: null, sketched, base, together: sketched ? together(kind, name, base.places) : [] };

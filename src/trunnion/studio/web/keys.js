@@ -87,7 +87,8 @@ function arrow({ target, key, shiftKey, altKey }) {
   if (held) sheet.view.root.focus(); // the cross leaves the joint, and Enter is for where it is
   const from = held?.at ?? pointer.value?.spot.at ?? sheet.view.frame.from([sheet.view.frame.width / 2, sheet.view.frame.height / 2]);
   const cross = altKey ? moved(from) : moved(sheet.snap(from).at);
-  pointer.value = { spot: sheet.snapOn(cross, altKey, linkUnder(cross)), keyboard: true, ...sheet.scale() };
+  const near = 0.45 * step; // nearer than a step, or the cross could not leave a joint
+  pointer.value = { spot: sheet.snapOn(cross, altKey, linkUnder(cross), near), keyboard: true, ...sheet.scale() };
   const { at, name, on } = pointer.value.spot;
   state.say(name || on ? `At ${name ?? on}.` : `At ${at.map((value) => `${Number((1000 * value).toPrecision(6))} mm`).join(", ")}.`);
   return true;
@@ -107,12 +108,18 @@ function enter({ target, shiftKey: shift }) {
     requestAnimationFrame(() => document.querySelector(".properties input")?.focus());
     return true;
   }
-  const spot = part ? sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name) : pointer.value && sheet.snap(pointer.value.spot.at, true);
+  const spot = part ? sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name) : crossed();
   if (!spot) return true;
   const under = partsAt(spot.at);
   const link = under.find(({ kind }) => kind === "links");
-  click(spot.kind || !toolOf().on ? spot : sheet.snapOn(spot.at, true, link), { shift, part: link ?? under[0] ?? null });
+  click(spot, { shift, part: link ?? under[0] ?? null });
   return true;
+}
+
+/** What the cross is at by now. */
+function crossed() {
+  const { at } = pointer.value?.spot ?? {};
+  return at && sheet.snapOn(at, true, linkUnder(at), 0.45 * sheet.step());
 }
 
 /** What lies at a place of the sheet, the uppermost first. */

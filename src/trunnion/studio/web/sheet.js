@@ -59,14 +59,14 @@ export const sheet = {
   /** Width of the window and reach of a click, m. */
   scale: () => ({ wide: sheet.view.frame.width / sheet.view.frame.scale, near: nearOf(sheet.view.frame.scale) }),
   spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.posed) : []),
-  /** What lies at a place: a joint, a point, or the grid; `loose` leaves the grid out. */
-  snap(at, loose = false) {
+  /** What lies at a place: a joint or a point no farther than `near` m, or the grid; `loose` leaves the grid out. */
+  snap(at, loose = false, near = nearOf(sheet.view.frame.scale)) {
     const step = sheet.step() / (loose || !state.snapping.value ? 100 : 1);
-    return snap(sheet.spots(), at, { near: nearOf(sheet.view.frame.scale), step });
+    return snap(sheet.spots(), at, { near, step });
   },
   /** The same with the link `part` under it, {…, on: link}, where the tool takes links and no joint or point is near. */
-  snapOn(at, loose, part) {
-    const spot = sheet.snap(at, loose);
+  snapOn(at, loose, part, near) {
+    const spot = sheet.snap(at, loose, near);
     if (spot.kind || part?.kind !== "links") return spot;
     const { scene, posed, frame } = sheet.view;
     const points = scene.links.find(({ name }) => name === part.name)?.points ?? [];

@@ -23,7 +23,7 @@ export const index = signal(0);
 /** {kind, name}, kind being links, joints, points, loads, springs or drivers; or null. */
 export const selection = signal(null);
 export const tool = signal("select");
-/** First end of what is being drawn: {at, end, …}, or null. */
+/** First end of what is being drawn: {at, written, …}, or null. */
 export const pending = signal(null);
 /** Joints, and free points "link.P", that stay where they are while others are dragged. */
 export const locked = signal([]);

@@ -50,8 +50,8 @@ export function click(spot, { shift = false, part = null } = {}) {
 }
 
 /** An end as a gesture says it: a joint, a point, a place on a link, on the ground, or anywhere. */
-function endOf({ kind, end, on, at }, shift = false) {
-  if (kind) return end;
+function endOf({ kind, name, on, at }, shift = false) {
+  if (kind) return name;
   return shift ? { ground: at } : on ? { on, at } : at;
 }
 
@@ -107,7 +107,7 @@ function placeLength(shift, aim) {
 
 /** Typed letters as the file writes them: with a decimal point, and a unit. */
 function withUnit(letters, unit) {
-  const { value, rest } = numberOf(plainNumber(letters)) ?? {};
+  const { value, rest } = numberOf(letters.replace(",", "."));
   return `${value} ${rest || unit}`;
 }
 

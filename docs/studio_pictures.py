@@ -5,36 +5,82 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZE = {"width": 1280, "height": 720}
 
 
 def main() -> None:
-    """Write both pictures."""
-    command = [sys.executable, "-m", "trunnion", "studio", "examples/durango-fourbar.yaml", "--no-open", "--port", "0"]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process, sync_playwright() as begun:
-        assert process.stdout is not None
-        address = process.stdout.readline().split()[-1]
-        browser = begun.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        try:
-            for scheme in ("light", "dark"):
-                page = browser.new_page(viewport=SIZE, color_scheme=scheme)
+    """Write all pictures, those of the press with layers and a variant last."""
+    four_bar = {"light": _at_rest, "dark": _compared}
+    press = {"layers": _layers, "variants": _variants}
+    for model, shots in (("durango-fourbar", four_bar), ("drawing-press", press)):
+        with _studio(model) as address, sync_playwright() as begun:
+            browser = begun.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+            for name, prepare in shots.items():
+                page = browser.new_page(viewport=SIZE, color_scheme="dark" if name == "dark" else "light")
                 page.goto(address)
                 page.wait_for_selector(".handle")
                 page.wait_for_timeout(1500)
-                page.evaluate("import('/studio/motion.js').then(motion => motion.crank.go(48))")
-                if scheme == "dark":
-                    page.locator(".choice select").first.select_option("compare")
-                    page.click("role=tab[name=Plots]")
+                prepare(page)
                 page.wait_for_timeout(1500)
-                page.screenshot(path=ROOT / "docs" / "images" / f"studio-{scheme}.png")
-        finally:
+                page.screenshot(path=ROOT / "docs" / "images" / f"studio-{name}.png")
             browser.close()
+
+
+@contextmanager
+def _studio(model: str) -> Iterator[str]:
+    """The address of a studio on an example."""
+    command = [sys.executable, "-m", "trunnion", "studio", f"examples/{model}.yaml", "--no-open", "--port", "0"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().split()[-1]
+        finally:
             process.terminate()
+
+
+def _go(page: Page, index: int) -> None:
+    page.evaluate(f"import('/studio/motion.js').then(motion => motion.crank.go({index}))")
+
+
+def _at_rest(page: Page) -> None:
+    _go(page, 48)
+
+
+def _compared(page: Page) -> None:
+    _go(page, 48)
+    page.locator(".choice select").first.select_option("compare")
+    page.click("role=tab[name=Plots]")
+
+
+def _layers(page: Page) -> None:
+    _go(page, 130)
+    page.click("summary:has-text('Show')")
+    for name in (
+        "Values of the reactions",
+        "Instant centres against the ground",
+        "Friction circles",
+        "Transmission angles",
+    ):
+        page.get_by_label(name, exact=True).click()
+    page.keyboard.press("Escape")
+    page.click("role=tab[name=Plots]")
+    page.get_by_role("button", name="Table of Drive force Z").click()
+
+
+def _variants(page: Page) -> None:
+    _go(page, 60)
+    page.click("role=tab[name=Plots]")
+    page.click("button:has-text('Keep as variant A')")
+    for path, value in ((["joint_defaults", "friction"], "0.15"), (["dimensions", "L"], "210 mm")):
+        page.evaluate("given => import('/studio/actions.js').then(a => a.setValue(...given))", [path, value])
+        page.wait_for_timeout(2000)
 
 
 if __name__ == "__main__":

@@ -18,16 +18,24 @@ HEIGHTS = {
     "drive": "(0.035 m * cos(drive) + sqrt((0.12 m)^2 - (0.035 m * sin(drive))^2))",
     "slide": "S.slide",
     "point": "piston.Q.x",
+    "named slide": "way",
+    "named point": "height",
     "distance": "hypot(rod.Q.x - frame.O.x, rod.Q.y - frame.O.y)",
 }
+NAMED = {
+    "measures": {
+        "way": {"slide": "S"}, "height": {"point": "piston.Q", "axis": "x"},
+        "pace": {"rate": "S"}, "rise": {"velocity": "piston.Q", "axis": "x"},
+    }
+}  # fmt: skip
 PRESS = "-30 N - 4000 N/m * ({0} - 0.11 m) - 500 N/m * abs({0} - 0.13 m) - 100 N * between({0}, 0.1 m, 0.12 m)"
 
 
 def pressed(force: str, **more: Any) -> Mechanism:
-    return slider_crank(0.1, loads={"work": {"link": "piston", "at": "Q", "force": [force, 0]}}, **more)
+    return slider_crank(0.1, loads={"work": {"link": "piston", "at": "Q", "force": [force, 0]}}, **NAMED, **more)
 
 
-@pytest.mark.parametrize("name", ["slide", "point", "distance"])
+@pytest.mark.parametrize("name", ["slide", "point", "distance", "named slide", "named point"])
 def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
     """It equals the same force stated over the crank angle, at every position and in the means."""
     one, other = (analyse(pressed(PRESS.format(HEIGHTS[key])), 90) for key in (name, "drive"))
@@ -41,12 +49,12 @@ def test_a_press_force_over_the_height_of_the_ram(name: str) -> None:
 
 def test_it_is_the_same_in_time() -> None:
     """Tabulated, with the places found at which the force jumps or bends."""
-    one, other = (simulate(pressed(PRESS.format(HEIGHTS[key])), 0.1, 5) for key in ("slide", "drive"))
+    one, other = (simulate(pressed(PRESS.format(HEIGHTS[key])), 0.1, 5) for key in ("named slide", "drive"))
     assert one["drive_rate"].values == pytest.approx(other["drive_rate"].values, rel=1e-9)
     assert np.abs(one["energy_residual"]).max() < 1e-8 * np.abs(one["work_drive"]).max()
 
 
-@pytest.mark.parametrize("name", ["S.slide_velocity", "piston.Q.velocity_x"])
+@pytest.mark.parametrize("name", ["S.slide_velocity", "piston.Q.velocity_x", "pace", "rise"])
 def test_a_force_by_a_speed_is_that_of_a_damper(name: str) -> None:
     damped = slider_crank(0.1, loads={}, springs={"oil": {"joint": "S", "damping": 50}})
     own = pressed(f"-50 N s/m * {name}")
@@ -105,3 +113,18 @@ def test_a_dimension_cannot_speak_of_the_motion() -> None:
     with pytest.raises(MechanismError) as caught:
         slider_crank(0.1, dimensions={"a": "2 * S.slide"})
     assert caught.value.findings[0].where == "dimensions.a"
+
+
+@pytest.mark.parametrize("measure", [{"effort": "O"}, {"slide": "S", "as": "maximum"}, {"angle": "rod"}])
+def test_a_measure_that_is_no_motion_at_every_position_is_told_what_to_name(measure: dict[str, str]) -> None:
+    data = slider_crank().model_dump(exclude_unset=True)
+    data["measures"] = {"way": measure}
+    data["loads"] = {"work": {"link": "crank", "moment": "-3 N m * way/(1 m)"}}
+    with pytest.raises(MechanismError, match=r"the measure 'way', which is no coordinate or speed .* — .*O\.rotation"):
+        Mechanism(**data)
+
+
+def test_a_dimension_goes_before_a_measure_of_its_name() -> None:
+    one = pressed("-30 N - 1000 N/m * way", dimensions={"way": "5 mm"})
+    other = pressed("-35 N")
+    assert analyse(one, 12)["drive_effort"].values == pytest.approx(analyse(other, 12)["drive_effort"].values)

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import trunnion
 from timed import LINEAR, slider_crank, wheel
 from trunnion.dynamics import batch, lanes
-from trunnion.dynamics.batch import figures_in_time, together
+from trunnion.dynamics.batch import figures_in_time, one_by_one
 from trunnion.dynamics.compiled_lanes import CompiledLanes, compiled_lanes
 from trunnion.dynamics.course import FIGURES, Courses
 from trunnion.dynamics.lanes import LaneState, picked_drive
@@ -38,7 +39,7 @@ def courses_of(run: Run, values: dict[str, Any], count: int, duration: float, to
     """The courses of one batch and its lanes' statuses."""
     motion = FreeMotion.of(run)
     nominal = tabulates(motion, places(motion))
-    assert nominal is not None
+    assert not isinstance(nominal, str)
     with np.errstate(all="ignore"):
         (tables,) = sampled_tables(nominal, values, count)
         drive, begin = batch._drive(motion, values), batch._begin(motion, values, count)
@@ -102,7 +103,7 @@ def test_machine_code_and_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     run, count = prepare(slider_crank(drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS["geared"]}})), 37
     values, motion = spread(run.system.mechanism, count, links__crank__inertia=0.1), FreeMotion.of(run)
     nominal, own = tabulates(motion, places(motion)), batch._drive(motion, values)
-    assert nominal is not None
+    assert not isinstance(nominal, str)
     assert own is not None
     (tables,) = sampled_tables(nominal, values, count)
     draw, rows, no = np.random.default_rng(1), tables.samples, np.zeros(count, bool)
@@ -159,7 +160,7 @@ def test_together_as_each_by_itself(name: str) -> None:
     """Every kind of motor on a slider-crank with friction and a load that resists."""
     mechanism = slider_crank(0.05, drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS[name]}})
     run = prepare(mechanism)
-    assert together(run)
+    assert not one_by_one(run)
     varied = {"links__crank__points__P__x": 0.01, "links__piston__mass": 0.05, "links__crank__inertia": 0.05}
     values = spread(mechanism, 2, **varied, joints__P__friction__coefficient=0.1)
     found = figures_in_time(run, "O", values, 2, 0.5, 1e-10)
@@ -240,7 +241,7 @@ def test_near_locking_tables_are_walks() -> None:
     """Much friction: the bound by the spectral radius shows one solution where the sum of a row does not."""
     motion = FreeMotion.of(prepare(slider_crank(0.8)))
     tables = tabulates(motion, places(motion))
-    assert tables is not None
+    assert not isinstance(tables, str)
     asked: list[Moment] = []
 
     def oracle(at: Moment) -> Rates:
@@ -259,9 +260,52 @@ def test_near_locking_tables_are_walks() -> None:
     assert len(asked) < count // 4
 
 
-def test_bristles_are_not_tabulated() -> None:
-    bristles = {"law": "dahl", "coefficient": 0.1, "stiffness": 1e5}
-    assert not together(prepare(slider_crank(bristles)))
+BRISTLES = {"law": "dahl", "coefficient": 0.1, "stiffness": 1e5}
+TIMED = {"work": {"link": "piston", "at": "Q", "force": ["-30 N * between(time, 0 s, 1 s)", 0]}}
+CLUTCH = {
+    "O": {
+        "speed": 100,
+        "motor": {"kind": "linear", "stall_effort": 9, "no_load_speed": 150, "inertia": 0.01, "clutch": 6},
+    }
+}
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "why"),
+    [
+        (slider_crank(BRISTLES), "friction has a memory"),
+        (slider_crank(loads=TIMED), "loads.work.force.x depends on time or speed"),
+        (slider_crank(drivers=CLUTCH), "a clutch slips"),
+    ],
+)
+def test_why_motions_are_followed_one_by_one(mechanism: Mechanism, why: str) -> None:
+    assert why in one_by_one(prepare(mechanism))
+
+
+def test_studies_tell_why_motions_are_followed_one_by_one() -> None:
+    """`tolerance` and `sweep` have the note where it is so, and none where motions are integrated together."""
+    for loads in ({}, TIMED):
+        mechanism = slider_crank(
+            loads=loads, drivers={"O": {"speed": 100, "motor": MOTORS["linear"]}},
+            tolerances={"links.crank.inertia": 1e-4}, measures={"peak": {"peak_effort": "O", "duration": 0.01}},
+        )  # fmt: skip
+        toleranced = trunnion.tolerance(mechanism, methods=("linear",), jobs=1)
+        swept = trunnion.sweep(mechanism, {"links.crank.inertia": [0.02, 0.03]}, 12, measures=["peak"])
+        for result in (toleranced, swept):
+            notes = [one for one in result.trunnion.findings if one.code == "motions.one_by_one"]
+            assert len(notes) == bool(loads)
+            assert all("loads.work.force.x depends on time or speed" in one.what for one in notes)
+            assert all(one.where == "measures.peak" for one in notes)
+
+
+def test_a_table_of_a_motor_that_varies_is_followed_one_by_one() -> None:
+    points = [[0, 9], [150, 0]]
+    motor = {"kind": "table", "over": "speed", "points": points}
+    mechanism = slider_crank(drivers={"O": {"speed": 100, "motor": motor}})
+    run = prepare(mechanism)
+    path = next(path for path in run.values if ".motor.points." in path)
+    assert not one_by_one(run)
+    assert path in one_by_one(run, ["links.crank.inertia", path])
 
 
 def test_the_end_of_a_range_ends_a_motion() -> None:

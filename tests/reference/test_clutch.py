@@ -199,11 +199,3 @@ def test_motions_with_a_clutch_are_taken_one_by_one() -> None:
     values = {**run.values, "drivers.A.motor.clutch": np.array([[5.0], [100.0]])}
     peaks = figures_in_time(run, "A", values, 2, 0.2)["peak_effort"]
     assert peaks == pytest.approx([5.0, 0.6 + WHEEL * (9 - 0.6) / (WHEEL + ROTOR)], rel=1e-9)
-
-
-def test_a_measure_in_a_load_is_told_what_to_name() -> None:
-    data = slider_crank().model_dump(exclude_unset=True)
-    data["measures"] = {"way": {"slide": "S"}}
-    data["loads"] = {"work": {"link": "crank", "moment": "-3 N m * way/(1 m)"}}
-    with pytest.raises(MechanismError, match=r"the measure 'way', which is not known to loads — .*O\.rotation"):
-        Mechanism(**data)

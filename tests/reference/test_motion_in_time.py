@@ -199,6 +199,36 @@ def test_a_mass_on_a_belt_sticks_and_slips() -> None:
     assert np.abs(result["energy_residual"].values).max() < 1e-8 * float(result["work_drive"].values.max())
 
 
+@pytest.mark.parametrize("clutch", [False, True])
+def test_a_feed_works_on_the_spring_of_a_carriage_at_rest(clutch: bool) -> None:
+    """At rest the nut stretches the screw, F₀ + k v t, from 20 N on: its work is ∫ F v dt, all of it in the spring.
+
+    The same beside a motor behind an open clutch, whose rotor turns meanwhile.
+    """
+    feed = read(EXAMPLES / "stick-slip-drive.yaml")
+    if clutch:
+        data = feed.data()
+        del data["drivers"]["S"]["free"]
+        data["drivers"]["S"]["motor"] = {"kind": "constant", "effort": 1, "inertia": 1, "clutch": 5, "clutch_from": 9}
+        feed = Mechanism(**data)
+    result = simulate(feed, 0.19, 19)
+    way = 5e-3 * result["time"].values
+    assert np.all(result["resting"] == 1)
+    assert result["work_drive"].values == pytest.approx(20.0 * way + 0.5 * 40e3 * way**2, rel=1e-9, abs=1e-12)
+    assert result["work_springs"].values == pytest.approx(-result["work_drive"].values, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_the_feed_does_all_the_work_of_stick_and_slip() -> None:
+    """∫ F v dt of the nut by its force at the rows; friction takes what the spring does not hold."""
+    result = simulate(read(EXAMPLES / "stick-slip-drive.yaml"), 0.8, 2000)
+    power = (result["drive_effort"] * result["drive_rate"]).sel(driver="E").values
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(result["time"].values))])
+    assert result["work_drive"].values == pytest.approx(work, abs=1e-7)
+    stored = (0.5 * 40e3) * ((power / 5e-3 / 40e3) ** 2 - (20.0 / 40e3) ** 2)
+    assert result["work_springs"].values == pytest.approx(-stored, abs=1e-9)
+
+
 @pytest.mark.slow
 def test_a_pulled_mass_with_bristles() -> None:
     """Canudas de Wit's experiment, the end of the spring moved by a prescribed driver: place after several slips."""

@@ -173,7 +173,8 @@ def test_a_half_drawn_linkage_is_no_error():
     ]
     text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [1, 0]})
     assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
-    assert ask(ask="model", text=text.replace("1 m,", "1 banana,").replace(" mm", " banana"))["missing"] == []  # that is wrong
+    wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
+    assert ask(ask="model", text=wrong)["missing"] == []
 
 
 def test_what_slides_goes_with_its_joint():

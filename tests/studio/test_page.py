@@ -5,144 +5,22 @@ Every test fails on an error of the page, on one in its console, and on a reques
 
 from __future__ import annotations
 
-import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import sync_playwright
 
 import trunnion
-from served import served
+from browsing import CHROMIUM
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-QUIET = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-HERE = re.compile(r"(http|ws)://127\.0\.0\.1:|data:|blob:")
 PEAK = 1e-6  # of the peak: how near a torque must be
 
 
-@pytest.fixture(scope="module")
-def studio(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("models")
-    (folder / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], encoding="utf-8")
-    with served(folder, "four-bar.yaml") as own:
-        yield own
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-        yield launched
-        launched.close()
-
-
-class User:
-    """Somebody in front of a page; state(name): a signal of the page."""
-
-    def __init__(self, page, studio):
-        self.page, self.studio, self.wrong = page, studio, []
-        page.on("pageerror", lambda error: self.wrong.append(f"page: {error}"))
-        page.on(
-            "console", lambda line: line.type in ("error", "warning") and self.wrong.append(f"console: {line.text}")
-        )
-        page.on("request", lambda asked: HERE.match(asked.url) or self.wrong.append(f"request: {asked.url}"))
-
-    def open(self):
-        self.page.goto(self.studio.address)
-        self.page.wait_for_selector(".sheet svg")
-        self.until("s.about.value.version && s.answer.value")
-
-    def state(self, words):
-        return self.page.evaluate(f'import("/studio/state.js").then(s => {words})')
-
-    def idle(self):
-        self.page.wait_for_timeout(80)
-        idle = 'import("/studio/state.js").then(s => s.connected.value && s.busy.value === 0)'
-        for _ in range(200):
-            if self.page.evaluate(idle):
-                break
-            self.page.wait_for_timeout(50)
-        else:
-            pytest.fail("the page is never idle")
-        self.page.wait_for_timeout(40)
-
-    def until(self, words):
-        for _ in range(400):
-            if self.state(f"Boolean({words})"):
-                return self.idle()
-            self.page.wait_for_timeout(25)
-        return pytest.fail(f"never: {words}")
-
-    def keys(self, *keys):
-        for key in keys:
-            self.page.keyboard.press(key)
-        self.idle()
-
-    def new_sheet(self):
-        self.page.click("summary:has-text('File')")
-        self.page.click("button:has-text('New sheet')")
-        self.idle()
-        self.box = self.page.locator(".sheet").bounding_box()
-        self.page.locator(".sheet > svg").focus()
-
-    def click(self, x, y, shift=False):
-        """Click at a place of the sheet, px."""
-        x, y = self.box["x"] + x, self.box["y"] + y
-        self.page.mouse.move(x - 3, y - 2)
-        self.page.mouse.move(x, y)
-        if shift:
-            self.page.keyboard.down("Shift")
-        self.page.mouse.click(x, y)
-        if shift:
-            self.page.keyboard.up("Shift")
-        self.page.wait_for_timeout(40)
-
-    def handle(self, name):
-        box = self.page.locator(f'.handle[data-name="{name}"]').bounding_box()
-        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-    def draw_four_bar(self):
-        """By mouse: three links, the crank driven."""
-        for one, other, *grounded in (
-            ((200, 350), (250, 270), True, False),
-            ((250, 270), (520, 180), False, False),
-            ((520, 180), (480, 350), False, True),
-        ):
-            self.keys("l")
-            self.click(*one, shift=grounded[0])
-            steps = self.state("s.past.value.length")
-            self.click(*other, shift=grounded[1])
-            self.until(f"s.past.value.length > {steps}")  # else what follows may come before the link is there
-            self.keys("Escape")
-        self.keys("d")
-        self.click(200, 350)
-        self.idle()
-        self.keys("v")
-
-
 if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
-
-    @pytest.fixture
-    def user(browser, studio):
-        context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
-        found = User(context.new_page(), studio)
-        found.open()
-        yield found
-        wrong = list(found.wrong)
-        context.close()
-        assert not wrong, wrong
 
     def efforts(user):
         return user.state("s.answer.value.scene.drivers[0].effort")

@@ -7,14 +7,20 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+import trunnion
 from served import served as serving
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
 from trunnion.studio.message import unpacked
+from trunnion.studio.page import document, modules
 
 ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "src" / "trunnion" / "studio" / "web"
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 
 
@@ -43,7 +49,25 @@ def fetched(studio, method, path, body=None, cookie=True, **headers):
     return answer.status, dict(answer.getheaders()), text
 
 
-PATHS = ["/", "/files", "/file/R%C3%A4der.yaml", "/studio/index.html", "/web/chart.js", "/?token=wrong"]
+def raw(studio, path):
+    """The bytes of an answer."""
+    connection = http.client.HTTPConnection("127.0.0.1", studio.port, timeout=20)
+    connection.request("GET", path, None, {"Cookie": f"trunnion_studio_{studio.port}={studio.token}"})
+    content = connection.getresponse().read()
+    connection.close()
+    return content
+
+
+PATHS = [
+    "/",
+    "/files",
+    "/first/R%C3%A4der.yaml",
+    "/thumbnail/hoecken",
+    "/file/R%C3%A4der.yaml",
+    "/studio/index.html",
+    "/web/chart.js",
+    "/?token=wrong",
+]
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -83,6 +107,32 @@ def test_files_of_the_folder_alone(served):
     told = json.loads(fetched(served, "GET", "/files")[2])
     assert (told["open"], told["files"]) == ("Räder.yaml", ["Räder.yaml"])
     assert fetched(served, "GET", "/file/R%C3%A4der.yaml")[2] == EXAMPLES["hoecken"]
+
+
+def test_what_the_first_picture_is_drawn_of(served):
+    result = trunnion.analyse(Mechanism(**entries_of(EXAMPLES["hoecken"])[0]), 360)
+    found = unpacked(raw(served, "/first/R%C3%A4der.yaml"))
+    assert found["text"] == EXAMPLES["hoecken"]
+    for key, track in found["tracks"].items():
+        places = result["point_position"].sel(point=key).values[:2]
+        np.testing.assert_allclose([track["x"], track["y"]], places, rtol=0, atol=1e-6 * np.abs(places).max() + 1e-9)
+    assert fetched(served, "GET", "/first/notes.txt")[0] == 404
+
+
+def test_pictures_of_examples(served):
+    found = unpacked(raw(served, "/thumbnail/durango-fourbar"))
+    assert [one["ground"] for one in found["links"]] == [True, False, False, False]
+    crank = next(track for track in found["paths"] if np.ptp(np.hypot(track["x"], track["y"])) < 1e-6)
+    assert max(crank["x"]) == pytest.approx(2.0, rel=0.01)  # m, as the file states
+    assert fetched(served, "GET", "/thumbnail/none")[0] == 404
+
+
+def test_the_page_names_all_its_modules():
+    paths = modules()
+    assert set(paths) == {"/studio/" + one.relative_to(PAGE).as_posix() for one in PAGE.rglob("*.js")} | {
+        path for path in paths if path.startswith("/web/")
+    }
+    assert all(f'<link rel="modulepreload" href="{path}">' in document("n") for path in paths)
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,11 @@ function played() {
     titles: charts.find(classes("title")).map((element) => element.textContent),
     marks: charts.find(classes("event")).length,
     lines: charts.find((element) => element.attributes.class === "event").length,
+    words: charts.find((element) => element.attributes.class === "mark middle").map((element) => [
+      element.textContent,
+      Number(element.attributes.x),
+      Number(element.attributes.y),
+    ]),
     axes: [...new Set(charts.find(classes("axis")).map((element) => element.textContent.replace(/ \[.*/, "")))],
     clicked,
     speed: chosen[0].textContent,

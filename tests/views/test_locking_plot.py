@@ -14,9 +14,10 @@ from trunnion.cycle.locking import LockingState
 from trunnion.results.attributes import summary_of
 from trunnion.views.common.joined import joined
 from trunnion.views.common.markup import with_code
+from trunnion.views.common.page import headline
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.locking_plot import STATES
-from trunnion.views.cycle.report import _summary, report
+from trunnion.views.cycle.report import report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 24
@@ -149,7 +150,7 @@ def test_curves_are_joined_by_values_and_gaps():
 def test_numerical_figures_are_in_their_own_table(cycle):
     names = {one.name for one in summary_of(cycle) if one.numerical}
     assert {"efficiency_error", "power_residual", "friction_iterations"} <= names
-    subjects = [subject for subject, _ in _summary(cycle)]
+    subjects = [subject for subject, _ in headline(cycle)]
     assert not {one.subject for one in summary_of(cycle) if one.numerical} & set(subjects)
     page = report(cycle)
     assert "Numerical quality" in page

@@ -161,7 +161,17 @@ def test_many_rows_are_thinned_and_events_are_not() -> None:
     assert scene["count"] <= MOST_ROWS
     assert scene["thinned"] == 3 * MOST_ROWS + 1
     assert [one["word"] for one in scene["motion"]["events"]] == ["starts"]
-    assert "4th" in report(result)
+    assert f"{scene['count']} rows shown with every peak" in " ".join(report(result).split())
+    assert scene["time"][-1] == pytest.approx(1.0)
+
+
+def test_thinned_rows_keep_the_peaks() -> None:
+    """A force that is large in a single row is drawn in its full size."""
+    result = simulate(wheel({"kind": "constant", "effort": 4}), 1.0, 3 * MOST_ROWS)
+    forces = np.zeros(result["reaction_force"].shape)
+    forces[0, 0, 1000] = 17.0
+    scene = motion_scene(shown(result.assign(reaction_force=(result["reaction_force"].dims, forces))))
+    assert max(abs(value) for value in scene["joints"][0]["reaction"]["x"]) == 17.0
 
 
 def test_several_free_drivers_have_a_curve_each() -> None:
@@ -208,7 +218,46 @@ def test_every_figure_bears_every_motion(motion: tuple[str, xr.Dataset], kind: s
     plt.close(drawn)
 
 
+def _with_events(times: dict[float, str]) -> xr.Dataset:
+    """A motion of which other things are told to happen."""
+    result = ends_early().drop_vars("event_time")
+    result.attrs["events"] = json.dumps([[kind, "A", None, ""] for kind in times.values()])
+    return result.assign(event_time=("event", np.array(list(times))))
+
+
+CLOSE_BY = {0.05: "motor-off", 0.06: "brake", 0.07: "clutch-slips", 0.25: "rest", 0.251: "impact"}
+
+
+def test_words_of_events_that_meet_stand_in_rows_above_each_other() -> None:
+    """In one row no two meet; a later word takes the lowest row in which there is room; an impact has no word."""
+    drawn = figure(_with_events(CLOSE_BY), "speed")
+    drawn.canvas.draw()
+    boxes = {text.get_text(): text.get_window_extent() for text in drawn.axes[0].texts}
+    assert list(boxes) == ["motor off", "brake on", "clutch slips", "rests", "ends"]
+    assert boxes["motor off"].y0 < boxes["brake on"].y0 < boxes["clutch slips"].y0
+    assert boxes["rests"].y0 == pytest.approx(boxes["motor off"].y0, abs=2.0)
+    apart = list(boxes.values())
+    assert not any(one.overlaps(other) for k, one in enumerate(apart) for other in apart[:k])
+    frame = drawn.axes[0].get_window_extent()
+    assert all(one.y0 >= frame.y1 - 1 and one.x0 >= frame.x0 - 1 and one.x1 <= frame.x1 + 1 for one in apart)
+    assert len(drawn.axes[0].lines) == len(figure(ends_early(), "speed").axes[0].lines) + 3  # it started and ended
+    plt.close("all")
+
+
 if NODE:
+
+    def test_words_of_events_on_the_page_stand_in_rows(tmp_path: Path) -> None:
+        told = page(_with_events(CLOSE_BY), tmp_path)["motion"]
+        assert told["lines"] == 5 * len(told["titles"])
+        assert told["marks"] == 6 * len(told["titles"])  # an impact has a mark on the axis alone
+        words = told["words"][:5]
+        assert [word for word, *_ in words] == ["motor off", "brake on", "clutch slips", "rests", "ends"]
+        rows = [y for *_, y in words]
+        assert rows[0] - 12 == rows[1] == rows[2] + 12
+        assert rows[3] == rows[0]
+        for k, (word, x, y) in enumerate(words):
+            for other, left, height in words[:k]:
+                assert height != y or abs(x - left) >= 3 * (len(word) + len(other))
 
     def page(result: xr.Dataset, folder: Path) -> Any:
         path = folder / "scene.json"

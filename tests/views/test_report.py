@@ -16,7 +16,8 @@ from trunnion.errors import Status
 from trunnion.results.attributes import figure_rows, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.views.common.bundle import bundle, web_text
-from trunnion.views.cycle.report import _summary, embedded, report
+from trunnion.views.common.page import headline
+from trunnion.views.cycle.report import embedded, report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -128,18 +129,18 @@ def test_a_figure_is_told_by_its_subject_its_value_and_a_remark(plain, figure, l
     plain.attrs["summary"] = json.dumps(figure_rows([figure]))
     assert figure.label == label
     assert summary_of(plain) == [figure]
-    assert _summary(plain) == [(figure.subject, [told])]
+    assert headline(plain) == [(figure.subject, [told])]
 
 
 def test_a_figure_of_an_older_file_is_all_subject(plain):
     plain.attrs["summary"] = json.dumps([{"label": "force, least", "value": 1.0, "unit": "1"}])
-    assert _summary(plain) == [("force, least", [("1", "")])]
+    assert headline(plain) == [("force, least", [("1", "")])]
 
 
 def test_figures_of_one_subject_stand_together(plain):
     rows = [Figure("f", "force", 1.0, "1", aspect) for aspect in ("least", "largest", MORE_THAN)]
     plain.attrs["summary"] = json.dumps(figure_rows(rows))
-    assert _summary(plain) == [("force", [("1", "least"), ("1", "largest"), ("> 1", "")])]
+    assert headline(plain) == [("force", [("1", "least"), ("1", "largest"), ("> 1", "")])]
 
 
 def test_a_gap_is_told_even_if_no_finding_speaks_of_it():

@@ -13,10 +13,11 @@ from stand_in_tolerances import CASES, odd_names, toleranced
 from test_report import Page
 
 from trunnion.views.common.bundle import web_text
+from trunnion.views.common.page import Section
 from trunnion.views.tolerance.figure import drawable, figure
 from trunnion.views.tolerance.notes import NOTES
 from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.report import Section, report
+from trunnion.views.tolerance.report import report
 from trunnion.views.tolerance.tables import TextTable
 
 SOURCE = "data:image/svg+xml;base64,"

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from trunnion.cli.model import lines_of, stated
-from trunnion.cli.options import File, Out, Set, Steps, TableUnits, Units, UnitsRow
+from trunnion.cli.options import File, Out, Report, Set, Steps, TableUnits, Units, UnitsRow
 from trunnion.cli.result import Shown, check_files
 from trunnion.cli.terminal import bar
 
@@ -30,14 +30,15 @@ def assemble(
         Uniform, typer.Option("--uniform", help="Joints with one common clearance: pins, or all kinds of play.")
     ] = Uniform.PINS,
     out: Out = None,
+    report: Report = None,
     units_row: UnitsRow = False,
     units: Units = TableUnits.si,
 ) -> None:
     """Clearance needed to assemble a linkage with axis errors."""
     from trunnion.studies.assembly.study import assemble as run
 
-    check_files(out or [])
+    check_files(out or [], report)
     mechanism = stated(file, set_)
     with lines_of(file), bar("positions", steps, least=1000) as progress:
         result = run(mechanism, steps, uniform.value, progress)
-    Shown(result, file, ["assembly"], out or [], None, units_row, units=units).finish()
+    Shown(result, file, ["assembly"], out or [], report, units_row, units=units).finish()

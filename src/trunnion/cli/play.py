@@ -12,6 +12,7 @@ from trunnion.cli.options import (
     Measures,
     OnePosition,
     Out,
+    Report,
     Set,
     Steps,
     TableFile,
@@ -36,6 +37,7 @@ def play(
     table: TableFile = None,
     friction: FrictionLaw = None,
     out: Out = None,
+    report: Report = None,
     units_row: UnitsRow = False,
     units: Units = TableUnits.si,
     uncut: Uncut = False,
@@ -46,7 +48,7 @@ def play(
     """
     from trunnion.studies.play.study import play as run
 
-    check_files(out or [])
+    check_files(out or [], report)
     mechanism = stated(file, set_, table, friction)
     with lines_of(file), bar("positions", steps, least=20_000) as progress:
         result = run(mechanism, measure, steps, progress, at)
@@ -65,4 +67,13 @@ def play(
 
         show_tables(mechanism.name, tables(result), apart=False)
 
-    Shown(result, file, ["measures", "joints"], out or [], None, units_row, draw=draw, show=show, units=units).finish()
+    def page() -> str:
+        from trunnion.views.common.peaks import whole_peaks
+        from trunnion.views.play.report import report as html
+
+        return html(whole_peaks(result, uncut))
+
+    Shown(
+        result, file, ["measures", "joints"], out or [], report, units_row,
+        draw=draw, page=page, show=show, units=units,
+    ).finish()  # fmt: skip

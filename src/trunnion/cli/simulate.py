@@ -26,6 +26,16 @@ __all__ = ["simulate"]
 
 MILLISECOND = 1000.0
 
+Kind = Annotated[
+    str | None,
+    typer.Option(
+        "--kind",
+        help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
+        "spectrum; of a steady cycle those of `trunnion plot`.",
+        show_default=False,
+    ),
+]
+
 
 def simulate(
     file: File,
@@ -52,15 +62,7 @@ def simulate(
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            help="Figure to write: sheet, speed, effort, reactions, energy, phase; in play contacts, gaps, orbit, "
-            "spectrum; of a steady cycle those of `trunnion plot`.",
-            show_default=False,
-        ),
-    ] = None,
+    kind: Kind = None,
     out: Out = None,
     report: Report = None,
     units_row: UnitsRow = False,

@@ -16,6 +16,7 @@ from trunnion.cli.options import (
     File,
     FrictionLaw,
     Out,
+    Report,
     Seats,
     Set,
     Steps,
@@ -27,7 +28,7 @@ from trunnion.cli.options import (
     over,
     points,
 )
-from trunnion.cli.result import Shown, show_tables
+from trunnion.cli.result import Shown, check_page, show_tables
 from trunnion.cli.terminal import bar, console
 from trunnion.errors import Finding, MechanismError, counted
 from trunnion.files import folder
@@ -84,6 +85,7 @@ def sweep(
     friction: FrictionLaw = None,
     seat: Seats = None,
     out: Out = None,
+    report: Report = None,
     image: Picture = "png",
     units_row: UnitsRow = False,
     units: Units = TableUnits.si,
@@ -101,6 +103,7 @@ def sweep(
     measures = list(dict.fromkeys(measure or ["efficiency"]))
     _check_figures(grid, x or "", family or "", kind)
     files = _files(out or [], measures, image)
+    check_page(report, "--report")
     mechanism = stated(file, set_, table, friction, seat, {name: values[0] for name, values in grid.items()})
     own = check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
@@ -116,8 +119,17 @@ def sweep(
 
         return figure(whole_peaks(result, uncut), files[path], x or "", family or "", kind)
 
+    def page() -> str:
+        from trunnion.views.common.peaks import whole_peaks
+        from trunnion.views.sweep.report import report as html
+
+        return html(whole_peaks(result, uncut), measures, x or "", family or "", kind)
+
     show = partial(_show, result, mechanism, file, measures, x or "", family or "")
-    Shown(result, file, ["assembly"], list(files), None, units_row, draw=draw, show=show, units=units).finish()
+    Shown(
+        result, file, ["assembly"], list(files), report, units_row,
+        draw=draw, page=page, show=show, units=units,
+    ).finish()  # fmt: skip
 
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:

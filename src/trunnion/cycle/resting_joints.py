@@ -47,8 +47,8 @@ def bracket(
     One resting joint at a position: the extremes over its resistance; several: their separate effects are added
     (first order). resting: positions at which a joint does; seats: of the pins, by path, over all positions.
     """
-    if not resting:
-        return  # both are the effort itself
+    if not resting or not run.system.mechanism.drivers:
+        return  # both are the effort itself, or there is none
     lower = arrays["drive_effort_lower"] = arrays["drive_effort"].copy()
     upper = arrays["drive_effort_upper"] = arrays["drive_effort"].copy()
     for joint, positions in resting.items():

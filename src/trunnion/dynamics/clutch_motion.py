@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from trunnion.dynamics.integrate import Integration, Stretch
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
-from trunnion.dynamics.rates import Dynamics, Rates
-from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.rates import WORKS, Dynamics, Rates
+from trunnion.dynamics.rest import Meanwhile, Rest
+from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.tabulated import TabulatedRates
 
@@ -50,10 +51,10 @@ class ClutchRates:
         """The rates; one lane."""
         return self._with_rotor(at, self.inner(at))
 
-    def resting(self, at: Moment) -> Rates:
-        """Those while the coordinate rests: the rotor alone moves; one lane."""
+    def resting(self, at: Moment, works: Array) -> Rates:
+        """Those while the coordinate rests, with the powers meanwhile: the rotor moves; one lane."""
         n = len(at.q)
-        return self._with_rotor(at, Rates(np.zeros(n), np.zeros(n), np.zeros(len(at.bristles)), np.zeros(4), True))
+        return self._with_rotor(at, Rates(np.zeros(n), np.zeros(n), np.zeros(len(at.bristles)), works, True))
 
     def _with_rotor(self, at: Moment, rates: Rates) -> Rates:
         drive = self.drive
@@ -84,7 +85,8 @@ class ClutchMotion(Integration):
         self.drive = _drive(self.motion)
         self.rates = ClutchRates(self.drive, self.dynamics)
         self.dynamics = self.rates
-        self.resting = False  # whether the rotor alone moves
+        self.resting = False  # whether the rotor alone moves, or it and what prescribed drivers move
+        self.meanwhile: Meanwhile | None = None  # what those do
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
         self.known = "holds" if self.drive.engaged(0.0) else "opens"
 
@@ -192,7 +194,7 @@ class ClutchMotion(Integration):
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
         end = self.rest.until(time, row, until, now)
-        self.resting = True
+        self.resting, self.meanwhile = True, self.rest.meanwhile(time, row, end, now)
         time, row, _ = self._move(time, row, end, 0.0, now, None)
         self.resting = False
         return time, row
@@ -203,7 +205,9 @@ class ClutchMotion(Integration):
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            return self.layout.row(np.zeros(1), self.rates.resting(self.moment(moment, numbers, 0.0, now)))
+            at = self.moment(moment, numbers, 0.0, now)
+            works = self.meanwhile.powers(at.time)[:, 0] if self.meanwhile else np.zeros(len(WORKS))
+            return self.layout.row(np.zeros(1), self.rates.resting(at, works))
 
         return rate
 

@@ -236,7 +236,8 @@ def _rates_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Num
 
 
 def _by_rounds(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> tuple[list[Number], Number]:
-    """Accelerations by Newton's method with slopes by differences, and 1 where it did not end."""
+    """Accelerations by Newton's method with slopes by differences, and 1 where it did not end, or where more
+    acceleration takes less effort."""
     count = len(motion.names)
 
     def step(numbers: list[Number]) -> list[Number]:
@@ -244,14 +245,18 @@ def _by_rounds(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> tuple[l
         missed = missing_of(motion, at, second)
         for k, size in enumerate(unit):
             ahead = DIFFERENCE * np.maximum(np.abs(second[k]), 1e-2 * size)
+            ahead = np.where(second[k] < 0.0, -ahead, ahead)
             tried = [one + ahead if i == k else one for i, one in enumerate(second)]
             columns.append([(a - b) / ahead for a, b in zip(missing_of(motion, at, tried), missed, strict=True)])
-        change, _ = eliminated([list(row) for row in zip(*columns, strict=True)], missed)
-        return [*(one - part for one, part in zip(second, change, strict=True)), *change]
+        change, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], missed)
+        turned: Number = 1.0  # the sign of the determinant, see `state.Accelerated`
+        for pivot in pivots:
+            turned = np.where(pivot > 0.0, turned, -turned)
+        return [*(one - part for one, part in zip(second, change, strict=True)), *change, turned]
 
     begin = [0.0 * rate for rate in at.rate]
-    found = looped(step, [*begin, *begin], ROUNDS)
-    doubt: Number = 0.0
+    *found, positive = looped(step, [*begin, *begin, 1.0], ROUNDS)
+    doubt: Number = np.where(positive > 0.0, 0.0, 1.0)
     for one, change, size in zip(found[:count], found[count:], unit, strict=True):
         small = CLOSE * np.maximum(np.abs(one), 1e-2 * size)
         doubt = np.maximum(doubt, np.where(np.abs(change) <= small, 0.0, 1.0))

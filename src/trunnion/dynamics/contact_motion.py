@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 from scipy.optimize import brentq
 
-from trunnion.dynamics.integrate import Event, Integration, Stretch
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seeing, Seen
+from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Onset
 from trunnion.joints.contact import elastic_force

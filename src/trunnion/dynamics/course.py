@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from trunnion.dynamics.integrate import Solution
+    from trunnion.dynamics.solution import Solution
     from trunnion.dynamics.state import FreeMotion
 
 __all__ = ["FEWEST", "NODES", "STARTED", "STEADY", "Courses"]
@@ -90,10 +90,11 @@ class Courses:
         """Derivatives by the share of the step, of numbers at the nodes."""
         return _by(_DERIVED, numbers)
 
-    def figures(self) -> dict[str, Array]:
-        """Every figure of `FIGURES`, (lane,); NaN where a motion has none."""
+    def figures(self, times: Array | None = None) -> dict[str, Array]:
+        """Every figure of `FIGURES`, (lane,); NaN where a motion has none. times: for `over` beside them, if given."""
         with np.errstate(all="ignore"):
-            return {name: figure(self) for name, figure in FIGURES.items()}
+            found = {name: figure(self) for name, figure in FIGURES.items()}
+            return found if times is None else found | self.over(times)
 
     # ---- turns ------------------------------------------------------------------------------------------------
 
@@ -116,25 +117,21 @@ class Courses:
         """A number where the coordinate has gone so far, (lane,)."""
         lane = np.arange(len(gone))
         step = np.minimum(np.sum(self.turned[:, :, -1] < gone[:, None], axis=1), self.turned.shape[1] - 1)
-        own = self.turned[lane, step]
-        coefficients, slopes = _by(_COEFFICIENTS, own), _by(_COEFFICIENTS, self.slopes(own))
-        low, high = np.zeros(len(gone)), np.ones(len(gone))
-        place = np.clip((gone - own[:, 0]) / (own[:, -1] - own[:, 0]), 0.0, 1.0)
-        left = np.isfinite(place)
-        place = np.where(left, place, 1.0)
-        for _ in range(ROUNDS):
-            basis = _basis(place)
-            off, steep = np.sum(basis * coefficients, axis=1) - gone, np.sum(basis * slopes, axis=1)
-            low, high = np.where(off < 0.0, place, low), np.where(off < 0.0, high, place)
-            better = place - off / steep
-            better = np.where((better > low) & (better < high), better, np.where(off == 0.0, place, 0.5 * (low + high)))
-            changed = np.abs(better - place) > EXACT
-            place = np.where(left, better, place)
-            left = left & changed
-            if not np.any(left):
-                break
-        found: Array = np.sum(_basis(place) * _by(_COEFFICIENTS, self.numbers[number, lane, step]), axis=1)
+        basis = _basis_where(self.turned[lane, step], gone)
+        found: Array = np.sum(basis * _by(_COEFFICIENTS, self.numbers[number, lane, step]), axis=1)
         return found
+
+    def over(self, times: Array) -> dict[str, Array]:
+        """Every number of `OVER_TIME` at times, (lane, time)."""
+        shape = self.numbers.shape[1], len(times)
+        step = np.array([np.searchsorted(ends, times) for ends in self.numbers[0, :, :, -1]])
+        step = np.minimum(step, self.numbers.shape[2] - 1).ravel()
+        lane = np.repeat(np.arange(shape[0]), shape[1])
+        basis = _basis_where(self.numbers[0, lane, step], np.tile(times, shape[0]))
+        return {
+            name: np.sum(basis * _by(_COEFFICIENTS, self.numbers[number, lane, step]), axis=1).reshape(shape)
+            for name, number in OVER_TIME.items()
+        }
 
     @cached_property
     def end(self) -> Array:
@@ -167,6 +164,27 @@ class Courses:
         top = here - (after - before) ** 2 / (8.0 * bend)
         inside = (part == inner) & (here >= before) & (here >= after) & (bend < 0.0)
         return np.where(inside, top, most)
+
+
+def _basis_where(own: Array, wanted: Array) -> Array:
+    """The basis at the share of a step where a rising number is as wanted, (lane, coefficient). own: (lane, node)."""
+    coefficients, slopes = _by(_COEFFICIENTS, own), _by(_COEFFICIENTS, Courses.slopes(own))
+    low, high = np.zeros(len(wanted)), np.ones(len(wanted))
+    place = np.clip((wanted - own[:, 0]) / (own[:, -1] - own[:, 0]), 0.0, 1.0)
+    left = np.isfinite(place)
+    place = np.where(left, place, 1.0)
+    for _ in range(ROUNDS):
+        basis = _basis(place)
+        off, steep = np.sum(basis * coefficients, axis=1) - wanted, np.sum(basis * slopes, axis=1)
+        low, high = np.where(off < 0.0, place, low), np.where(off < 0.0, high, place)
+        better = place - off / steep
+        better = np.where((better > low) & (better < high), better, np.where(off == 0.0, place, 0.5 * (low + high)))
+        changed = np.abs(better - place) > EXACT
+        place = np.where(left, better, place)
+        left = left & changed
+        if not np.any(left):
+            break
+    return _basis(place)
 
 
 def _basis(place: Array) -> Array:
@@ -243,3 +261,5 @@ FIGURES: dict[str, Callable[[Courses], Array]] = {
     "fluctuation": fluctuation,
     "peak_effort": peak_effort,
 }
+
+OVER_TIME = {"coordinate": 1, "rate": 2, "effort": 3}  # rows of `Courses.numbers`

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
-from trunnion.dynamics.integrate import Solution, Stretch
 from trunnion.dynamics.opened import Opened
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books
 from trunnion.dynamics.shown import Touches, as_stated
 from trunnion.dynamics.shown_space import JointsInSpace
+from trunnion.dynamics.solution import Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
@@ -110,11 +110,10 @@ class Filling:
         return found
 
     def _solved(self, at: Moment, stretch: Stretch) -> tuple[Array, Backward, tuple[Onset, ...]]:
-        """Accelerations and the walk; at rest with the share of the friction that holds it."""
+        """Accelerations and the walk; at rest with the shares of the friction that hold it."""
         self.motion.begin(stretch.snapshot)
-        if not stretch.resting:
+        if not stretch.resting or self.motion.resisted:
             found = self.motion.accelerate(at)
             return found.second, found.back, found.onsets
-        share = Rest(self.motion, self.solution.layout, stretch.slips).shares(at)
-        zero = np.zeros_like(at.q)
-        return zero, self.motion.solve(at, zero, self.motion.beginning(at._replace(sense=1.0), share)), ()
+        rest = Rest(self.motion, self.solution.layout, stretch.slips)
+        return np.zeros_like(at.q), rest.back(at), ()

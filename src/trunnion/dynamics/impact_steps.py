@@ -18,7 +18,7 @@ from trunnion.algebra.dual import primal
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates, Linear
 from trunnion.dynamics.contact_motion import ContactMotion, Impact, OpenContact
 from trunnion.dynamics.impact_law import Struck, strike
-from trunnion.dynamics.integrate import Event, Stretch
+from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import Closed
 

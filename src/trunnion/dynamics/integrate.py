@@ -13,7 +13,7 @@ which it would break away forward and backward; see `rest`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,14 +23,14 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.rates import Dynamics, Layout
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout
 from trunnion.dynamics.rest import Rest
+from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
-__all__ = ["Ended", "Event", "Integration", "Solution", "Stretch"]
+__all__ = ["Integration"]
 
 Array = NDArray[np.float64]
 
@@ -39,36 +39,6 @@ CREEPING, CREPT = 400, 1e-9  # steps that get on by less of the duration: it doe
 STUCK = 50  # events at one time
 SECANTS = 8  # rounds to the place of a time in a step along another number
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
-CLOSE = 1e-13  # of the time or coordinate: places that are one
-
-
-class Event(NamedTuple):
-    """Something that happens at a time, s: its kind, what it happens to, and a figure with its unit."""
-
-    time: float
-    kind: str
-    of: str
-    figure: float = np.nan
-    unit: str = ""
-
-
-class Stretch(NamedTuple):
-    """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
-
-    sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
-    goes on, where it is followed; onsets, senses, slips: of contacts, joints that may stick and a clutch, see `Moment`.
-    """
-
-    begin: float
-    end: float
-    state: Callable[[Array], Array]
-    sense: float
-    resting: bool
-    now: float
-    snapshot: Snapshot | None = None
-    onsets: tuple[Onset, ...] = ()
-    senses: tuple[int, ...] = ()
-    slips: float = 0.0
 
 
 class Passing(NamedTuple):
@@ -76,49 +46,6 @@ class Passing(NamedTuple):
 
     number: int
     value: float
-
-
-class Ended(NamedTuple):
-    """Why an integration ended before its time."""
-
-    code: str
-    time: float
-    figures: dict[str, Any]
-
-
-@dataclass
-class Solution:
-    """What an integration found: stretches one after the other, events, and why it ended early, if it did.
-
-    notes: figures of findings by their code; stepped: whether some of it is stepped, to the first order.
-    """
-
-    layout: Layout
-    stretches: list[Stretch] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    ended: Ended | None = None
-    asked: int = 0
-    notes: dict[str, dict[str, Any]] = field(default_factory=dict)
-    stepped: bool = False
-
-    @property
-    def end(self) -> float:
-        """The time until which there is a motion, s."""
-        return self.stretches[-1].end if self.stretches else 0.0
-
-    def at(self, time: Array) -> tuple[Array, NDArray[np.intp]]:
-        """State (number, time) and number of the stretch at rising times; NaN, −1 after the end."""
-        found = np.full((self.layout.size, len(time)), np.nan)
-        which = np.full(len(time), -1, np.intp)
-        ends = np.array([one.end for one in self.stretches])
-        # the end is reached but for rounding
-        time = np.where((time > self.end) & (time <= self.end * (1 + 2 * CLOSE)), self.end, time)
-        number = np.searchsorted(ends, time)
-        for k in np.unique(number[number < len(ends)]):
-            lanes = number == k
-            found[:, lanes] = self.stretches[k].state(time[lanes])
-            which[lanes] = k
-        return found, which
 
 
 @dataclass
@@ -239,10 +166,14 @@ class Integration:
         assert self.rest is not None
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
-        end = self.rest.until(time, row, until, now)
+        rest, end = self.rest, self.rest.until(time, row, until, now)
+        meanwhile = rest.meanwhile(time, row, end, now)
 
         def held(moments: Array) -> Array:
-            return self.rest.held(time, row, moments) if self.rest else np.empty(0)
+            rows = rest.held(time, row, moments)
+            if meanwhile:
+                self.layout.works(rows)[: len(WORKS)] += meanwhile.works(moments)
+            return rows
 
         self._add(Stretch(time, end, held, 0.0, True, now))
         return end, held(np.array([end]))[:, 0]
@@ -457,13 +388,26 @@ class Integration:
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
         causes = [self._cause(time, one, sense, now) for one in (row, ahead)]
         if self.rest is not None and "locked" in causes:
-            energy = self._kinetic(time, row, sense, now)
-            self._note(time, "lock", energy, "J")
-            row[n] = 0.0
+            self._note(time, "lock", self._stopped(time, row, np.zeros(n), sense, now), "J")
             return time, row, None
         code = next((one for one in causes if one != "locked" and one), "step")
         self._stop(code, time, row)
         return time, row, None
+
+    def _stopped(self, time: float, row: Array, rates: Array, sense: float, now: float) -> float:
+        """Change rates at once, by friction: the energy lost, J, of rotors too, which is work of friction."""
+        n, works = self.layout.coordinates, self.layout.size - len(self.layout.works_named)
+        before, known = self._kinetic(time, row, sense, now), row[n : 2 * n].copy()
+        rotors = sum(
+            0.5 * drive.inertia * drive.ratio**2 * (old * old - new * new)
+            for drive, old, new in zip(self.motion.drives.values(), known, rates, strict=True)
+            if not drive.clutched
+        )
+        row[n : 2 * n] = rates
+        lost = before - self._kinetic(time, row, sense, now) + float(rotors)
+        row[works + WORKS.index("drive")] += float(rotors)
+        row[works + WORKS.index("friction")] += lost
+        return lost
 
     def _stop(self, code: str, time: float, row: Array) -> None:
         figures = {"coordinate": float(row[0]), "rate": float(row[self.layout.coordinates])}

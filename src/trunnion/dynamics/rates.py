@@ -24,6 +24,7 @@ __all__ = [
     "Seeing",
     "Seen",
     "Walks",
+    "powers_of",
     "seen_of",
     "works_of",
 ]
@@ -132,6 +133,8 @@ class Walks:
         """The rates; one lane."""
         motion = self.motion
         found = motion.accelerate(at, self._last)
+        if self._last is not None and not np.all(found.converged & ~found.turned):
+            found = motion.accelerate(at)  # the last ones may lie on the wrong side of where a reaction turns round
         if np.all(np.isfinite(found.second)):
             self._last = found.second
         integral = np.array([
@@ -158,15 +161,27 @@ def seen_of(found: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
 
 def works_of(back: Backward, at: Moment, contacts: Contacts | None = None) -> Array:
     """Power of the drivers, loads and springs into the mechanism, and to friction and contacts, W; one lane."""
-    walk, stated = back.walk, back.walk.system.mechanism.loads
-    drive = sum(float(np.ravel(primal(e * walk.rate(name)))[0]) for name, e in back.efforts.items())
-    loads = sum(float(np.ravel(primal(power))[0]) for name, power in back.load_powers.items() if name in stated)
-    springs = sum(float(np.ravel(primal(state.power))[0]) for state in back.springs.values())
-    friction = sum(float(np.ravel(primal(back.friction_power(joint)))[0]) for joint in walk.system.joints)
+    found = powers_of(back, 1)[:, 0]
     if contacts is None or not contacts.each:
-        return np.array([drive, loads, springs, friction])
-    contact = sum(float(np.ravel(push.loss)[0]) for _, push in contacts.pushes(walk, at.onsets))
-    return np.array([drive, loads, springs, friction, contact])
+        return found
+    contact = sum(float(np.ravel(push.loss)[0]) for _, push in contacts.pushes(back.walk, at.onsets))
+    return np.append(found, contact)
+
+
+def powers_of(back: Backward, lanes: int) -> Array:
+    """Power of the drivers, loads and springs into the mechanism, and to friction, W; (work, lane)."""
+    walk, stated = back.walk, back.walk.system.mechanism.loads
+    each = (
+        [effort * walk.rate(name) for name, effort in back.efforts.items()],
+        [power for name, power in back.load_powers.items() if name in stated],
+        [state.power for state in back.springs.values()],
+        [back.friction_power(joint) for joint in walk.system.joints],
+    )
+    found = np.zeros((len(each), lanes))
+    for row, powers in zip(found, each, strict=True):
+        for power in powers:
+            row += np.ravel(primal(power))
+    return found
 
 
 def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.filling import Filling
-from trunnion.dynamics.integrate import Solution
+from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.state import FreeMotion
 from trunnion.joints.motion import Drive, MotionLaw, Parameters, Span
 

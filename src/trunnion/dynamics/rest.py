@@ -5,18 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.rates import Layout, powers_of
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.solve.backward import Backward
 
-__all__ = ["Rest"]
+__all__ = ["Meanwhile", "Rest"]
 
 Array = NDArray[np.float64]
 
 SCANNED = 200  # times of a rest at which what drives it is looked at, where that changes
 SHARES = 40  # bisections of the share of the friction that acts at rest
+PANELS, NODES = 16, 8  # of a rest, and places in each at which powers are asked for
 
 
 @dataclass(frozen=True)
@@ -88,9 +91,8 @@ class Rest:
     def _changes(self) -> bool:
         """Whether anything may change while it rests."""
         system = self.motion.system
-        prescribed = any(name not in self.motion.drives for name in system.mechanism.drivers)
         varies = any(entry.varies for entry in system.mechanism.parameter_set.entries.values())
-        return prescribed or varies or any(drive.timed for drive in self.motion.drives.values())
+        return self.driven or varies or any(drive.timed for drive in self.motion.drives.values())
 
     def shares(self, at: Moment) -> Array:
         """The share of the friction, of the same part in every joint, that holds each lane at rest; from −1 to 1."""
@@ -105,3 +107,60 @@ class Rest:
             low, high = np.where(less, middle, low), np.where(less, high, middle)
         found: Array = 0.5 * (low + high)
         return found
+
+    # ---- what is done meanwhile -------------------------------------------------------------------------------
+
+    @property
+    def driven(self) -> bool:
+        """Whether prescribed drivers move other links meanwhile, so that work is done."""
+        return any(name not in self.motion.drives for name in self.motion.system.mechanism.drivers)
+
+    def back(self, at: Moment) -> Backward:
+        """Motion and forces at rest, with the share of the friction that holds it."""
+        senses = self.motion.beginning(at._replace(sense=1.0), self.shares(at))
+        return self.motion.solve(at, np.zeros_like(at.q), senses)
+
+    def powers(self, at: Moment) -> Array:
+        """What goes into the works of `rates.WORKS`, W, (work, lane)."""
+        with np.errstate(all="ignore"):
+            return powers_of(self.back(at), at.q.shape[1])
+
+    def meanwhile(self, begin: float, row: Array, end: float, now: float) -> Meanwhile | None:
+        """Powers and works during a rest, where work is done; all powers are asked for at once."""
+        if not (self.driven and end > begin):
+            return None
+        nodes, edges = chebyshev.chebpts1(NODES), np.linspace(begin, end, PANELS + 1)
+        times = (edges[:-1, None] + 0.5 * (edges[1] - edges[0]) * (1.0 + nodes)).ravel()
+        powers = self.powers(self._moment(times, row, begin, 0.0, now)).reshape(-1, PANELS, NODES)
+        vander = chebyshev.chebvander(nodes, NODES - 1)
+        through = np.linalg.solve(vander, np.moveaxis(powers, -1, 0).reshape(NODES, -1)).reshape(NODES, -1, PANELS)
+        return Meanwhile(edges, np.asarray(through, np.float64))
+
+
+@dataclass(frozen=True)
+class Meanwhile:
+    """What goes into the works during a rest: Chebyshev polynomials through powers, W, (coefficient, work, panel)."""
+
+    edges: Array
+    through: Array
+
+    def powers(self, time: Array) -> Array:
+        """Powers, W, (work, time)."""
+        panel, place = self._place(time)
+        return np.asarray(chebyshev.chebval(place, self.through[:, :, panel], tensor=False), np.float64)
+
+    def works(self, time: Array) -> Array:
+        """Works since the begin, J, (work, time)."""
+        panel, place = self._place(time)
+        half = 0.5 * (self.edges[1] - self.edges[0])
+        integrals: Array = np.asarray(half * chebyshev.chebint(self.through, lbnd=-1), np.float64)
+        each = integrals.sum(axis=0)  # every polynomial is 1 at 1
+        before = np.cumsum(each, axis=1) - each
+        found: Array = before[:, panel] + chebyshev.chebval(place, integrals[:, :, panel], tensor=False)
+        return found
+
+    def _place(self, time: Array) -> tuple[NDArray[np.intp], Array]:
+        """The panel of each time, and the place in it from −1 to 1."""
+        panel = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, PANELS - 1)
+        half = 0.5 * (self.edges[1] - self.edges[0])
+        return panel, (time - self.edges[panel]) / half - 1.0

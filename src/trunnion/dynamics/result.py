@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
-from trunnion.dynamics.integrate import Event, Solution, Stretch
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
 from trunnion.dynamics.rates import CONTACT as IN_CONTACTS
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.shown import CONTACT, IMPACT, Touches, impact_arrays, impact_figures
+from trunnion.dynamics.solution import Event, Solution, Stretch
 from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
 from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
@@ -194,7 +194,8 @@ def _note_switches(motion: FreeMotion, solution: Solution) -> None:
 
 def _energy(books: Books) -> tuple[Array, float]:
     """What works and energies differ by at every row, J, and the energy turned over, J."""
-    drive, loads, springs, *lost = books.works  # to friction, and to contacts
+    # to friction, and to contacts; from the first row on, which is that after a stop at the start
+    drive, loads, springs, *lost = books.works - books.works[:, :1]
     energy = books.energies.sum(axis=0)
     residual = drive + loads + springs - sum(lost) - (energy - energy[0])
     sizes = [np.nanmax(np.abs(one), initial=0.0) for one in (*books.works, *(books.energies - books.energies[:, :1]))]
@@ -248,23 +249,48 @@ def motion_findings(
     yield from (finding_for(code, "joints", **figures) for code, figures in solution.notes.items())
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
     turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
-    for event in solution.events:
-        if event.kind == "lock":
-            yield finding_for("simulate.locks", f"drivers.{event.of}", time=event.time, energy=event.figure)
-    rests = [one for one in solution.events if one.kind == "rest"]
-    if rests and solution.stretches and solution.stretches[-1].resting:
-        last = solution.stretches[-1]
-        given, needed = _holding(motion, solution, last)
-        code = "stays_at_rest" if all(one.resting for one in solution.stretches) else "rests"
-        figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
-        more: dict[str, Any] = {} if code == "stays_at_rest" else {"times": len(rests), "time": rests[-1].time}
-        yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
+    yield from _locks(motion, solution)
+    yield from _rests(motion, solution, name, effort)
     if solution.ended is not None:
         ended = solution.ended
         unit: dict[str, Any] = (
             {"unit": "rad" if turns else "m", "driver": name} if ended.code == "simulate.range" else {}
         )
         yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
+
+
+def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
+    """What locks as it runs."""
+    locks = [one for one in solution.events if one.kind == "lock"]
+    if not motion.resisted:
+        for event in locks:
+            yield finding_for("simulate.locks", f"drivers.{event.of}", time=event.time, energy=event.figure)
+    elif locks:
+        joints, energy = list(dict.fromkeys(one.of for one in locks)), float(np.nansum([one.figure for one in locks]))
+        times = len({one.time for one in locks})
+        yield finding_for("simulate.joints_lock", f"joints.{joints[0]}", joints=joints, count=len(joints), times=times,
+                          time=locks[0].time, energy=energy)  # fmt: skip
+
+
+def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> Iterator[Finding]:
+    """What holds it where it rests at the end."""
+    rests = [one for one in solution.events if one.kind == "rest"]
+    if not (rests and solution.stretches and solution.stretches[-1].resting):
+        return
+    last, stays = solution.stretches[-1], all(one.resting for one in solution.stretches)
+    more: dict[str, Any] = {} if stays else {"times": len(rests), "time": rests[-1].time}
+    if motion.resisted:
+        at = solution.layout.moment(np.array([last.begin]), solution.at(np.array([last.begin]))[0], now=last.now)
+        shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
+        worst = int(np.argmax(shares))
+        code = "none_starts" if stays else "all_rest"
+        joint = motion.resisted[worst]
+        yield finding_for(f"simulate.{code}", f"joints.{joint}", joint=joint, share=float(shares[worst]), **more)
+        return
+    given, needed = _holding(motion, solution, last)
+    figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
+    code = "stays_at_rest" if stays else "rests"
+    yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
 
 
 def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:

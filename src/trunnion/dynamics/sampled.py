@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.start import Places, nominal_motion, placed
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.tables import EXACT, NODES, POWERS, Rub, Tables, fits, numbers, scale_of, tabulated
+from trunnion.dynamics.tables import EXACT, NODES, POWERS, Rub, Tables, numbers, scale_of, tabulated, unfit
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import Values
@@ -86,16 +86,20 @@ def picked(values: Mapping[str, Any], rows: Rows | int) -> dict[str, Any]:
     }
 
 
-def tabulates(motion: FreeMotion, known: Places) -> Tables | None:
-    """The tables of the nominal mechanism, if its like can be tabulated together.
+def tabulates(motion: FreeMotion, known: Places) -> Tables | str:
+    """The tables of the nominal mechanism, or why its like cannot be tabulated together.
 
-    That is in the plane, and where friction has no memory.
+    They can in the plane, and where friction has no memory.
     """
-    if motion.bristles or not fits(motion):
-        return None
+    if motion.bristles:
+        return "friction has a memory"
+    if why := unfit(motion):
+        return why
     found = tabulated(motion, known)
-    planar = found is not None and all(isinstance(rub.load, PlanarContactLoad) for rub in found.rubs)
-    return found if planar else None
+    if found is None:
+        return "its forces have no tables that are exact enough"
+    planar = all(isinstance(rub.load, PlanarContactLoad) for rub in found.rubs)
+    return found if planar else "the mechanism is spatial"
 
 
 def sampled_tables(nominal: Tables, values: Values, count: int) -> Iterator[SampledTables]:

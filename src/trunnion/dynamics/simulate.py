@@ -15,11 +15,12 @@ from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
-from trunnion.dynamics.integrate import Integration, Solution
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
 from trunnion.dynamics.rates import Seeing, Walks
 from trunnion.dynamics.result import result_of
+from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of

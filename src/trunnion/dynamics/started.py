@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trunnion.dynamics.course import STARTED, Courses
-from trunnion.dynamics.integrate import Solution
+from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.state import FreeMotion
 from trunnion.results.figure import Figure
 
@@ -22,7 +22,7 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
     if not solution.stretches:
         return []
     if solution.stretches[-1].resting:
-        return _run_down(motion, solution)
+        return _run_down(motion, solution, i)
     if not motion.system.turns(name):
         return []
     figures = {key: float(value[0]) for key, value in Courses.of_solution(motion, solution, i).figures().items()}
@@ -39,15 +39,15 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
     ]
 
 
-def _run_down(motion: FreeMotion, solution: Solution) -> list[Figure]:
-    """How long, and how far, the one free coordinate still moves after its motor is switched off, or from the start if
-    it has none; nothing if it did not move then."""
-    ((name, drive),) = motion.drives.items()
+def _run_down(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
+    """How long, and how far, a free coordinate still moves after its motor is switched off, or from the start if it has
+    none, until all rest; nothing if it did not move then."""
+    name, drive = list(motion.drives.items())[i]
     off = 0.0 if drive.motor is None else drive.off_from
     rest = next((one.time for one in reversed(solution.events) if one.kind == "rest"), np.nan)
     if not off < rest:
         return []
-    (begin, end), unit = solution.at(np.array([off, rest]))[0][0], "rad" if motion.system.turns(name) else "m"
+    (begin, end), unit = solution.at(np.array([off, rest]))[0][i], "rad" if motion.system.turns(name) else "m"
     return [
         Figure(f"{name}.run_down", f"run-down of {name}", rest - off, "s", "until it rests"),
         Figure(f"{name}.run_down_way", f"run-down of {name}", end - begin, unit, "on its way"),

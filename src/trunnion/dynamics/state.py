@@ -28,7 +28,7 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["Accelerated", "FreeMotion", "Moment"]
+__all__ = ["Accelerated", "FreeMotion", "Moment", "ahead"]
 
 Array = NDArray[np.float64]
 
@@ -253,22 +253,24 @@ class FreeMotion:
     def accelerate(self, at: Moment, guess: Array | None = None) -> Accelerated:
         """The accelerations at which every free driver is given what the walk demands; NaN where there are none."""
         count, lanes = at.q.shape
-        second = np.zeros((count, lanes)) if guess is None else np.array(guess, float)
+        second = self.begun(at) if guess is None else np.array(guess, float)
         turned, step = np.zeros(lanes, bool), np.full((count, lanes), np.inf)
         largest = np.maximum(np.max(np.abs(second), axis=0), 0.0)
-        senses = self.beginning(at)
+        senses, before, last = self.beginning(at), second, second
         for _ in range(ROUNDS):
             miss, slopes = self._linearised(at, second, senses)
             turned = _turned(slopes)
             with np.errstate(all="ignore"):
                 step = -_solved(slopes, miss)
-            second = second + step
+            before, last, second = last, second, second + step
             largest = np.maximum(np.max(np.abs(second), axis=0), 1e-6 * np.min(self.unit))
             close = SETTLED if not self.affine else CLOSE
             if np.all(~np.isfinite(step) | (np.abs(step) <= close * largest)):
                 break
             if self.affine and np.all(~np.isfinite(step) | (np.abs(step) <= FAR * self.unit[:, None])):
                 break
+            if np.all(~np.isfinite(step) | (np.abs(second - before) <= SETTLED * largest)):
+                break  # to and fro: there is no solution on either side of where a reaction turns round
             if np.all(~np.isfinite(step) | (np.abs(step) <= CLOSE * DIFFERENCE * largest)):
                 break
             back = self.solve(at, second, senses, sliding=True)  # most are there after one step, as this walk tells
@@ -279,6 +281,12 @@ class FreeMotion:
         second = np.where(turned, np.nan, second)
         return Accelerated(second, self.solve(at, second, senses, sliding=True), turned, converged, at.onsets)
 
+    def begun(self, at: Moment) -> Array:
+        """Where the search for the accelerations begins: at 0, on the side of it to which they are driven."""
+        if self.affine:
+            return np.zeros_like(at.q)
+        return np.copysign(0.0, -self.missing(at, np.zeros_like(at.q), self.beginning(at)))
+
     def inertia(self, at: Moment) -> Array:
         """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""
         return self._linearised(at, np.zeros_like(at.q), self.beginning(at))[1]
@@ -288,7 +296,7 @@ class FreeMotion:
         count, lanes = at.q.shape
         steps = self.unit[:, None] + np.zeros((count, lanes))
         if not self.affine:
-            steps = DIFFERENCE * np.maximum(np.abs(second), 1e-2 * steps)
+            steps = ahead(second, steps)
         else:
             steps = np.maximum(np.maximum(steps, self.trial[:, None]), np.abs(second))
         tried = [second] + [second + np.where(np.arange(count)[:, None] == i, steps, 0.0) for i in range(count)]
@@ -305,6 +313,11 @@ class FreeMotion:
         slopes = (found[:, 1:] - found[:, :1]) / steps[None]
         miss: Array = found[:, 0]
         return miss, slopes
+
+
+def ahead(second: Array, unit: Array) -> Array:
+    """By how much accelerations are changed to tell a derivative: away from 0, where reactions may turn round."""
+    return np.copysign(DIFFERENCE * np.maximum(np.abs(second), 1e-2 * unit), second)
 
 
 def _solved(matrix: Array, right: Array) -> Array:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.course import Courses
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.integrate import Integration, Solution
+from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import FINEST, integration_of, rates_of
 from trunnion.dynamics.rates import Dynamics, Layout
 from trunnion.dynamics.result import motion_findings
+from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import Places, initial_row, places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError

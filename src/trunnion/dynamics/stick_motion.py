@@ -1,37 +1,33 @@
 """Motion in time of several free coordinates whose joints stick one by one, with contacts of joints in play or without.
 
 A step ends where a joint that slides comes to rest, and where one that sticks breaks away. Which joints stick from then
-on is the answer of a complementarity of friction and acceleration: what sticks needs no more than what resists it, what
-begins to slide does so in the sense that its friction opposes.
+on is the answer of a complementarity of friction and acceleration, and so is which of them lock where there is none:
+see `cases`.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import OdeSolver
 
+from trunnion.dynamics.cases import IDLE, SLACK, Case, Cases, Senses
 from trunnion.dynamics.contact_motion import ContactMotion, Crossing, Dense
-from trunnion.dynamics.integrate import Event
+from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
-from trunnion.dynamics.sticking import StickingMotion
+from trunnion.dynamics.sticking import RANK, StickingMotion
 
 __all__ = ["StickMotion"]
 
 Array = NDArray[np.float64]
-Senses = tuple[int, ...]
 
-MEET = 1e-8  # of a typical speed: joints that are as slow may stick
-SLACK = 1e-10  # of a typical speed, of a share: what a joint may miss before it counts
-BRINK = 1e-8  # of a share: as near to its end a joint breaks away
-TINY = 1e-9  # of the accelerations: what is none
-SOON = 1e-3  # of a typical time: how far ahead one looks for the sense of what does not move now
-IDLE = 1e-7  # of a typical speed for a typical rate: what moves a joint as little does not, now
-MOST_CASES = 729  # of joints that stick or slide, which are tried one after the other
+AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
+FEW = 8  # steps after which one looks for other accelerations
+SEVERAL = "simulate.several_accelerations"
 
 
 @dataclass
@@ -45,6 +41,8 @@ class StickMotion(ContactMotion):
         self.now = 0.5 * self.breaks[0]
         self._crossed: int | None = None
         self._slow = np.sqrt(self.free.typical)
+        self._resting = False  # whether nothing moves
+        self._steps = 0
 
     def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
         """The state of a row, with contacts and joints as they are."""
@@ -90,80 +88,90 @@ class StickMotion(ContactMotion):
 
     # ---- what sticks and what slides --------------------------------------------------------------------------
 
+    @property
+    def _cases(self) -> Cases:
+        return Cases(self.free, float(np.max(self.pace)))
+
     def _decided(self, time: float, row: Array) -> bool:
-        """Find what sticks and what slides from here; `row` is what it is after it."""
-        before, crossed = self.senses, self._crossed
+        """Find what sticks, slides and locks from here; `row` is what it is after it."""
+        before, crossed, n = self.senses, self._crossed, self.layout.coordinates
         at, self._crossed = self.moment(time, row, 0.0, self.now), None
         with np.errstate(all="ignore"):
-            ways, speeds = self.free.ways(at)
-            slow = {k for k, speed in enumerate(speeds) if abs(speed) <= MEET or k == crossed}
-            slow |= {k for k, sense in enumerate(before) if sense == 0}
-            may = [k for k in sorted(slow) if np.max(np.abs(ways[k])) > IDLE]  # others turn round as they must
-            base = [0 if k in may else int(np.sign(speed)) or 1 for k, speed in enumerate(speeds)]
-            brink = crossed is not None and before[crossed] == 0
-            senses = self._consistent(at, base, may, brink)
-            if senses is not None and (idle := [k for k in slow if k not in may and k != crossed]):
-                ahead = self._ahead(at._replace(senses=senses))
-                base = [int(np.sign(ahead[k])) or 1 if k in idle else sense for k, sense in enumerate(base)]
-                senses = self._consistent(at, base, may, brink)
-            if senses is None:
+            case = self._cases.of(at, before, crossed)
+            if case.senses is None:
+                if self._locked(time, row, case.base):
+                    return self._decided(time, row)
                 self._stop("no_acceleration", time, row)
                 return False
-            sticks, n = [k for k in may if senses[k] == 0], self.layout.coordinates
-            self.senses = senses
+            sticks = [k for k in case.may if case.senses[k] == 0]
+            self.senses = case.senses
             if not before or any(before[k] for k in sticks):
                 row[n : 2 * n] = self.free.stopped(self.moment(time, row, 0.0, self.now), sticks)
-        for k in may:
-            was, joint = before[k] if before else None, self.free.resisted[k]
-            if senses[k] == 0 and was != 0:
-                self.solution.events.append(Event(time, "stick", joint))
-            elif senses[k] != 0 and not was:
-                self.solution.events.append(Event(time, "break-away", joint, float(senses[k])))
+            for k in case.may:
+                was, joint = before[k] if before else None, self.free.resisted[k]
+                if case.senses[k] == 0 and was != 0:
+                    self.solution.events.append(Event(time, "stick", joint))
+                elif case.senses[k] != 0 and not was:
+                    self.solution.events.append(Event(time, "break-away", joint, float(case.senses[k])))
+            self._rests(time, row, sticks)
+            self._others(time, row, case)
         return True
 
-    def _ahead(self, at: Moment) -> Array:
-        """Relative speeds of all joints a little later, as the accelerations have it."""
-        second, soon = self.motion.accelerate(at).second, SOON / np.max(self.pace)
-        rate = at.rate + second * soon
-        walk = self.motion.walk(at._replace(q=at.q + 0.5 * (at.rate + rate) * soon, rate=rate), second)
-        return self.free.speeds(walk, 1)[:, 0]
+    def _locked(self, time: float, row: Array, senses: Senses) -> bool:
+        """Let joints lock, if they can: they stop at once."""
+        found = self._cases.lock(self.moment(time, row, 0.0, self.now), senses)
+        if found is None:
+            return False
+        energy = self._stopped(time, row, found.rate, 0.0, self.now)
+        for k in found.joints:  # the whole loss is told once
+            figure = energy if k == found.joints[0] else np.nan
+            self.solution.events.append(Event(time, "lock", self.free.resisted[k], figure, "J"))
+        self.senses = found.senses
+        return True
 
-    def _consistent(self, at: Moment, base: Sequence[int], may: Sequence[int], brink: bool) -> Senses | None:
-        """The senses of all joints of which those that may stick agree with shares and accelerations; None: no case
-        does. From all that may sticking, those are let go that cannot, and taken back that would turn round."""
-        senses, tried = list(base), set[Senses]()
-        while tuple(senses) not in tried:
-            tried.add(tuple(senses))
-            objections = self._objections(at, senses, may, brink and len(tried) == 1)
-            if objections == {}:
-                return tuple(senses)
-            for k, sense in (objections or {}).items():
-                senses[k] = sense
-        if 3 ** len(may) > MOST_CASES:
-            return None
-        for case in itertools.product((0, 1, -1), repeat=len(may)):
-            for k, sense in zip(may, case, strict=True):
-                senses[k] = sense
-            if tuple(senses) not in tried and self._objections(at, senses, may, False) == {}:
-                return tuple(senses)
-        return None
+    def _failed(
+        self, time: float, row: Array, sense: float, now: float, message: str | None
+    ) -> tuple[float, Array, None]:
+        """As of any motion; where there are no accelerations ahead, joints lock."""
+        with np.errstate(all="ignore"):
+            ahead = row.copy()
+            soon, at = AHEAD / float(np.max(self.pace)), self.moment(time, row, sense, now)
+            n, second = self.layout.coordinates, np.nan_to_num(self.free.accelerate(at).second[:, 0])
+            ahead[:n] += soon * row[n : 2 * n]
+            ahead[n : 2 * n] += soon * second
+            causes = {self._cause(when, one, sense, now) for when, one in ((time, row), (time + soon, ahead))}
+            if causes & {"locked", "no_acceleration"} and self._locked(time, row, self.senses):
+                return time, row, None
+        return super()._failed(time, row, sense, now, message)
 
-    def _objections(self, at: Moment, senses: Sequence[int], may: Sequence[int], brink: bool) -> dict[int, int] | None:
-        """Joints that do not do what a case says, with what they seem to do instead; None: it has no accelerations.
-        brink: whether those break away that are at the end of their share."""
-        found = self.motion.accelerate(at._replace(senses=tuple(senses)))
-        pulls = self.free.pulls(found.back.walk, 1)[:, 0] / self.free.typical
-        small = TINY * max(1.0, float(np.max(np.abs(found.second / self.motion.unit[:, None]))))
-        stuck = [k for k in may if senses[k] == 0]
-        if not np.all(found.converged & ~found.turned):
-            moved = [k for k in stuck if abs(pulls[k]) > small]  # nothing can hold it
-            worst = max(moved, key=lambda k: abs(pulls[k]), default=None)
-            return None if worst is None else {worst: int(np.sign(pulls[worst]))}
-        if stuck:
-            assert found.shares is not None
-            shares = found.shares[:, 0]
-            most = float(np.max(np.abs(shares[stuck])))
-            if most > 1.0 + SLACK or (brink and most > 1.0 - BRINK):
-                return {k: int(np.sign(shares[k])) for k in stuck if abs(shares[k]) >= most * (1.0 - BRINK)}
-        back = [k for k in may if senses[k] * pulls[k] < -small]
-        return {min(back, key=lambda k: senses[k] * pulls[k]): 0} if back else {}
+    def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
+        """Whether all free coordinates rest from here on, in what resists the joints."""
+        n, before, self._resting = self.layout.coordinates, self._resting, False
+        at = self.moment(time, row, 0.0, self.now)
+        if set(self.motion.names) != set(self.motion.system.mechanism.drivers) or not sticks:
+            return
+        ways = self.free.ways(at)[0][sticks]
+        if np.linalg.matrix_rank(ways, tol=RANK) < n or np.any(np.abs(row[n : 2 * n]) > IDLE * self.pace):
+            return
+        row[n : 2 * n], self._resting = 0.0, True
+        if not before:
+            self._note(time, "rest")
+
+    def _add(self, stretch: Stretch) -> None:
+        super()._add(stretch._replace(resting=self._resting))
+
+    # ---- other accelerations ----------------------------------------------------------------------------------
+
+    def _others(self, time: float, row: Array, case: Case) -> None:
+        """Tell where there are several accelerations."""
+        if SEVERAL not in self.solution.notes and self._cases.several(self.moment(time, row, 0.0, self.now), case.may):
+            self.solution.notes[SEVERAL] = {"time": time}
+
+    def _held(self, solver: OdeSolver, row: Array) -> None:
+        """Look for other accelerations at the end of every few steps."""
+        super()._held(solver, row)
+        self._steps += 1
+        if self._steps % FEW:
+            return
+        with np.errstate(all="ignore"):
+            self._others(float(solver.t), row, Case(self.senses, (), self.senses))

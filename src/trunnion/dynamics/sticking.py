@@ -19,15 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.state import DIFFERENCE, ROUNDS, SETTLED, Accelerated, FreeMotion, Moment
+from trunnion.dynamics.state import ROUNDS, SETTLED, Accelerated, FreeMotion, Moment, ahead
 from trunnion.solve.backward import Backward, Sense
 from trunnion.solve.forward import Forward
 
-__all__ = ["StickingMotion", "least_shares"]
+__all__ = ["StickingMotion", "least_shares", "repeated"]
 
 Array = NDArray[np.float64]
 
 RANK = 1e-9  # of the largest: singular values below are 0
+FAR = 1e6  # times what is typical: an acceleration at which inertia is all there is
 HELD = 1e-8  # of the accelerations: a joint that sticks has none but for rounding
 
 
@@ -64,32 +65,60 @@ class StickingMotion(FreeMotion):
                  for name, pair in zip(self.resisted, pairs, strict=True)]  # fmt: skip
         return np.array(found, float).reshape(len(found), lanes)
 
-    def accelerate(self, at: Moment, guess: Array | None = None) -> Accelerated:
-        """The accelerations, with the shares that hold what sticks; NaN where there are none."""
+    def accelerate(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
+        """The accelerations, with the shares that hold what sticks; NaN where there are none. pulls: relative
+        accelerations that the joints that stick are to have, (joint that sticks, 1), rad/s² or m/s²; none if not given.
+
+        Where the search ends on a side of where a reaction turns round on which there is no answer, or on which more
+        acceleration takes less effort, it is begun from far away on other sides.
+        """
+        found = self.searched(at, guess, pulls)
+        left = found.turned | (~found.converged & (found.shares is None))
+        if not np.any(left):
+            return found
+        second = np.nan_to_num(found.second)
+        for start in self.far(second).T:
+            other = self.searched(at, np.where(left, start[:, None], second), pulls)
+            better = left & other.converged & ~other.turned
+            second = np.where(better, other.second, second)
+            left &= ~better
+            if not np.any(left):
+                return self.searched(at, second, pulls)
+        return found
+
+    def far(self, second: Array) -> Array:
+        """Accelerations far beyond some, one coordinate at a time, (coordinate, lane)."""
+        size = FAR * np.maximum(self.unit, np.max(np.abs(second), axis=1))
+        return np.hstack([np.diag(size), -np.diag(size)])
+
+    def searched(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
+        """See `accelerate`, from one place."""
         sticks = [k for k, sense in enumerate(at.senses) if sense == 0]
         if not sticks:
             return super().accelerate(at, guess)
         count, lanes = at.q.shape
         numbers = np.zeros((count + len(sticks), lanes))
-        if guess is not None:
-            numbers[:count] = guess
+        numbers[:count] = self.begun(at) if guess is None else guess
         unit = np.concatenate([self.unit, np.ones(len(sticks))])[:, None]
-        turned = np.zeros(lanes, bool)
+        turned, wanted = np.zeros(lanes, bool), np.zeros((len(sticks), 1)) if pulls is None else pulls
         for _ in range(ROUNDS):
             missed, slopes = self._linear(at, numbers, sticks)
+            missed[count:] -= wanted
             for _ in range(2):  # most are there after the second step with the same slopes
                 step, turned = _steps(slopes, missed, numbers, unit, self.typical[sticks])
                 numbers = numbers + step
                 largest = np.maximum(np.max(np.abs(numbers / unit), axis=0), 1e-6)
                 settled = ~np.isfinite(step) | (np.abs(step / unit) <= SETTLED * largest)
                 missed, back = self._missed(at, numbers, sticks)
+                missed[count:] -= wanted
                 if np.all(settled):
                     break
             if np.all(settled):
                 break
         left = np.abs(missed[count:]) / self.typical[sticks][:, None]
         converged = np.all(np.isfinite(numbers) & (np.abs(step / unit) <= HELD * largest), axis=0)
-        converged &= np.all(left <= HELD * np.maximum(1.0, largest), axis=0)
+        able = np.max(np.abs(slopes[:count, count:]), axis=0) > 0.0  # others have nothing to be held by
+        converged &= np.all(left <= HELD * np.maximum(np.where(able, 1.0, 1e-6), largest), axis=0)
         shares = np.repeat(np.array(at.senses, float)[:, None], lanes, axis=1)
         shares[sticks] = numbers[count:]
         return Accelerated(np.where(turned, np.nan, numbers[:count]), back, turned, converged, at.onsets, shares)
@@ -108,9 +137,9 @@ class StickingMotion(FreeMotion):
         """What is missed (equation, lane), and its derivatives (equation, number, lane)."""
         count, lanes = at.q.shape
         size = len(numbers)
-        steps = DIFFERENCE * np.maximum(np.abs(numbers), np.append(1e-2 * self.unit, np.ones(size - count))[:, None])
+        steps = ahead(numbers, np.append(self.unit, 1e2 * np.ones(size - count))[:, None])
         tried = [numbers, *(numbers + np.where(np.arange(size)[:, None] == i, steps, 0.0) for i in range(size))]
-        many = _repeated(at, size + 1)
+        many = repeated(at, size + 1)
         found = self._missed(many, np.concatenate(tried, axis=1), sticks)[0].reshape(size, size + 1, lanes)
         return found[:, 0], (found[:, 1:] - found[:, :1]) / steps[None]
 
@@ -129,11 +158,19 @@ class StickingMotion(FreeMotion):
         found: Array = at.rate[:, 0] - np.sqrt(self.unit) * change
         return found
 
+    def turning(self, at: Moment, second: Array, sticks: Sequence[int], shares: Array) -> NDArray[np.bool_]:
+        """Lanes in which more acceleration takes less effort, under shares of what resists some joints,
+        (joint, lane); one lane of `at`."""
+        count = len(self.names)
+        many = repeated(at, second.shape[1])
+        slopes = self._linear(many, np.vstack([second, shares]), sticks)[1][:count, :count] * self.unit[None, :, None]
+        return np.asarray(np.linalg.det(np.moveaxis(slopes, -1, 0)) <= 0.0)
+
     def ways(self, at: Moment) -> tuple[Array, Array]:
         """How relative speeds follow from the rates, (joint, coordinate), and these speeds, (joint,), all by what is
         typical; one lane."""
         count = len(self.names)
-        many = _repeated(at, count + 2)._replace(rate=np.hstack([np.eye(count, count + 1, 1), at.rate]))
+        many = repeated(at, count + 2)._replace(rate=np.hstack([np.eye(count, count + 1, 1), at.rate]))
         speeds = self.speeds(self.walk(many, np.zeros((count, count + 2))), count + 2)
         speeds = speeds / np.sqrt(self.typical)[:, None]
         return (speeds[:, 1:-1] - speeds[:, :1]) * np.sqrt(self.unit), speeds[:, -1]
@@ -146,7 +183,7 @@ class StickingMotion(FreeMotion):
         return found * np.sqrt(self.unit) * np.sqrt(self.unit)[:, None]
 
 
-def _repeated(at: Moment, times: int) -> Moment:
+def repeated(at: Moment, times: int) -> Moment:
     """The same state in more lanes."""
     q, rate, integral, bristles = (np.tile(part, (1, times)) for part in (at.q, at.rate, at.integral, at.bristles))
     return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles)
@@ -168,21 +205,26 @@ def _steps(
 
 
 def _step(slopes: _Slopes, efforts: Array, pulls: Array, shares: Array) -> tuple[Array, bool]:
-    """Step of accelerations and shares of one lane, scaled, and whether more acceleration takes less effort."""
-    nothing = np.full(len(efforts) + len(pulls), np.nan)
-    if not np.linalg.det(slopes.mass) > 0.0:
-        return nothing, True
-    answer = np.linalg.solve(slopes.mass, np.column_stack([slopes.shares, efforts]))
-    by_shares, free = answer[:, :-1], answer[:, -1]
-    left, sizes, _ = np.linalg.svd(slopes.ways, full_matrices=False)
-    left = left[:, sizes > RANK]
-    # the relative accelerations that can be told apart are to become 0: W s = c
-    own = left.T @ slopes.ways @ by_shares
-    wanted = left.T @ (pulls - slopes.ways @ free) + own @ shares
-    if len(shares) == left.shape[1] and np.linalg.det(slopes.ways @ by_shares) < 0.0:
-        return nothing, True
-    change = least_shares(own, wanted) - shares
-    return np.append(-(free + by_shares @ change), change), False
+    """Step of accelerations and shares of one lane, scaled, and whether more acceleration takes less effort.
+
+    The accelerations are x + Z z, x those of the joints that stick and Z what these leave free; the shares are what
+    E − T leaves to them outside the columns of ∂E/∂q̈ Z, so that ∂E/∂q̈ itself may be singular. A joint that nothing
+    resists, as nothing presses on it, is not held.
+    """
+    able = np.max(np.abs(slopes.shares), axis=0) > 0.0
+    left, sizes, right = np.linalg.svd(slopes.ways * able[:, None])
+    rank, count = int(np.sum(sizes > RANK)), len(efforts)
+    known = -right[:rank].T @ ((left[:, :rank].T @ (pulls * able)) / sizes[:rank])
+    free = slopes.mass @ right[rank:].T
+    whole = np.block([[slopes.mass, slopes.shares], [slopes.ways, np.zeros((len(pulls), len(pulls)))]])
+    over = np.linalg.det(right[rank:] @ free) if len(pulls) > rank else np.linalg.det(whole) * (-1.0) ** rank
+    if not np.all(np.linalg.svd(free, compute_uv=False) > 0.0):
+        return np.full(count + len(pulls), np.nan), True
+    outside = np.linalg.svd(free)[0][:, count - rank :].T
+    own, rest = outside @ slopes.shares, efforts + slopes.mass @ known
+    change = least_shares(own, own @ shares - outside @ rest) - shares
+    along = np.linalg.lstsq(free, -rest - slopes.shares @ change, rcond=None)[0]
+    return np.concatenate([known + right[rank:].T @ along, change]), bool(over < 0.0)
 
 
 def least_shares(ways: Array, wanted: Array) -> Array:

@@ -43,11 +43,11 @@ __all__ = [
     "POWERS",
     "Rub",
     "Tables",
-    "fits",
     "numbers",
     "rubs_of",
     "scale_of",
     "tabulated",
+    "unfit",
 ]
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ class Tables:
 
 def tabulated(motion: FreeMotion, known: Places) -> Tables | None:
     """The tables of a motion; None where its forces are not functions of one coordinate and its speed."""
-    if not fits(motion) or motion.cycle.duration <= 0:
+    if unfit(motion) or motion.cycle.duration <= 0:
         return None
     way = (0.0, known.period) if known.period is not None else known.limits
     edges = np.unique(np.concatenate([way, [bend for bend in known.bends if way[0] < bend < way[1]]]))
@@ -132,16 +132,22 @@ def tabulated(motion: FreeMotion, known: Places) -> Tables | None:
     return Tables(motion, parted, found, known.period, rubs, error)
 
 
-def fits(motion: FreeMotion) -> bool:
+def unfit(motion: FreeMotion) -> str:
+    """Why the forces are not functions of one coordinate and its speed; empty if they are."""
     mechanism = motion.system.mechanism
-    if len(mechanism.drivers) != 1 or motion.followed or any(gear.teeth for gear in mechanism.gears.values()):
-        return False
+    if len(mechanism.drivers) != 1:
+        return "several drivers move"
+    if motion.followed:
+        return "a group is followed along the motion"
+    if any(gear.teeth for gear in mechanism.gears.values()):
+        return "a gear pair has teeth"
     timed = {"time", "speed"} | {name for name, table in mechanism.tables.items() if table.over == "time"}
-    entries = mechanism.parameter_set.entries.values()
-    if any(entry.varies and any(name in timed or RATE in name for name in entry.quantity.names) for entry in entries):
-        return False
+    for entry in mechanism.parameter_set.entries.values():
+        if entry.varies and any(name in timed or RATE in name for name in entry.quantity.names):
+            return f"{entry.path} depends on time or speed"
     wound = any(spring.joint in mechanism.drivers for spring in mechanism.springs.values())  # it counts whole turns
-    return not (wound and motion.cycle.periodic and motion.system.turns(motion.names[0]))
+    wound = wound and motion.cycle.periodic and motion.system.turns(motion.names[0])
+    return "a spring winds up at the driven joint" if wound else ""
 
 
 def _parted(edges: Array, widest: float) -> Array:

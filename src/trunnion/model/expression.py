@@ -101,6 +101,10 @@ class Expression:
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
 
+    def renamed(self, names: Mapping[str, str]) -> Expression:
+        """The same that speaks of some by other names."""
+        return _expression(self._tree, {key: names.get(str(one), one) for key, one in self._operands.items()})
+
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
         return _dimension(self._tree, self._operands, names)
@@ -137,6 +141,10 @@ def parse(text: str) -> Expression:
         raise UnitError(f"'{text}' cannot be read", "check operators and parentheses") from None
     if depth > MAX_DEPTH:
         raise UnitError(f"'{text[:40]}…' is nested too deeply", "split it in dimensions")
+    return _expression(tree, operands)
+
+
+def _expression(tree: ast.expr, operands: Mapping[str, Literal | str]) -> Expression:
     evaluate = _compile(tree, operands)
     names = tuple(dict.fromkeys(one for one in operands.values() if isinstance(one, str) and one not in RESERVED))
     found = [one for one in operands.values() if isinstance(one, Literal)]

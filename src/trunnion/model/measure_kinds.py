@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from trunnion.model.expression import MOTION, PLACED, RESERVED
 from trunnion.model.joint_parts import freedoms
 from trunnion.model.measure_parts import Measure
 from trunnion.model.measure_table import MEASURES
@@ -15,7 +16,7 @@ from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError
 if TYPE_CHECKING:
     from trunnion.model.fields import Fields
 
-__all__ = ["course_kind", "drive_kind", "figure_kind", "is_place", "place_kind"]
+__all__ = ["course_kind", "drive_kind", "figure_kind", "is_place", "place_kind", "placed_measures"]
 
 
 def drive_kind(mechanism: Fields) -> Kind:
@@ -70,3 +71,23 @@ def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, D
         if quantity.check(dimensions) in KINDS["time"].dimensions:
             return KINDS["time"]
     return drive_kind(mechanism)
+
+
+def placed_measures(mechanism: Fields) -> dict[str, str]:
+    """Measures that are a place or a speed at every position, by the names that a load has for these."""
+    others = {*RESERVED, *MOTION, *mechanism.tables, *mechanism.dimensions}
+    found = {name: _placed(mechanism, one) for name, one in mechanism.measures.items() if name not in others}
+    return {name: placed for name, placed in found.items() if placed}
+
+
+def _placed(mechanism: Fields, measure: Measure) -> str:
+    if measure.at is not None or measure.over is not None or measure.statistic or measure.along:
+        return ""
+    joint = mechanism.effective_joints.get(measure.subject)
+    if measure.kind in ("rotation", "slide"):
+        return f"{measure.subject}{PLACED}{measure.kind}"
+    if measure.kind == "rate" and joint is not None:
+        freedom = "rotation" if "rotation" in freedoms(joint.type) else "slide"
+        return f"{measure.subject}{PLACED}{freedom}_velocity"
+    component = {"point": "", "velocity": "velocity_"}.get(measure.kind)
+    return f"{measure.subject}{PLACED}{component}{measure.axis}" if component is not None and measure.axis else ""

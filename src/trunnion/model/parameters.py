@@ -22,7 +22,7 @@ from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.dimensions import evaluation_order
 from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.limits import Limits
-from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind
+from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind, placed_measures
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameter_names import ERRORS, ParameterNames
 from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, Spring, freedoms
@@ -121,14 +121,23 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
             yield from _walk(getattr(loop_joint, key), f"loop.{loop_joint.joint}.{key}", ("loop", row, key))
     for name, joint in mechanism.effective_joints.items():
         yield from _joint_entries(mechanism, name, joint)
+    placed = placed_measures(mechanism)
     for section in ("gears", "drivers", "tables", "loads", "springs", "assembly", "measures"):
         for name, part in getattr(mechanism, section).items():
             stated = part.complete() if isinstance(part, Driver | Gear) else part
             for entry in _walk(stated, f"{section}.{name}", (section, name)):
                 kind = _narrow(mechanism, section, name, entry)
                 moving = {*MOTION, *mechanism.tables}
-                varies = section == "loads" and any(one in moving or PLACED in one for one in entry.quantity.names)
-                yield Entry(entry.path, entry.location, entry.quantity, kind, varies=varies)
+                quantity = _of_motion(entry.quantity, placed) if section == "loads" else entry.quantity
+                varies = section == "loads" and any(one in moving or PLACED in one for one in quantity.names)
+                yield Entry(entry.path, entry.location, quantity, kind, varies=varies)
+
+
+def _of_motion(quantity: Quantity, placed: Mapping[str, str]) -> Quantity:
+    """A quantity of a load that speaks of motions by the names of results where it speaks of measures."""
+    if quantity.expression is None or placed.keys().isdisjoint(quantity.names):
+        return quantity
+    return replace(quantity, expression=quantity.expression.renamed(placed))
 
 
 def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:

@@ -75,7 +75,7 @@ def told_at(measure: Measure) -> str:
     if measure.everywhere:
         return ""
     if measure.in_time:
-        return ": it is of a motion in time; measured starts are fitted by trunnion.simulate and scipy.optimize"
+        return ": it is of a motion in time; state its measured values under starts: in the mapping, for identify"
     return f": the model gives it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
 
 

@@ -17,28 +17,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.file import entries_of, text_of
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.ends import held
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
+from trunnion.studio.margin import margin_of
 from trunnion.studio.message import packed
 from trunnion.studio.missing import missing
+from trunnion.studio.overlays import centres, circles, place_motion, point_motion, transmission
+from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
+from trunnion.studio.variants import overlaid
 from trunnion.studio.words import spoken
 from trunnion.version import __version__
-from trunnion.views.common.cycle import abscissa
 from trunnion.views.cycle.scene import scene
 
 __all__ = ["ANSWERS", "answer", "examples"]
@@ -49,7 +50,6 @@ Array = NDArray[np.float64]
 STEPS = 360
 MOST_STEPS = 3600
 KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
-MARGIN_KNOWN = 10.0  # a larger one is told as this
 
 
 def answer(request: bytes) -> bytes:
@@ -139,12 +139,11 @@ def _model(asked: Asked) -> dict[str, Any]:
     }
     if result is None:
         return head
-    ideal = state.result(steps, False) if asked.get("ideal") and friction else None
-    shown = scene(result, ideal, max_positions=MOST_STEPS)
+    shown = scene(result, max_positions=MOST_STEPS)
     return head | {
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
-        **_margin(result, friction and bool(rubbing(state.run.system))),
+        **margin_of(result, friction and bool(rubbing(state.run.system))),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         "figures": [
             [one.label, one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"]
@@ -162,25 +161,11 @@ def _row(one: Finding) -> dict[str, Any]:
 def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
     """Every number in SI, by path; of what is half drawn those that can be read."""
     if state.mechanism:
-        return _plain(state.mechanism.parameters())
+        return plain(state.mechanism.parameters())
     try:
-        return _plain(drawn.numbers)
+        return plain(drawn.numbers)
     except MechanismError:
         return {}
-
-
-def _plain(numbers: Mapping[str, Any]) -> dict[str, float]:
-    return {path: float(np.ravel(primal(value))[0]) for path, value in numbers.items()}
-
-
-def _margin(result: Any, rubs: bool) -> dict[str, Any]:
-    """The locking margin over the cycle, the least and where it is; none where nothing rubs."""
-    margin = np.where(result["status"].values <= Status.LOCKED, result["locking_margin"].values, np.nan)
-    if not rubs or np.all(np.isnan(margin)):
-        return {"margin": None, "margin_least": None}
-    index = int(np.nanargmin(margin))
-    least = {"value": min(float(margin[index]), MARGIN_KNOWN), "beyond": bool(margin[index] > MARGIN_KNOWN)}
-    return {"margin": np.minimum(margin, MARGIN_KNOWN), "margin_least": least | {"at": abscissa(result).say(index)}}
 
 
 # ---- dragging -----------------------------------------------------------------------------------------------------
@@ -218,8 +203,8 @@ def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int
 
 def _shown(state: Loaded, steps: int, index: int) -> Sketch:
     """The sketch of a model at a position of its cycle."""
-    tracks = _columns(_walked(state, {}, steps), steps)["points"]
-    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in tracks.items()}
+    paths = tracks(_walked(state, {}, steps).walk, steps)
+    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
     if any(not np.isfinite(part) for place in places.values() for part in place):
         what = "cannot be assembled at the position that is shown"
         raise MechanismError(Finding(what, remedy="go to another position"))
@@ -238,24 +223,10 @@ def _walked(state: Loaded, values: Mapping[str, float], steps: int) -> Backward:
 
 def _columns(back: Backward, steps: int) -> dict[str, Any]:
     """What the page draws of a walk in the plane."""
-    walk, column = back.walk, partial(_column, steps=steps)
-    points = _tracks(walk, steps)
-    angles = {link: column(np.arctan2(one.frame.s, one.frame.c)) for link, one in walk.motions.items()}
-    return {"points": points, "angles": angles, "efforts": {name: column(one) for name, one in back.efforts.items()}}
-
-
-def _column(number: Any, steps: int) -> Array:
-    return np.broadcast_to(np.asarray(primal(number), float), (steps,))
-
-
-def _tracks(walk: Forward, steps: int) -> dict[str, dict[str, Array]]:
-    """Where the points of the links are over the cycle."""
-    return {
-        f"{link}.{name}": {
-            axis: _column(part, steps) for axis, part in zip("xy", walk.point(link, name).place, strict=True)
-        }
-        for link, name in walk.system.points
-    }
+    walk, whole = back.walk, partial(column, steps=steps)
+    points = tracks(walk, steps)
+    angles = {link: whole(np.arctan2(one.frame.s, one.frame.c)) for link, one in walk.motions.items()}
+    return {"points": points, "angles": angles, "efforts": {name: whole(one) for name, one in back.efforts.items()}}
 
 
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
@@ -301,8 +272,47 @@ def _assemblies(asked: Asked) -> dict[str, Any]:
     if state.run.system.mechanism.space != "planar":
         return {"others": []}
     found = other_assemblies(state.run, state.entries or {}, steps)
-    rows = [{"name": name, "gestures": gestures, "points": _tracks(walk, steps)} for name, gestures, walk in found]
+    rows = [{"name": name, "gestures": gestures, "points": tracks(walk, steps)} for name, gestures, walk in found]
     return {"others": rows}
+
+
+# ---- what is laid over ---------------------------------------------------------------------------------------------
+
+
+def _layers(asked: Asked) -> dict[str, Any]:
+    """What the sheet shows over the mechanism, of what is wanted: motion of a point, and in the plane instant centres,
+    friction circles, transmission angles.
+    """
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    result = state.result(steps, asked.get("friction") != "off")
+    wanted, point = set(asked.get("wanted") or ()), str(asked.get("point"))
+    found: dict[str, Any] = {"point": point_motion(result, point) if point in result["point"].values else None}
+    if state.run.system.mechanism.space != "planar":
+        return found
+    if asked.get("place"):
+        found["point"] = place_motion(result, asked["place"])
+    if "circles" in wanted:
+        found["circles"] = circles(result, rubbing(state.run.system))
+    if wanted & {"centres", "transmission"}:
+        walk = _walked(state, {}, steps).walk
+        found |= {name: tell(walk, steps) for name, tell in WALKED.items() if name in wanted}
+    return found
+
+
+WALKED = {"centres": centres, "transmission": transmission}
+
+
+def _compare(asked: Asked) -> dict[str, Any]:
+    """Other variants, `{text, friction}` each, laid over the present result, and the table of figures against it."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    friction = asked.get("friction") != "off"
+    present, rubs = state.result(steps, friction), friction and bool(rubbing(state.run.system))
+    return {
+        "others": [
+            overlaid(loaded(str(other["text"])), other.get("friction") != "off", steps, present, rubs)
+            for other in asked["others"]
+        ]
+    }
 
 
 def _export(asked: Asked) -> dict[str, Any]:
@@ -319,4 +329,6 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "edit": _edit,
     "export": _export,
     "assemblies": _assemblies,
+    "layers": _layers,
+    "compare": _compare,
 }

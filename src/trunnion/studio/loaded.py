@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
-from trunnion.cycle.analyse import analyse
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
@@ -52,6 +51,8 @@ class Loaded:
         """Its cycle with or without friction; MechanismError where it has none."""
         if self.mechanism is None:
             raise MechanismError(self.findings)
+        from trunnion.cycle.analyse import analyse  # not for the first picture
+
         mechanism = self.mechanism if friction else self.mechanism.with_friction("off")
         return analyse(mechanism, steps)
 

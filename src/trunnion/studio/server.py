@@ -12,12 +12,11 @@ import contextlib
 import json
 import mimetypes
 import secrets
+import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from threading import Lock
+from threading import Event, Lock
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -27,6 +26,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from trunnion.files import whole
+from trunnion.studio.page import document, found
 
 __all__ = ["Studio"]
 
@@ -34,8 +34,9 @@ COOKIE = "trunnion_studio"
 MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
 MOST_FILES = 500
+PACE = 1e-3  # s that loading runs before files of the page are served between; Python's own 5 ms add up over them
+PATIENCE = 1.0  # s that the rest waits for the page
 ANSWERING = Lock()  # one after another: the second about a text finds what was read for the first
-PLACES = {"studio": ("trunnion.studio", "web"), "web": ("trunnion.views", "web")}
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Studio:
     opened: str | None
     port: int
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    seen: Event = field(default_factory=Event)  # that the page has what its first picture is drawn of
 
     @property
     def address(self) -> str:
@@ -57,8 +59,10 @@ class Studio:
         routes = [
             Route("/", self._guarded(self._page)),
             Route("/files", self._guarded(self._files)),
-            Route("/file/{name}", self._guarded(self._read)),
-            Route("/file/{name}", self._guarded(self._write), methods=["PUT"]),
+            Route("/file/{name:path}", self._guarded(self._read)),
+            Route("/first/{name:path}", self._guarded(self._first)),
+            Route("/thumbnail/{name}", self._guarded(_thumbnail)),
+            Route("/file/{name:path}", self._guarded(self._write), methods=["PUT"]),
             Route("/{place:str}/{name:path}", self._guarded(self._asset)),
             WebSocketRoute("/socket", self._socket),
         ]
@@ -66,16 +70,16 @@ class Studio:
 
     @contextlib.asynccontextmanager
     async def _warmed(self, app: Starlette) -> AsyncIterator[None]:
-        """While it runs. What answers is loaded beside, and looks at the opened model, while the browser opens."""
-        warming = asyncio.get_running_loop().run_in_executor(None, self._look)
-        yield
-        await warming
-
-    def _look(self) -> None:
-        text = ""
+        """While it runs. What answers is loaded beside, and solves the opened model, while the browser opens."""
+        pace, text = sys.getswitchinterval(), ""
+        sys.setswitchinterval(PACE)
         with contextlib.suppress(ValueError, OSError):
-            text = self._model(self.opened or "").read_text(encoding="utf-8")
-        _answered(json.dumps({"ask": "model", "text": text}))
+            text = self._text(self.opened or "")
+        warming = asyncio.get_running_loop().run_in_executor(None, _look, text, self.seen)
+        warming.add_done_callback(lambda _: sys.setswitchinterval(pace))
+        yield
+        self.seen.set()
+        await warming
 
     # ---- who may ask ----------------------------------------------------------------------------------------------
 
@@ -110,19 +114,18 @@ class Studio:
 
     async def _page(self, request: Request) -> Response:
         nonce = secrets.token_urlsafe(16)
-        text = _found("studio", "index.html").read_text(encoding="utf-8").replace("{{nonce}}", nonce)
         policy = (
             f"default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'unsafe-inline'; "
             "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; "
             "form-action 'none'; frame-ancestors 'none'"
         )
         headers = {"Content-Security-Policy": policy, "Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
-        return Response(text, media_type="text/html; charset=utf-8", headers=headers)
+        return Response(document(nonce), media_type="text/html; charset=utf-8", headers=headers)
 
     async def _asset(self, request: Request) -> Response:
         place, name = request.path_params["place"], request.path_params["name"]
         with contextlib.suppress(LookupError, OSError, ValueError):
-            content = _found(place, name).read_bytes()
+            content = found(place, name).read_bytes()
             kind = "text/javascript" if name.endswith(".js") else mimetypes.guess_type(name)[0]
             headers = {"X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
             return Response(content, media_type=kind or "application/octet-stream", headers=headers)
@@ -151,14 +154,28 @@ class Studio:
             return self._model(name).is_file()
         return False
 
+    def _text(self, name: str) -> str:
+        """The text of a model of the folder; ValueError or OSError if it cannot be had."""
+        path = self._model(name)
+        if path.stat().st_size > MOST_BYTES:
+            raise ValueError(f"'{path.name}' is larger than {MOST_BYTES:,} bytes")
+        return path.read_text(encoding="utf-8")
+
     async def _read(self, request: Request) -> Response:
         try:
-            path = self._model(request.path_params["name"])
-            if path.stat().st_size > MOST_BYTES:
-                raise ValueError(f"'{path.name}' is larger than {MOST_BYTES:,} bytes")
-            return PlainTextResponse(path.read_text(encoding="utf-8"))
+            return PlainTextResponse(self._text(request.path_params["name"]))
         except (ValueError, OSError) as error:
             return JSONResponse({"error": _reason(error)}, status_code=404)
+
+    async def _first(self, request: Request) -> Response:
+        """A model's text with what its first picture is drawn of, as an answer to a question."""
+        try:
+            text = self._text(request.path_params["name"])
+        except (ValueError, OSError) as error:
+            return JSONResponse({"error": _reason(error)}, status_code=404)
+        content = await run_in_threadpool(_placed, text)
+        self.seen.set()
+        return Response(content, media_type="application/octet-stream")
 
     async def _write(self, request: Request) -> Response:
         try:
@@ -186,25 +203,49 @@ class Studio:
                     await socket.send_bytes(await run_in_threadpool(_answered, question))
 
 
+async def _thumbnail(request: Request) -> Response:
+    """The small picture of an example, as an answer to a question."""
+    from trunnion.studio.answers import examples
+
+    text = examples().get(request.path_params["name"])
+    if text is None:
+        return PlainTextResponse("There is no such example.", status_code=404)
+    headers = {"Cache-Control": "max-age=3600"}
+    content = await run_in_threadpool(_small, text)
+    return Response(content, media_type="application/octet-stream", headers=headers)
+
+
+def _small(text: str) -> bytes:
+    from trunnion.studio.message import packed
+    from trunnion.studio.thumbnails import thumbnail
+
+    with ANSWERING:
+        return packed(thumbnail(text))
+
+
+def _look(text: str, seen: Event) -> None:
+    """Load what answers, the first picture before the rest, and have the model solved before the page asks for it."""
+    _placed(text)
+    seen.wait(PATIENCE)  # to load the rest beside would hold up the page
+    import trunnion.studio.answers  # noqa: F401  # not while answers are being made: the page may ask for the picture
+
+    _answered(json.dumps({"ask": "model", "text": text}))
+
+
+def _placed(text: str) -> bytes:
+    from trunnion.studio.message import packed
+    from trunnion.studio.placed import placed
+
+    with ANSWERING:
+        return packed(placed(text))
+
+
 def _answered(question: str) -> bytes:
     """The answer to a question; what it takes is loaded with the first."""
     from trunnion.studio.answers import answer
 
     with ANSWERING:
         return answer(question.encode())
-
-
-def _found(place: str, name: str) -> Traversable:
-    """A file of the page; LookupError for what is none."""
-    if place not in PLACES or not name or any(part in ("", ".", "..") for part in name.split("/")) or "\\" in name:
-        raise LookupError(name)
-    package, folder = PLACES[place]
-    found = files(package) / folder
-    for part in name.split("/"):
-        found = found / part
-    if not found.is_file():
-        raise LookupError(name)
-    return found
 
 
 def _reason(error: Exception) -> str:

@@ -67,6 +67,7 @@ def add_point(sketch: Sketch, given: Given) -> str:
     begin(sketch)
     point = letter(sketch)
     put(sketch, str(given["link"]), point, vector(given["at"]))
+    sketch.made = ("points", f"{given['link']}.{point}")  # and so its velocity and acceleration are shown
     return f"Add point {point}"
 
 

@@ -23,7 +23,7 @@ __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report
 REPORTS = {
     "cycle": "cycle.report", "tolerance": "tolerance.report", "allocation": "allocation.allocation",
     "comparison": "compare.report", "identification": "identify.report",
-    "motion": "motion.report",
+    "motion": "motion.report", "play": "play.report", "sweep": "sweep.report", "assembly": "assembly.report",
 }  # fmt: skip
 FIGURES = {
     "cycle": "cycle.plots", "sweep": "sweep.figure", "play": "play.figure", "assembly": "assembly.figure",

@@ -77,6 +77,15 @@ assert.equal(fields.findingsOf(found, ["links", "bar"]).length, 1);
 assert.deepEqual(fields.partOf({ where: "links.bar.mass" }, { links: { bar: {} } }), { kind: "links", name: "bar" });
 assert.equal(fields.partOf({ where: "drivers" }, {}), null);
 
+// ---- the locking margin in words
+const { told } = await load("studio/words.js");
+assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 0), "4 here, least 0.5 at 90°");
+assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 1), "none here, least 0.5 at 90°");
+assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 2), "0.5 here: it locks, least 0.5 at 90°");
+assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 3), "> 10 here, least 0.5 at 90°");
+assert.equal(told([10], { value: 10, beyond: true, at: "0°" }, 7), "> 10 everywhere");
+assert.equal(told(null, null, 0), "—");
+
 // ---- answers
 const header = JSON.stringify({ ask: "model", points: { A: { x: { column: [1, 2] } } }, list: [1, null] });
 const text = new TextEncoder().encode(header.padEnd(Math.ceil(header.length / 4) * 4));

@@ -85,7 +85,8 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
         placed = [one for one, _ in _placed_dimensions(mechanism)]
         shown = ", ".join(dict.fromkeys([placed[0], placed[-2]]))
         remedy = f"name the motion of a joint or a point as the columns of a result do: {shown} …"
-        return Finding(f"'{source}' refers to the measure '{name}', which is not known to loads", path, remedy)
+        what = f"'{source}' refers to the measure '{name}', which is no coordinate or speed at every position"
+        return Finding(what, path, remedy)
     if name not in MOTION and name not in mechanism.tables:
         remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
         return Finding(what, path, remedy)

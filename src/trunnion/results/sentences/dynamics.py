@@ -17,6 +17,17 @@ DYNAMICS: dict[str, Sentence] = {
         "{driver} comes to rest {times:#time}, for the last time at {time:~s}: {given:~{unit}} act on it then, "
         "and it breaks away from {needed:~{unit}} on",
     ),
+    "simulate.none_starts": Sentence(
+        WARNING,
+        "nothing starts: what acts needs {share:.2%} of what resists it at rest in {joint}, and no more in the other "
+        "joints",
+        "use a stronger motor or a gear, lower the friction, or begin elsewhere",
+    ),
+    "simulate.all_rest": Sentence(
+        NOTE,
+        "all free drivers come to rest {times:#time}, for the last time at {time:~s}: what acts then needs {share:.2%} "
+        "of what resists it at rest in {joint}, and no more in the other joints",
+    ),
     "simulate.range": Sentence(
         WARNING,
         "{driver} reaches {coordinate:.6g} {unit}, the end of its stated range, at {time:~s}: the motion ends there",
@@ -70,6 +81,18 @@ DYNAMICS: dict[str, Sentence] = {
         WARNING,
         "the mechanism locks as it runs, at {time:~s}: it stops at once, and loses {energy:~J}",
         "see `trunnion locking` for where and by how much",
+    ),
+    "simulate.joints_lock": Sentence(
+        WARNING,
+        "{joints} {count:#locks/lock} as the mechanism runs, {times:#time}, first at {time:~s}: {count:#it stops/they "
+        "stop} at once, {energy:~J} is lost, and what is still free moves on",
+        "see `trunnion locking` for where and by how much",
+    ),
+    "simulate.several_accelerations": Sentence(
+        WARNING,
+        "from {time:~s} on there are several accelerations: friction that grows with the acceleration allows others "
+        "than that which is followed (Painlevé's paradox)",
+        "lower the friction or the inertia behind the joints that could lock",
     ),
     "simulate.centred": Sentence(
         NOTE,

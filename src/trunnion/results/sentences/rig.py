@@ -229,9 +229,9 @@ IDENTIFY = {
     ),
     "fit.not_repeated": Sentence(
         WARNING,
-        "no turn is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
+        "no {one} is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
         "intervals are too narrow if the data are filtered",
-        "record several turns",
+        "record several {one}s",
     ),
     "fit.freedom": Sentence(
         NOTE,

@@ -18,7 +18,7 @@ from trunnion.rig.identification.identifiability import Combination, Inseparable
 from trunnion.rig.identification.misfit import MisfitCause, OwnSize
 from trunnion.rig.identification.number_text import amount, share
 from trunnion.rig.identification.outstanding import Outstanding, outstanding
-from trunnion.rig.identification.uncertainty import RANDOM, quantile
+from trunnion.rig.identification.uncertainty import RANDOM, STATED, quantile
 from trunnion.rig.reading.log import few_digits
 from trunnion.rig.reading.measurement import zeros_of_files
 from trunnion.rig.reading.units_taken import read_as
@@ -103,9 +103,10 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
             remedy = f"see {odd.channel} in {odd.condition}, whose residual stands out"
         phrases = {"times_told": _times(times), "remedy": remedy}
         yield finding_for("fit.conditions_disagree", where, severity=severity, phrases=phrases, times=times)
-    single = [block for block in problem.blocks if block.fitted and not block.repeats]
+    single = [block for block in problem.blocks if block.fitted and not block.known]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
-        yield finding_for("fit.not_repeated", "data")
+        phrases = {"one": "start" if judged.found.measurement.of_starts else "turn"}
+        yield finding_for("fit.not_repeated", "data", phrases=phrases)
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
     if freedom.size and np.min(freedom) < FEW:
         least = round(float(np.min(freedom)))
@@ -387,7 +388,7 @@ def _sensors(judged: Assessment) -> Iterator[Finding]:
     names, shares = judged.budget
     for p, unknown in enumerate(problem.model.unknowns):
         for source, part in zip(names, shares[p], strict=True):
-            if source not in (*RANDOM, "resolution") and part > MOSTLY:
+            if source not in (*RANDOM, STATED, "resolution") and part > MOSTLY:
                 remedy = "calibrate that sensor better"
                 if source.startswith(OWN):
                     remedy = "record a longer unloaded stretch in each file, or more files"
@@ -408,7 +409,7 @@ def _exact(judged: Assessment) -> Iterator[Finding]:
     for one in judged.problem.blocks:
         accuracy = one.course.accuracy
         if one.fitted:
-            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain)
+            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain or accuracy.stated)
             known[one.channel] = known.get(one.channel, False) or stated
     bare = [channel for channel, stated in known.items() if not stated]
     forces = [channel for channel in bare if not measures[channel].of_motion]

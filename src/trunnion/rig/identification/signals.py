@@ -29,7 +29,7 @@ from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
-__all__ = ["Courses", "Model", "Said", "SeatedModel"]
+__all__ = ["ConditionSaid", "Courses", "Model", "Said", "SeatedModel", "said_of"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array
@@ -45,6 +45,10 @@ class Said:
 
     value: Array
     slope: Array
+
+
+# what the model says in one condition by channel, statuses of its positions, where a sense changes
+ConditionSaid = tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -100,9 +104,7 @@ class Model:
             for low in range(0, len(alike), most):
                 yield alike[low : low + most]
 
-    def _batch(
-        self, part: Sequence[int], at: Array
-    ) -> list[tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]]:
+    def _batch(self, part: Sequence[int], at: Array) -> list[ConditionSaid]:
         many, size = len(self.unknowns), len(self.phases[part[0]])
         values = self._values(part, at)
         time = self._times(part, at)
@@ -115,10 +117,10 @@ class Model:
             status = status_of(found, shape) if isinstance(found, Backward) else pose_status(found, shape)
             courses = {name: self._course(measure, found) for name, measure in self.measures.items()}
             turned = self._turned(found, shape) if isinstance(found, Backward) else np.zeros(shape, bool)
-        rows: list[tuple[Mapping[str, Said], NDArray[np.int8], NDArray[np.bool_]]] = []
+        rows: list[ConditionSaid] = []
         for k in range(len(part)):
             own = slice(k * many, (k + 1) * many)
-            said = {name: _said(number, shape, own) for name, number in courses.items()}
+            said = {name: said_of(number, shape, own) for name, number in courses.items()}
             rows.append((said, np.max(status[own], axis=0), np.any(turned[own], axis=0)))
         return rows
 
@@ -272,7 +274,7 @@ class Model:
         return Dual(phase * duration, phase * slope)
 
 
-def _said(number: Number, shape: tuple[int, ...], own: slice) -> Said:
+def said_of(number: Number, shape: tuple[int, ...], own: slice) -> Said:
     """The rows of one condition: the number itself, and one derivative a row."""
     width = np.shape(primal(number))[-1:] or (1,)
     full = (shape[0], width[0] if width != (1,) else shape[1])

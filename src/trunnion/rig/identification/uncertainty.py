@@ -17,11 +17,22 @@ from scipy import special
 from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.fit import FitProblem
 
-__all__ = ["CONFIDENCE", "RANDOM", "Covariances", "Test", "correlation_factors", "left_over", "quantile", "spread_of"]
+__all__ = [
+    "CONFIDENCE",
+    "RANDOM",
+    "STATED",
+    "Covariances",
+    "Test",
+    "correlation_factors",
+    "left_over",
+    "quantile",
+    "spread_of",
+]
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 NEIGHBOURS = 5  # frequencies that a power is smoothed over
+STATED = "stated uncertainty"  # of values of starts
 RANDOM = ("scatter", "conditions", "misfit")
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
 UNLIKELY = 0.001  # a chance below which the model is said not to fit
@@ -157,18 +168,20 @@ def spread_of(problem: FitProblem, x: Array) -> Covariances:
     rows = problem.jacobian(x)
     information = rows.T @ rows
     inverse, null = _inverse(information)
-    turns, freedom, follows, own = _between_turns(problem, x, inverse)
+    turns, freedom, follows, alone = _between_turns(problem, x, inverse)
     test = lack_of_fit(problem, x)
     parts = {"scatter": turns}
-    apart = _apart(problem, x, inverse, own)
+    apart = _apart(problem, x, inverse, alone)
     if np.any(apart > 1):
         wider = np.sqrt(apart - 1)
         parts["conditions"] = turns * np.outer(wider, wider)
-        between = np.full(count, max(len(own) - 1.0, 1.0))
+        between = np.full(count, max(len(alone) - 1.0, 1.0))
         freedom = _joined([(turns, freedom), (parts["conditions"], between)])
-    steps = _steps(problem, x, inverse)
-    if np.any(steps):
-        parts["resolution"] = steps
+    for source, stated in (("resolution", False), (STATED, True)):
+        own = [k for k, block in enumerate(problem.blocks) if (block.course.accuracy.stated > 0) == stated]
+        steps = _steps(problem, x, inverse, own)
+        if np.any(steps):
+            parts[source] = steps
     left, pieces = _left_over(problem, x, inverse, again=False)
     if np.any(left):
         freedom = _joined([(turns + parts.get("conditions", 0.0), freedom), (left, np.full(count, pieces))])
@@ -187,10 +200,10 @@ def spread_of(problem: FitProblem, x: Array) -> Covariances:
     return Covariances(information, inverse, null, parts, freedom, test, follows, apart[: problem.count])
 
 
-def _steps(problem: FitProblem, x: Array, inverse: Array, blocks: Sequence[int] | None = None) -> Array:
+def _steps(problem: FitProblem, x: Array, inverse: Array, blocks: Sequence[int]) -> Array:
     """Covariance by readings that stick to steps: of a mean that does not get finer by more turns; of some blocks."""
     total = np.zeros_like(inverse)
-    for k in range(len(problem.blocks)) if blocks is None else blocks:
+    for k in blocks:
         block = problem.blocks[k]
         if block.fitted and block.unresolved:
             columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k)) * block.unresolved
@@ -337,6 +350,11 @@ def lack_of_fit(problem: FitProblem, x: Array) -> Test:
         mean += float(np.mean(each)) + sum(float(np.mean(one[1])) for one in found if len(one[1]) != turns)
         least = sum(one[2] for one in found)
         variance += max(float(np.var(each, ddof=1)), least) * (1 + 1 / turns)
+    stated = [k for k, one in enumerate(problem.blocks) if one.fitted and one.stated and np.any(problem.masks[k])]
+    if stated:  # of normal errors of these sizes: χ² of as many
+        weighed = [problem.misses(x, k, problem.blocks[k].mean)[0] / problem.blocks[k].unresolved for k in stated]
+        value, mean = value + float(np.sum(np.square(weighed))), mean + len(stated)
+        variance += 2 * len(stated) * (1 - min(problem.count / mean, 0.5))
     mean -= min(float(problem.count), 0.5 * mean)
     if mean <= 0 or variance <= 0:
         return Test(float("nan"), float("nan"), float("nan"))
@@ -384,7 +402,7 @@ def _left_over(problem: FitProblem, x: Array, inverse: Array, again: bool) -> tu
     pieces, gaps = 0.0, []
     for k, block in enumerate(problem.blocks):
         mask = problem.masks[k]
-        if not block.fitted or block.repeats != again or not np.any(mask):
+        if not block.fitted or block.known != again or not np.any(mask):
             continue
         gap = np.where(mask, problem.misses(x, k, block.mean), 0.0)
         power = _smooth(_powers(gap))

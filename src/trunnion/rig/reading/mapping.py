@@ -5,21 +5,14 @@ Strict, like a model file: an unknown key, a wrong unit or a name that is not th
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, Tag, ValidationError, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import AfterValidator, BeforeValidator, Field, Tag, WithJsonSchema, model_validator
 
-from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part, forms, problem
-from trunnion.model.file import Lines, place, read_entries
-from trunnion.model.findings import schema_findings
-from trunnion.model.names import nearest
 from trunnion.model.quantity import Angle, AnyQuantity, Dimensionless, Quantity, Rate, Time
-from trunnion.model.units import ANGLE, KINDS, UnitError
+from trunnion.model.units import KINDS, UnitError
 from trunnion.rig.reading.scale import MeasureText, SensorScale, scale
 from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number, UnitText, alike, dimensions
 
@@ -32,15 +25,13 @@ __all__ = [
     "FixedNumber",
     "FixedTime",
     "FromData",
-    "Mapped",
+    "Measured",
+    "Start",
     "TimeBase",
     "Zero",
-    "read_mapping",
 ]
 
 Sign = Literal[1, -1]
-NOUN = "a mapping file"
-START = "write trunnion-data: 1, then files, time, angle and channels"
 
 
 class FromData(Part):
@@ -267,6 +258,78 @@ class File(Part):
         return self
 
 
+def _several(value: object) -> object:
+    """One value as a list of values."""
+    return value if isinstance(value, (list, tuple)) else [value]
+
+
+class Measured(Part):
+    """Values of one quantity of a start, one for each repetition of it, with the standard uncertainty of each."""
+
+    values: Annotated[
+        tuple[Number, ...],
+        BeforeValidator(_several),
+        Field(min_length=1, max_length=10_000),
+        WithJsonSchema({"type": ["number", "string", "array"], "items": {"type": ["number", "string"]}}),
+    ]
+    uncertainty: Number | None = None
+    accuracy: Accuracies = Accuracies()
+
+    @model_validator(mode="after")
+    def _known(self) -> Measured:
+        if self.uncertainty is not None and not self.uncertainty.value > 0:
+            raise problem("the standard uncertainty is not above zero", "write one such as 10 ms")
+        if self.uncertainty is None and len({one.value for one in self.values}) < 2:
+            remedy = "state the standard uncertainty of a value, uncertainty: 10 ms, or the values of several starts"
+            raise problem("the uncertainty of the value is unknown", remedy)
+        return self
+
+
+class Start(File):
+    """A start in place of cycles: what was set, a data file of it from the time at which it begins, and values that
+    were measured of it; `duration` is how long the model is followed where there is no file."""
+
+    file: str = ""
+    duration: FixedTime | None = None
+    measured: Mapping[MeasureText, Measured] = {}
+
+    @model_validator(mode="after")
+    def _whole(self) -> Start:
+        if not self.file and not self.measured:
+            raise problem("nothing was measured", "add measured: {…} or file: start-01.csv")
+        if self.file and self.over is None:
+            raise problem("'over' is missing: when the start begins in the file, and where it ends", "write [0 s, 3 s]")
+        if self.over is not None and (self.duration is not None or not self.file):
+            raise problem("'over' is of a file, in place of a duration", "keep one of them")
+        if self.angle is not None:
+            raise problem("a start has no angle: time names its positions", "remove it")
+        if self.duration is not None and not self.duration.evaluate() > 0:
+            raise problem("the duration is not above zero", "write the time that the start is followed, such as 3 s")
+        for measures, one in self.measured.items():
+            _check_units(measures, one)
+        return self
+
+    @property
+    def followed(self) -> float:
+        """How long it is followed, s; NaN for what the model states."""
+        if self.over is not None:
+            return self.over[1].value - self.over[0].value
+        return float("nan") if self.duration is None else float(self.duration.evaluate())
+
+
+def _check_units(measures: str, measured: Measured) -> None:
+    """Units that what is measured of a start cannot have."""
+    spread = [one for one in (measured.uncertainty, measured.accuracy.zero) if one is not None and one.value]
+    try:
+        found = {scale(measures, one.unit, None).unit for one in (*measured.values, *spread)}
+    except UnitError as error:
+        raise problem(
+            f"{measures}: {error.what}", error.remedy.replace("state the gain, such as 100 mV/", "write ")
+        ) from None
+    if len(found) > 1:
+        raise problem(f"{measures}: values in {' and '.join(sorted(found))}", "write all in units of one quantity")
+
+
 class Filter(Part):
     """Butterworth low-pass, forward and backward: without delay."""
 
@@ -281,9 +344,10 @@ class DataMapping(Part):
     name: str = ""
     notes: str = ""
     files: tuple[File, ...] = ()
+    starts: tuple[Start, ...] = ()
     time: TimeBase | None = None
     angle: AngleSource | None = None
-    channels: Annotated[Mapping[Name, Channel], Field(min_length=1)]
+    channels: Annotated[Mapping[Name, Channel], Field(min_length=1)] = {}
     set: Mapping[str, Setting] = {}
     filter: Filter | None = None
     cycle: FixedQuantity = Quantity.read("1 turn")
@@ -301,116 +365,14 @@ class DataMapping(Part):
                 name: entry.channels[name].of(one) if name in entry.channels else one
                 for name, one in self.channels.items()
             }
+        if isinstance(entry, Start):
+            changes["cycle"] = Quantity.read(f"{entry.followed!r} s")
         return self.model_copy(update=changes) if changes else self
 
     @property
     def timed(self) -> bool:
         """Whether the cycle is a time."""
         return self.cycle.check({}) == KINDS["time"].dimensions[0]
-
-
-class Mapped:
-    """A mapping with the folder that its files lie below, and the lines of its entries for findings."""
-
-    def __init__(self, mapping: DataMapping, folder: Path, file: str, lines: Lines, data: Mapping[str, Any]) -> None:
-        self.mapping, self.folder, self.file = mapping, folder, file
-        self._lines, self._data = lines, data
-
-    def placed(self, findings: list[Finding]) -> list[Finding]:
-        """Findings about the mapping with its file and line; those of other files as they are."""
-        return place(findings, self.file, self._lines, self._data) if self.file else findings
-
-
-def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any]) -> Mapped:
-    """A mapping from its file, or from plain data, whose files lie below the working folder.
-
-    MechanismError with every finding, each with file and line.
-    """
-    if isinstance(source, Mapping):
-        data, lines, file, folder = dict(source), Lines(), "", Path()
-    else:
-        path = Path(source)
-        data, lines = read_entries(path, NOUN, START)
-        file, folder = str(path), path.parent
-    try:
-        mapping = DataMapping.model_validate(data)
-        findings = [*_check(mapping), *_outside(mapping, folder)]
-    except ValidationError as error:
-        findings = [_explained(one, data) for one in schema_findings(error, DataMapping, data)]
-    if findings:
-        raise MechanismError(place(findings, file, lines, data) if file else findings)
-    return Mapped(mapping, folder, file, lines, data)
-
-
-def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
-    """A file of another kind is told as such."""
-    if finding.what == "'trunnion-data' is missing" and "trunnion" in data:
-        return Finding("is a model file, not a mapping file", "trunnion", "name the mapping, then the data files")
-    if finding.what == "'trunnion-data' is missing":
-        return Finding(finding.what, finding.where, "begin the file with trunnion-data: 1")
-    if finding.remedy == "see the examples of model files":
-        return Finding(finding.what, finding.where, "see the examples of mappings in docs/how-to/measured-data.md")
-    return finding
-
-
-def _check(mapping: DataMapping) -> Iterator[Finding]:
-    """What one part alone cannot tell."""
-    channels = mapping.channels
-    settings = {f"set.{key}": value for key, value in mapping.set.items()}
-    for number, file in enumerate(mapping.files):
-        settings |= {f"files.{number}.set.{key}": value for key, value in file.set.items()}
-    for where, value in settings.items():
-        if isinstance(value, FromData) and value.mean is not None and value.mean not in channels:
-            yield Finding(f"there is no channel '{value.mean}'", f"{where}.mean", nearest(value.mean, channels))
-    if mapping.cycle.check({}) not in (ANGLE, KINDS["time"].dimensions[0], None):
-        yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
-    elif not float(mapping.cycle.evaluate()) > 0:
-        yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
-    elif mapping.angle is None and not mapping.timed:
-        remedy = "add angle: {from: …}, or write cycle: as a time"
-        yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
-    for number, file in enumerate(mapping.files):
-        if file.angle is not None and mapping.angle is None:
-            what = "states a zero of the angle, but no column gives an angle"
-            yield Finding(what, f"files.{number}.angle", "add angle: {from: …}, or remove it")
-        yield from _check_channels(file, f"files.{number}.channels", channels)
-    source = mapping.angle.channel if mapping.angle else None
-    if source is not None and source not in channels:
-        yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
-    elif source is not None and not channels[source].measures.startswith("rate:"):
-        what = f"the channel '{source}' measures {channels[source].measures}, not a speed"
-        yield Finding(what, "angle.channel", "name a channel that measures rate:DRIVER")
-    base = mapping.time
-    if mapping.filter and base and base.rate and 2 * mapping.filter.cut_off.value >= base.rate.value:
-        what = f"a cut-off of {mapping.filter.cut_off.value:g} Hz, samples come at {base.rate.value:g} Hz"
-        yield Finding(what, "filter.cut_off", f"write less than half of that, {base.rate.value / 2:g} Hz")
-
-
-def _check_channels(file: File, where: str, channels: Mapping[str, Channel]) -> Iterator[Finding]:
-    """Channels of one file that are none of the mapping, or do not go together with it."""
-    for name, own in file.channels.items():
-        if name not in channels:
-            yield Finding(f"there is no channel '{name}'", f"{where}.{name}", nearest(name, channels))
-            continue
-        try:
-            own.of(channels[name])
-        except PydanticCustomError as error:
-            told = error.context or {}
-            yield Finding(error.message(), f"{where}.{name}", str(told.get("remedy", "")))
-
-
-def _outside(mapping: DataMapping, folder: Path) -> Iterator[Finding]:
-    """Files that are not below the folder of the mapping: a mapping is data from a stranger."""
-    home = folder.resolve()
-    for number, entry in enumerate(mapping.files):
-        try:
-            inside = not Path(entry.file).is_absolute() and (folder / entry.file).resolve().is_relative_to(home)
-        except (OSError, ValueError, RuntimeError):
-            inside = False
-        if not inside:
-            remedy = "put it there, or name it on the command line"
-            what = f"'{entry.file[:80]}' is not below the folder of the mapping"
-            yield Finding(what, f"files.{number}.file", remedy)
 
 
 def _check_spans(spans: Any) -> None:

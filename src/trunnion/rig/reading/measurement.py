@@ -46,13 +46,14 @@ class Accuracy:
     zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
-    of `zero` is the same in all files.
+    of `zero` is the same in all files. stated: of a value of one start, by itself.
     """
 
     zero: float = 0.0
     gain: float = 0.0
     resolution: float = 0.0
     own: float = 0.0
+    stated: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,10 +99,10 @@ class Signal:
     @cached_property
     def unresolved(self) -> float:
         """Standard uncertainty by the resolution, step/√12 (GUM F.2.2.1), where readings scatter by less than half a
-        step; more than that carries them over the steps, and their mean is finer."""
+        step; more than that carries them over the steps, and their mean is finer. Of a value what is stated of it."""
         step = self.accuracy.resolution
         if not step:
-            return 0.0
+            return self.accuracy.stated
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             scatter = float(np.nanmedian(self.scatter))
@@ -111,9 +112,10 @@ class Signal:
     def uncertainty(self) -> Array:
         """Standard uncertainty of the mean, (position,): scatter/√n, zero, gain and resolution.
 
-        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns.
+        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns of which nothing is stated.
         """
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
+        repeated = np.where((self.count == 1) & (self.accuracy.stated > 0), 0.0, repeated)
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
             known = np.square(self.accuracy.zero) + np.square(self.unresolved)
             return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2))
@@ -131,6 +133,8 @@ class Condition:
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
     known; own_zero: whether its file states it, in place of the zero that all share.
+    of_start: whether it is no cycle but a motion from its start, of which `duration` is what is followed, s, NaN for
+    what the model states; its turns are repetitions, its phases shares of that duration.
     """
 
     name: str
@@ -146,6 +150,7 @@ class Condition:
     duration: float = float("nan")
     zero: float = float("nan")
     own_zero: bool = False
+    of_start: bool = False
 
 
 def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:
@@ -176,33 +181,48 @@ class Measurement:
     findings: tuple[Finding, ...] = ()
     done: Sequence[str] = field(default_factory=tuple)
 
+    @property
+    def of_starts(self) -> bool:
+        """Whether it is of starts, in place of cycles."""
+        return any(one.of_start for one in self.conditions)
+
+    @property
+    def channels(self) -> dict[str, Signal]:
+        """The first course of each channel."""
+        return {name: course for one in reversed(self.conditions) for name, course in one.courses.items()}
+
 
 def dataset(measurement: Measurement) -> xr.Dataset:
     """Means over the turns with scatter and standard uncertainty, by condition, channel and position; SI.
 
     `set` has what was set, by the names of the model's values; NaN where a condition has none.
     """
-    conditions = measurement.conditions
-    first = conditions[0]
-    channels = list(first.courses)
+    conditions, first = measurement.conditions, measurement.channels
+    channels, phase = list(first), max((one.phase for one in conditions), key=len)
     names = list(dict.fromkeys(name for one in conditions for name in one.values))
     figures = {"mean": "mean", "scatter": "scatter", "uncertainty": "uncertainty", "turns": "count"}
     courses = {
-        name: np.array([[getattr(one.courses[channel], figure) for channel in channels] for one in conditions])
-        for name, figure in figures.items()
-    }
+        name: np.full((len(conditions), len(channels), len(phase)), 0 if name == "turns" else np.nan,
+                      np.intp if name == "turns" else float)
+        for name in figures
+    }  # fmt: skip
+    for i, one in enumerate(conditions):
+        for channel, course in one.courses.items():
+            for name, figure in figures.items():
+                row = getattr(course, figure)
+                courses[name][i, channels.index(channel), : len(row)] = row
     values = np.array([[one.values.get(name, np.nan) for name in names] for one in conditions])
     speeds = np.array([one.speed for one in conditions])
     arrays = {**courses, "set": values.reshape(len(conditions), len(names)), "speed": speeds}
     variables = described(arrays, VARIABLES)
-    units = encoded({"member_units": [first.courses[name].unit for name in channels]})
+    units = encoded({"member_units": [first[name].unit for name in channels]})
     for name in ("mean", "scatter", "uncertainty"):
         variables[name].attrs |= units
     labels = {"condition": [one.name for one in conditions], "channel": channels, "setting": names}
     attributes = {
         "name": measurement.name,
-        "measured": [first.courses[name].measures for name in channels],
+        "measured": [first[name].measures for name in channels],
         "done": list(measurement.done),
         "findings": finding_rows(measurement.findings),
     }
-    return dataset_of("measurement", variables, labels, attributes, described({"phase": first.phase}, VARIABLES))
+    return dataset_of("measurement", variables, labels, attributes, described({"phase": phase}, VARIABLES))

@@ -18,10 +18,12 @@ from trunnion.rig.reading.angle_steps import tell_slopes
 from trunnion.rig.reading.channels import ChannelReading, Zeroed, filtered, read_in, reading, resolution, shown, zeroed
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account, counted, told
-from trunnion.rig.reading.mapping import DataMapping, File, FromData, Mapped, Zero, read_mapping
+from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
+from trunnion.rig.reading.mapping_file import Mapped, read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
+from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, resampled, time_mean
@@ -59,6 +61,8 @@ def read_measured(
             failed = True
         findings += account.findings
         accounts.append(account)
+    starts = [(k, one) for k, one in enumerate(mapped.mapping.starts) if not one.file]
+    conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
     findings = mapped.placed([*findings, *notes, *_unused_zero(mapped, [entry for _, entry in entries])])
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
@@ -74,7 +78,8 @@ def read_measured(
 def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]:
     """What `read_measured` reads: the mapping file, the data files that it names or that are given in their place."""
     mapped = read_mapping(mapping)
-    named = list(files or ()) or [mapped.folder / entry.file for entry in mapped.mapping.files]
+    stated = (*mapped.mapping.files, *(one for one in mapped.mapping.starts if one.file))
+    named = list(files or ()) or [mapped.folder / entry.file for entry in stated]
     return [mapping, *named]
 
 
@@ -84,6 +89,8 @@ def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> s
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
+    if any(one.of_start for one in conditions):
+        return f"{each} start{'s' * (max(counts) > 1)}{where}"
     if sum(counts) < recorded - 2 * len(counts):
         where += f", {sum(counts):,}" if len(counts) > 1 else ""
         where += f" of {recorded:,.0f} recorded"
@@ -102,6 +109,11 @@ def _files(
     """
     entries = mapped.mapping.files
     named = [Path(one) for one in files or ()]
+    if mapped.mapping.starts and named:
+        what = "the mapping states starts, each with the file that it was recorded in"
+        raise MechanismError(mapped.placed([Finding(what, "starts", "name the files there")]))
+    if mapped.mapping.starts:
+        return [(mapped.folder / one.file, one) for one in mapped.mapping.starts if one.file], []
     if not named and not entries:
         finding = Finding(
             "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"
@@ -164,7 +176,7 @@ def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
     names = [one.name for one in conditions]
     for one in conditions:
         name = one.name
-        if names.count(name) > 1:
+        if names.count(name) > 1 and one.files:
             name = f"{name} ({', '.join(Path(file).stem for file in one.files)})"
         plain, number = name, 2
         while any(name == other.name for other in found):
@@ -271,7 +283,8 @@ class _File:
         mapping = self.mapping
         cycle = float(mapping.cycle.evaluate())
         if mapping.timed:
-            return self.line.seconds / cycle, 1.0, np.empty((0, 2))
+            begin = self.entry.over[0].value if isinstance(self.entry, Start) and self.entry.over else 0.0
+            return (self.line.seconds - begin) / cycle, 1.0, np.empty((0, 2))
         assert mapping.angle is not None
         source, speed = mapping.angle, None
         if source.channel is not None:
@@ -321,7 +334,7 @@ class _File:
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
             where = _where(setting)
-            if turns.numbers.size < 2:
+            if turns.numbers.size < 2 and not isinstance(self.entry, Start):
                 account.warn(
                     "data.turns.one",
                     where,
@@ -442,12 +455,13 @@ class _File:
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
-        return Condition(
+        found = Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, dimensions=known_as, duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
             own_zero=self.entry.angle is not None,
         )  # fmt: skip
+        return with_values(found, self.entry) if isinstance(self.entry, Start) else found
 
 
 def _where(setting: Setting) -> str:

@@ -18,7 +18,7 @@ from trunnion.rig.reading.mapping import DataMapping, File, FromData
 from trunnion.rig.reading.sensor_quantity import Dimensions, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
-__all__ = ["Setting", "dimension_of", "settings", "stated"]
+__all__ = ["Setting", "constant", "dimension_of", "name_of", "settings", "stated"]
 
 MOST = 500  # values that a column may state; more, and it is a measurement
 DIGITS = 9  # by which two of its values are the same
@@ -45,27 +45,27 @@ def stated(mapping: DataMapping, entry: File) -> dict[str, FromData | Quantity]:
     return {**mapping.set, **entry.set}
 
 
+def constant(mapping: DataMapping, entry: File) -> tuple[dict[str, float], dict[str, str], dict[str, Dimension]]:
+    """Numbers that were set, SI, by name; as they are written; dimensions of those that have a unit."""
+    numbers = {path: one for path, one in stated(mapping, entry).items() if isinstance(one, Quantity)}
+    known_as = {}
+    for path, one in numbers.items():
+        dimension = one.check({})
+        if dimension is not None and not (one.expression and one.expression.bare):
+            known_as[path] = dimension
+    values = {path: float(one.evaluate()) for path, one in numbers.items()}
+    return values, {path: str(one.source) for path, one in numbers.items()}, known_as
+
+
 def settings(mapping: DataMapping, entry: File, table: DataTable, line: Timeline, account: Account) -> list[Setting]:
     """The conditions of a file: one, or as many as the columns that state them take different values."""
-    values: dict[str, float] = {}
-    texts: dict[str, str] = {}
-    means: dict[str, str] = {}
-    columns: dict[str, FromData] = {}
-    known_as: dict[str, Dimension] = {}
-    for path, one in stated(mapping, entry).items():
-        if isinstance(one, Quantity):
-            values[path] = float(one.evaluate())
-            texts[path] = str(one.source)
-            dimension = one.check({})
-            if dimension is not None and not (one.expression and one.expression.bare):
-                known_as[path] = dimension
-        elif one.mean is not None:
-            means[path] = one.mean
-        else:
-            columns[path] = one
+    values, texts, known_as = constant(mapping, entry)
+    taken = {path: one for path, one in stated(mapping, entry).items() if isinstance(one, FromData)}
+    means = {path: one.mean for path, one in taken.items() if one.mean is not None}
+    columns = {path: one for path, one in taken.items() if one.mean is None}
     if not columns:
         everywhere = np.ones(line.seconds.size, dtype=np.bool_)
-        return [Setting(_name(texts), values, means, known_as, slice(0, everywhere.size), everywhere)]
+        return [Setting(name_of(texts), values, means, known_as, slice(0, everywhere.size), everywhere)]
     units = {path: one.unit or table.columns[str(one.column)].unit for path, one in columns.items()}
     factors = {path: _factor(path, unit, known_as, account) for path, unit in units.items()}
     raw = np.column_stack([line.rows(table.columns[str(one.column)].values) for one in columns.values()])
@@ -98,7 +98,7 @@ def settings(mapping: DataMapping, entry: File, table: DataTable, line: Timeline
             unit = units[path]
             own[path] = float(value) * factors[path]
             said[path] = f"{value:.6g} {unit}".strip()
-        found.append(Setting(_name(said), own, means, known_as, window, number[window] == k))
+        found.append(Setting(name_of(said), own, means, known_as, window, number[window] == k))
     return found
 
 
@@ -132,5 +132,5 @@ def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(np.rint(values * scale) / scale)
 
 
-def _name(texts: Mapping[str, str]) -> str:
+def name_of(texts: Mapping[str, str]) -> str:
     return ", ".join(f"{path} {text}" for path, text in texts.items())

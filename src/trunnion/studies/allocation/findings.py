@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.dynamics.measured import slow_motions
 from trunnion.errors import Finding, Severity
 from trunnion.results.attributes import attribute
 from trunnion.results.figure import Figure
@@ -47,8 +48,9 @@ def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> I
 
 def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     """Why there is no allocation; that it is proven; limits that are not kept on the mechanism itself."""
-    answer = found.answer
+    answer, study = found.answer, found.study
     yield from found.findings
+    yield from slow_motions(study.run, (of.measure for of in study.linear.measures), study.inputs.names)
     yield from answer.findings
     if not answer.found:
         return

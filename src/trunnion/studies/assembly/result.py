@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.cycle.summary import inputs
 from trunnion.errors import Coded, Finding
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
@@ -229,6 +230,7 @@ class Result:
             mechanism,
             self.system.plan.formula,
             assembling=self.of,
+            inputs=inputs(mechanism),
             summary=figure_rows(self.summary()),
             findings=finding_rows(self.findings),
             coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],

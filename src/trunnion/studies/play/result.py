@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.summary import references
+from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
@@ -110,6 +110,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         **cited(references(mechanism)),
         "measure_units": units,
         "limits": [measure.limit for measure in found.measures],
+        "inputs": inputs(mechanism),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, references
+from trunnion.cycle.summary import effort_units, inputs, references
 from trunnion.deprecation import renamed
+from trunnion.dynamics.measured import slow_motions
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
@@ -86,6 +87,7 @@ def sweep(
         if progress:
             progress(done)
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")
     for name in of_errors:
         arrays.pop(name, None)
@@ -150,6 +152,7 @@ def _dataset(
         **origin(mechanism, run.system.plan.formula, swept=names, steps=points.steps),
         "method": points.method.name,
         **cited(references(mechanism)),
+        "inputs": inputs(mechanism),
         "driver_units": effort_units(run.system),
         "findings": finding_rows(findings),
     }

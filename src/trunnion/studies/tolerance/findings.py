@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle import shared_dimensions
 from trunnion.cycle.summary import model_notes
+from trunnion.dynamics.measured import slow_motions
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import NOT_NEGATIVE
 from trunnion.results.figure import Figure
@@ -107,6 +108,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from shared_dimensions.findings(mechanism)
+    yield from slow_motions(study.run, (of.measure for of in study.linear.measures), study.inputs.names)
     yield from _play_sizes(outcome)
     yield from _measured(outcome)
     yield from _impossible(outcome)

@@ -3,7 +3,9 @@
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
-import { connection } from "./socket.js";
+import { carries, linkOf, textOf } from "./links.js";
+import { forgetPhoto } from "./photo.js";
+import { connection, decode } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
@@ -11,20 +13,19 @@ const TYPING = 350; // ms of quiet before typed text is solved
 let link;
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
-export const start = () => counted(begun());
+export function start() {
+  addEventListener("hashchange", () => carries(location.hash) && counted(openLink(location.hash)));
+  return counted(begun());
+}
 
 async function begun() {
   link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
     state.connected.value = open;
     if (open && untracked(() => state.text.value)) solve();
   });
-  const [about, files] = await Promise.all([link.ask("start", {}), fetch("/files").then((reply) => reply.json())]);
-  if (about && !about.error) state.about.value = about;
+  const files = await fetch("/files").then((reply) => reply.json());
   state.folder.value = { folder: files.folder, names: files.files };
-  const last = state.lastSheet();
-  const again = last?.folder === files.folder ? last.name : files.open;
-  if (again && (files.open === again || files.files.includes(again))) await openFile(again);
-  else openSheet({ name: null, saved: "", content: "" });
+  if (!sheets) await opened(files);
   const left = state.kept(null);
   if (state.fileName.value !== null && left && left.text !== left.saved) state.waiting.value = left.time;
   state.keepSteps();
@@ -32,6 +33,17 @@ async function begun() {
     state.friction.value; // another friction is another answer
     untracked(solve);
   });
+  const about = await link.ask("start", {}); // not before the picture, for it takes the whole of Python
+  if (about && !about.error) state.about.value = about;
+}
+
+/** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
+async function opened(files) {
+  if (carries(location.hash) && (await openLink(location.hash))) return;
+  const last = state.lastSheet();
+  const again = last?.folder === files.folder ? last.name : files.open;
+  if (again && (files.open === again || files.files.includes(again))) await openFile(again);
+  else openSheet({ name: null, saved: "", content: "" });
 }
 
 /** A promise that counts as work until it is settled. */
@@ -52,11 +64,11 @@ export function solve() {
 async function answered() {
   const sent = state.text.value;
   const friction = state.friction.value;
-  const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated", ideal: friction === "compare" };
+  const asked = { text: sent, steps: STEPS, friction: friction === "off" ? "off" : "stated" };
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
-  state.answer.value = { ...found, text: sent };
+  state.answer.value = { ...found, text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
   const count = found.scene?.count ?? 1;
   if (state.index.value >= count) state.index.value = 0;
@@ -123,6 +135,22 @@ export function drag(fields) {
   return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, ...fields });
 }
 
+/** Ask something else of the mechanism that is shown; null where it has changed meanwhile or there is no answer. */
+export async function askOf(kind, fields) {
+  const { text, friction, scene } = state.answer.value;
+  const found = await counted(link.ask(kind, { text, friction, steps: scene.count, ...fields }));
+  if (found?.error) state.say(found.error, true);
+  return found && !found.error && state.answer.value?.scene === scene ? found : null;
+}
+
+/** Take another text as a step to undo. */
+export function takeText(content, name) {
+  const before = present();
+  state.commit(name, before, { ...before, text: content });
+  state.say(`${name}.`);
+  return solve();
+}
+
 /** The other assemblies of the present text. */
 export async function assemblies() {
   const found = await link.ask("assemblies", { text: state.text.value, steps: STEPS });
@@ -153,11 +181,18 @@ function after(words) {
   solve();
 }
 
-/** Open a sheet with a text; its steps, and work that was left of it unsaved, are taken up again. */
-export function openSheet({ name, saved, content }) {
+let sheets = 0; // that were opened or asked for: the latest is the one that is shown
+
+/**
+ * Open a sheet with a text; its steps, and work that was left of it unsaved, are taken up again.
+ * `first` has what it is drawn of before it is solved.
+ */
+export function openSheet({ name, saved, content, first = null }) {
+  sheets += 1;
   const left = state.kept(name);
   const found = left && (name === null || left.text === saved || left.text !== left.saved) ? left : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
+  if (first?.tracks && first.text === state.text.value) showFirst(first);
   state.dialog.value = null;
   return solve();
 }
@@ -167,6 +202,7 @@ export function takeWaiting(open) {
   state.waiting.value = null;
   if (open) return openSheet({ name: null, saved: "", content: "" });
   state.forget(null);
+  forgetPhoto(null);
   return null;
 }
 
@@ -181,20 +217,54 @@ export function openFile(name) {
 }
 
 async function fetched(name) {
-  const reply = await fetch(`/file/${encodeURIComponent(name)}`);
+  const mine = (sheets += 1);
+  const reply = await fetch(`/first/${encodeURIComponent(name)}`);
   if (!reply.ok) return state.say(`${name} could not be read.`, true);
-  const content = await reply.text();
-  await openSheet({ name, saved: content, content });
+  const first = decode(await reply.arrayBuffer());
+  if (mine === sheets) await openSheet({ name, saved: first.text, content: first.text, first });
+}
+
+/** Draw a mechanism by where its points go, until its answer is there. */
+function showFirst({ text, entries, numbers, tracks }) {
+  state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
+  state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };
 }
 
 /** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo. */
 export function openText(content, words) {
-  const left = state.fileName.value === null && state.unsaved.value ? { name: words, ...present() } : null;
+  const kept = state.kept(null);
+  const before = state.fileName.value === null && state.unsaved.value ? present() : kept?.text !== kept?.saved ? kept : null;
+  const left = before && { name: words, text: before.text, places: before.places ?? {} };
   state.forget(null);
+  forgetPhoto(null);
   const opened = openSheet({ name: null, saved: content, content });
   if (left) state.past.value = [left];
   state.say(`${words}.`);
   return opened;
+}
+
+/** Open the model of a link, and take it out of the address; whether there was one. */
+export async function openLink(address) {
+  const mine = (sheets += 1);
+  history.replaceState(null, "", location.pathname);
+  try {
+    const content = await textOf(address);
+    if (mine === sheets) await openText(content, "The model of the link opened");
+    return true;
+  } catch (problem) {
+    state.say(problem.message, true);
+    return false;
+  }
+}
+
+/** The model as a link in the clipboard. */
+export async function copyLink() {
+  try {
+    await navigator.clipboard.writeText(await linkOf(state.text.value, `${location.origin}/`));
+    state.say("The link is in the clipboard. It holds the model itself; whoever opens it needs a studio of their own.");
+  } catch (problem) {
+    state.say(problem.message, true);
+  }
 }
 
 export function openExample(example) {
@@ -202,13 +272,14 @@ export function openExample(example) {
 }
 
 async function shipped({ name, title }) {
+  const mine = (sheets += 1);
   const found = await link.ask("example", { name });
-  if (!found) return;
+  if (!found || mine !== sheets) return;
   if (found.error) return state.say(found.error, true);
   await openText(found.text, `Example ${title || name} opened`);
 }
 
-/** Save under the name, or ask for one. */
+/** Save under the name, or ask for one; why it was refused, or "". */
 export function save(name = state.fileName.value) {
   return name ? counted(stored(name)) : void (state.dialog.value = "save");
 }
@@ -217,10 +288,10 @@ async function stored(name) {
   const content = state.text.value;
   const there = name === state.fileName.value ? await fetch(`/file/${encodeURIComponent(name)}`) : null;
   if (there?.ok && ![state.savedText.value, content].includes(await there.text()))
-    return state.say(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`, true);
+    return unsaved(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`);
   const reply = await fetch(`/file/${encodeURIComponent(name)}`, { method: "PUT", body: content });
   const told = await reply.json().catch(() => ({ error: `${name} could not be saved.` }));
-  if (told.error) return state.say(told.error, true);
+  if (told.error) return unsaved(told.error);
   if (told.saved !== state.fileName.value) state.forget(state.fileName.value);
   state.fileName.value = told.saved;
   state.savedText.value = content;
@@ -229,6 +300,12 @@ async function stored(name) {
   const { folder, names } = state.folder.value;
   state.folder.value = { folder, names: [...new Set([...names, told.saved])].sort() };
   state.say(`Saved as ${told.saved}.`);
+  return "";
+}
+
+function unsaved(words) {
+  state.say(words, true);
+  return words;
 }
 
 /** Export and hand the file to the browser. */

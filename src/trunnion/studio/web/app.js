@@ -5,6 +5,7 @@ import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
 import { Motion } from "./motion.js";
+import { PhotoCard } from "./photo.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
 import { Space } from "./space.js";
@@ -22,7 +23,7 @@ export function App() {
       <${ToolBar} />
       <div class="middle-part">
         <div class="window">
-          ${state.spatial.value ? html`<${Space} />` : html`<${Stage} /><${ZoomBar} /><${Welcome} />`}
+          ${state.spatial.value ? html`<${Space} />` : html`<${Stage} /><${ZoomBar} /><${Welcome} /><${PhotoCard} />`}
           <${Messages} />
         </div>
         <${Motion} />

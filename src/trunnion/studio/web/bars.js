@@ -1,6 +1,9 @@
 // The bars around the sheet: file, undo, friction and export above; tools at the left; readiness and margin below.
 
-import { exported, openText, redo, save, undo } from "./actions.js";
+import { copyLink, exported, openText, redo, save, undo } from "./actions.js";
+import { LAYERS } from "./layers.js";
+import { Margin } from "./margin.js";
+import { photoCard } from "./photo.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { nextTheme, theme } from "./theme.js";
@@ -8,7 +11,6 @@ import { TOOLS, choose, hint } from "./tools.js";
 import { Button, Icon, Menu, html } from "./ui.js";
 
 const EXPORTS = [["csv", "Table (CSV)"], ["png", "Picture (PNG)"], ["svg", "Picture (SVG)"], ["gif", "Animation (GIF)"], ["report", "Report (HTML)"], ["script", "Python script"]]; // prettier-ignore
-const LAYERS = [["reactions", "Reactions"], ["curves", "Paths of points"], ["names", "Names"], ["grid", "Grid"], ["others", "Other assemblies"]];
 
 export function TopBar() {
   const { past, future, fileName, unsaved, dialog } = state;
@@ -21,6 +23,7 @@ export function TopBar() {
       <${Button} label="Examples …" onClick=${() => (dialog.value = "examples")} />
       <${Button} label="Save" title="Save (Ctrl+S)" onClick=${() => save()} />
       <${Button} label="Save as …" onClick=${() => (dialog.value = "save")} />
+      <${Button} label="Copy a link" title="The model as a link, to be opened in another studio" disabled=${!state.text.value.trim()} onClick=${copyLink} />
     <//>
     <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}${unsaved.value ? html`<span class="changed" title="There are changes that are not saved"> · changed</span>` : ""}</span>
     <${Button} kind="icon" label=${before ? `Undo: ${before}` : "Undo"} title=${before ? `Undo: ${before} (Ctrl+Z)` : "Nothing to undo"} disabled=${!before} onClick=${undo}><${Icon} name="undo" /><//>
@@ -36,6 +39,7 @@ export function TopBar() {
       ${LAYERS.map(([name, label]) => html`<label class="tick"><input type="checkbox" checked=${state.layers.value[name]}
         onChange=${(event) => (state.layers.value = { ...state.layers.value, [name]: event.target.checked })} /> ${label}</label>`)}
       <label class="tick"><input type="checkbox" checked=${state.snapping.value} onChange=${(event) => (state.snapping.value = event.target.checked)} /> Snap to the grid</label>
+      <${Button} label="Picture behind the grid …" disabled=${state.spatial.value} onClick=${() => (photoCard.value = true)} />
     <//>
     <${Menu} label="Export" disabled=${!state.solved.value}>${EXPORTS.map(([what, label]) => html`<${Button} label=${label} onClick=${() => exported(what)} />`)}<//>
     <${Button} kind="icon" label=${`Colours: ${theme.value}`} title=${`Colours: ${theme.value}; click for the next`} onClick=${nextTheme}><${Icon} name=${theme.value} /><//>
@@ -79,15 +83,4 @@ export function BottomBar() {
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore
-}
-
-/** How many times the friction may grow until it locks. */
-function Margin() {
-  const { margin_least: least } = state.answer.value ?? {};
-  if (!state.solved.value) return html`<span class="margin"><b>Locking margin</b> —</span>`;
-  if (!least) return html`<span class="margin" title="Nothing rubs, so nothing locks"><b>Locking margin</b> no friction</span>`;
-  const told = `${least.beyond ? "> " : ""}${Number(least.value).toPrecision(3).replace(/\.?0+$/, "")}`;
-  const near = !least.beyond && least.value < 2;
-  const words = "So many times the friction may grow before this position locks; at 1 it locks.";
-  return html`<span class=${near ? "margin near" : "margin"} title=${words}><b>Locking margin</b> ${told}${least.at && !least.beyond ? ` at ${least.at}` : ""}</span>`;
 }

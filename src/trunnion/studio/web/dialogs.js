@@ -1,7 +1,9 @@
-// Dialogs: examples, files of the folder, saving under a name; files that are dropped.
+// Dialogs: files of the folder, saving under a name; files that are dropped.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { openExample, openFile, openText, save } from "./actions.js";
+import { openFile, openLink, openText, save } from "./actions.js";
+import { Examples } from "./gallery.js";
+import { carries } from "./links.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
@@ -21,37 +23,38 @@ function Frame({ children }) {
   </dialog>`;
 }
 
-function Examples() {
-  const [wanted, setWanted] = useState("");
-  const fits = ({ name, title }) => `${name} ${title}`.toLowerCase().includes(wanted.toLowerCase());
-  return html`<h2>Examples</h2>
-    <input type="search" aria-label="Search the examples" placeholder="Search" value=${wanted} onInput=${(event) => setWanted(event.target.value)} autofocus />
-    <ul class="list">
-      ${state.about.value.examples.filter(fits).map((one) => html`<li><button type="button" class="plain wide" onClick=${() => openExample(one)}>
-        <span>${one.title || one.name}</span><span class="of">${one.space === "spatial" ? "in space" : "planar"}</span></button></li>`)}
-    </ul>`; // prettier-ignore
-}
-
 function Open() {
   const { folder, names } = state.folder.value;
   const take = async ({ target }) => target.files[0] && openText(await target.files[0].text(), `${target.files[0].name} opened`);
+  const [wrong, setWrong] = useState("");
+  const link = async (event) => {
+    event.preventDefault();
+    const typed = event.target.elements.link.value.trim();
+    if (!carries(typed)) return setWrong("This is no link to a model: it has no #m= in it.");
+    if (!(await openLink(typed))) setWrong(state.notice.value.words);
+  };
   return html`<h2>Open</h2>
     <p class="calm">${folder}</p>
     <ul class="list">${names.map((name) => html`<li><button type="button" class="plain wide" onClick=${() => openFile(name)}>${name}</button></li>`)}</ul>
-    <label class="choice">A file from elsewhere <input type="file" accept=".yaml,.yml,.json,.txt" onChange=${take} /></label>`; // prettier-ignore
+    <label class="choice">A file from elsewhere <input type="file" accept=".yaml,.yml,.json,.txt" onChange=${take} /></label>
+    <form onSubmit=${link}><label class="choice wide-choice">A link <input name="link" placeholder="http://…#m=…" autocomplete="off" /></label>
+      <p class="wrong" role="alert">${wrong}</p>
+      <p class="row-of-buttons end"><button type="submit" class="plain">Open the link</button></p></form>`; // prettier-ignore
 }
 
 function Save() {
   const [name, setName] = useState(state.fileName.value ?? "mechanism.yaml");
   const known = state.folder.value.names.includes(name) && name !== state.fileName.value;
-  const submit = (event) => {
+  const [wrong, setWrong] = useState("");
+  const submit = async (event) => {
     event.preventDefault();
-    save(/\.\w+$/.test(name) ? name : `${name}.yaml`);
+    setWrong(await save(/\.\w+$/.test(name) ? name : `${name}.yaml`));
   };
   return html`<form onSubmit=${submit}>
     <h2>Save as</h2>
     <label class="choice">Name <input value=${name} onInput=${(event) => setName(event.target.value)} required autofocus /></label>
     <p class="calm">In ${state.folder.value.folder}${known ? html` — <b>a file of this name is there and will be replaced</b>` : ""}</p>
+    <p class="wrong" role="alert">${wrong}</p>
     <p class="row-of-buttons end"><button type="submit" class="plain strong">Save</button></p>
   </form>`;
 }

@@ -10,12 +10,13 @@ import { coil } from "../web/spring.js";
 import { gridStep, posedAt } from "./geometry.js";
 
 const MANY = 2000; // parts above which each kind is one plain path
+export const KEY = 168; // px, room for the words of the key at the right edge
 const TARGET = 12; // px, radius of what a pointer may hit
 
 /** The drawing of a scene in an SVG element; `draw(scene)` builds, `pose(…)` moves, `fit` and `zoom` change the frame. */
 export function drawing(root) {
   const layers = Object.fromEntries(
-    ["grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "locks", "tools", "key"].map((name) => [
+    ["photo", "grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "locks", "tools", "key"].map((name) => [
       name,
       svg("g", { class: `layer ${name}` }),
     ]),
@@ -179,7 +180,8 @@ function measure(view) {
   view.usual = Math.max(Math.min(quantile(forces.flat(), 0.9), most), most / 2);
 }
 
-function perNewton({ usual, frame, factor }) {
+/** Pixels a newton. */
+export function perNewton({ usual, frame, factor }) {
   return usual > 0 ? (factor * 0.18 * Math.min(frame.width, frame.height)) / usual : 0;
 }
 
@@ -192,7 +194,8 @@ export function drawTracks(view) {
   layers.tracks.replaceChildren(...moving.map(([key, free]) => svg("path", { class: free ? "track free" : "track", d: trackPath(scene, key) })));
 }
 
-function trackPath(scene, key) {
+/** The path of a point in metres. */
+export function trackPath(scene, key) {
   let path = "";
   let pen = "M";
   for (let index = 0; index < scene.count + (scene.abscissa.closed ? 1 : 0); index += 1) {
@@ -242,7 +245,7 @@ export function drawKey(view) {
   const scale = perNewton(view);
   if (scale > 0 && shown.reactions !== false) {
     const force = roundBelow(110 / scale);
-    const x = frame.width - force * scale - 130;
+    const x = frame.width - force * scale - KEY;
     parts.push(svg("path", { class: "reaction reference", d: arrow(x, y, force * scale, 0) }));
     parts.push(svg("text", { x: x + force * scale + 8, y, dy: "0.32em" }, `reaction ${stated(force, "N")}`));
   }

@@ -6,8 +6,11 @@ import { App } from "./app.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";
 import { listenToKeys } from "./keys.js";
+import { keepLayers } from "./layers.js";
+import { keepPhotos } from "./photo.js";
 import { keepTheme } from "./theme.js";
 import { html } from "./ui.js";
+import { keepCompared } from "./variants.js";
 
 keepTheme();
 render(html`<${App} />`, document.getElementById("studio"));
@@ -15,3 +18,6 @@ listenToKeys(document);
 listenToDrops(document);
 start();
 keepOthers();
+keepLayers();
+keepCompared();
+keepPhotos();

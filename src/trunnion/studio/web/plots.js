@@ -1,52 +1,146 @@
-// Curves over the drive: pointing at one moves the mechanism, and the mechanism moves their cursors.
+// Curves over the drive: pointing at one moves the mechanism, and the mechanism moves their cursors. Variants are laid over.
 
-import { effect, untracked } from "@preact/signals";
+import { effect, signal, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { lineChart } from "../web/chart.js";
+import { at, full, magnitude } from "../web/data.js";
+import { polarChart } from "../web/polar.js";
 import { charts } from "../web/report.js";
+import { edit } from "./actions.js";
+import { clicked, laid } from "./layers.js";
 import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
-import { html } from "./ui.js";
+import { tabled } from "./tables.js";
+import { Button, html } from "./ui.js";
+import { Variants, compared } from "./variants.js";
 
 const MOST = 24; // joints whose reactions are drawn
+const FEW = 2; // curves of a variant that are named one by one
+const DASHES = ["variant", "variant second"];
+const MEANING = "So many times the friction may grow before it locks; at 1 it locks.";
+
+/** Whether the polar diagrams are open, and in space the plane they are seen in. */
+const polars = signal(false);
+const plane = signal("x–y");
 
 export function Plots() {
-  const holder = useRef(null);
-  const shown = useRef([]);
-  useEffect(() => effect(() => fill(holder.current, shown)), []);
-  useEffect(() =>
-    effect(() => {
-      const index = state.index.value;
-      shown.current.forEach((chart) => chart.show(Math.min(index, chart.last)));
-    }), []); // prettier-ignore
   return html`<div class="plots">
-    <div class="charts" ref=${holder}></div>
+    <${Variants} />
+    <${Place} />
+    <${Curves} class="charts" listOf=${curves} />
+    <${Polars} />
     <${Figures} />
-    ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism has an answer.</p>`}
+    ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism is solved.</p>`}
   </div>`;
 }
 
-function fill(holder, shown) {
-  const found = state.answer.value;
-  const scene = state.solved.value ? found.scene : null;
-  untracked(() => {
-    const list = scene ? chartsOf(scene, found.margin_least?.beyond ? null : found.margin) : [];
-    const last = (scene?.count ?? 1) - 1;
-    shown.current = list.map((chart) => ({ show: chart.show, last }));
-    holder.replaceChildren(...list.map((chart) => chart.element));
-    shown.current.forEach((chart) => chart.show(Math.min(state.index.value, last)));
-  });
+/** Charts of the present scene, [{element, show}] of `listOf(found, others)`, that follow the position. */
+function Curves({ class: kind, listOf }) {
+  const holder = useRef(null);
+  useEffect(() => {
+    let [list, last] = [[], 0];
+    const follow = (index) => list.forEach((chart) => chart.show(Math.min(index, last)));
+    const stop = [
+      effect(() => {
+        const found = state.solved.value ? state.answer.value : null;
+        const others = compared.value.filter((one) => one.scene && one.scene.count === found?.scene.count);
+        list = found ? listOf(found, others) : [];
+        last = (found?.scene.count ?? 1) - 1;
+        holder.current.replaceChildren(...list.map((chart) => chart.element));
+        untracked(() => follow(state.index.value));
+      }),
+      effect(() => follow(state.index.value)),
+    ];
+    return () => stop.forEach((end) => end());
+  }, []);
+  return html`<div class=${kind} ref=${holder}></div>`;
 }
 
-function chartsOf(scene, margin) {
+/** Charts of the answer with those of the variants laid over, and of the chosen point. */
+function curves(found, others) {
+  const { scene } = found;
+  const list = listed(found);
+  others.forEach((other, order) => {
+    for (const one of listed(other)) lay(list.find(({ title }) => title === one.title), one, other.name, DASHES[order]);
+  });
+  if (laid.value?.scene === scene && laid.value.point) list.splice(1, 0, ...ofPoint(laid.value.point));
+  return list
+    .filter((one) => !one.only || one.series.length > 1)
+    .map((one) => {
+      const chart = lineChart(scene, { ...one, pick: crank.pick });
+      return tabled(chart, { scene, title: one.title, columns: one.series, pick: crank.pick });
+    });
+}
+
+function listed({ scene, margin, margin_least: least }) {
   const few = { ...scene, joints: scene.joints.slice(0, MOST) };
-  const list = charts(few, kindsOf(few), crank.pick);
-  if (!margin) return list;
-  const note = "So many times the friction may grow before it locks; at 1 it locks.";
-  const series = [{ label: "margin", values: margin, kind: "k2" }];
-  list.splice(1, 0, lineChart(scene, { title: "Locking margin", unit: "", series, limits: [0, 10], note, pick: crank.pick }));
+  const list = charts(few, kindsOf(few));
+  const series = margin ? [{ label: "margin", values: margin, kind: "k2" }] : [];
+  // one that is beyond 10 everywhere is shown only beside another
+  list.splice(1, 0, { title: "Locking margin", unit: "", series, limits: [0, 10], note: MEANING, only: !margin || least?.beyond });
   return list;
+}
+
+/** Lay the series of a variant's chart over the one of the same title. */
+function lay(chart, { series }, name, dash) {
+  if (!chart) return;
+  const unlisted = series.length > FEW;
+  if (unlisted) chart.note = `${chart.note ?? ""} ${dash === DASHES[0] ? "Dashed" : "Dotted"}: ${name}.`.trim();
+  chart.series.push(...series.map((one) => ({ ...one, label: `${one.label}, ${name}`, kind: `${one.kind} ${dash}`, quiet: true, unlisted })));
+}
+
+/** Velocity and acceleration of a point. */
+function ofPoint({ key, velocity, acceleration }) {
+  return [["Velocity", velocity, "m/s"], ["Acceleration", acceleration, "m/s²"]].map(([word, parts, unit]) => {
+    const count = Math.max(...Object.values(parts).map((one) => one.length));
+    const axes = Object.entries(parts).map(([axis, values], order) => ({ label: axis, values: full(values, count), kind: `k${order} d${order + 1}` }));
+    return { title: `${word} of ${key}`, unit, series: [{ label: "magnitude", values: magnitude(parts, count), kind: "ink" }, ...axes] };
+  }); // prettier-ignore
+}
+
+/** A place that was clicked: it can become a point of its link. A link chosen otherwise offers its middle. */
+function Place() {
+  const { kind, name } = state.selection.value ?? {};
+  if (kind !== "links" || !state.solved.value || state.spatial.value) return null;
+  const { scene } = state.answer.value;
+  const here = (track) => ["x", "y"].map((axis) => at(track[axis], state.index.peek()));
+  const point = laid.value?.scene === scene && laid.value.point?.link === name ? laid.value.point : null;
+  const keep = () => edit([{ do: "add-point", link: name, at: here(point.position) }]);
+  const middle = () => {
+    const spots = scene.links.find((one) => one.name === name).points.map((key) => here(scene.points[key]));
+    clicked.value = { link: name, at: [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length), index: state.index.peek() };
+  };
+  return html`<p class="row-of-buttons of-place">${point
+    ? html`<span>The place clicked on ${name}.</span> <${Button} label="Make it a point" onClick=${keep} />`
+    : html`<span>Click ${name} on the sheet: the place there draws its curve.</span> <${Button} label="Its middle" onClick=${middle} />`}</p>`;
+}
+
+/** Polar diagrams of the reactions: the force vector of each joint as a closed curve. */
+function Polars() {
+  if (!state.solved.value) return null;
+  const spatial = state.spatial.value;
+  return html`<details class="polars" open=${polars.value} onToggle=${(event) => (polars.value = event.currentTarget.open)}>
+    <summary>Reactions as vectors (polar diagrams)</summary>
+    ${spatial && html`<label class="plane">Plane <select value=${plane.value} onChange=${(event) => (plane.value = event.target.value)}>
+      ${["x–y", "x–z", "y–z"].map((one) => html`<option>${one}</option>`)}</select></label>`}
+    ${polars.value && html`<p class="calm">The tip of each force over the cycle, on the second link of the joint.</p><${Curves} class="charts polar-charts" listOf=${loops} />`}
+  </details>`; // prettier-ignore
+}
+
+function loops({ scene }, others) {
+  const kinds = kindsOf(scene);
+  const axes = plane.value.split("–");
+  const seen = scene.space === "spatial" ? axes : ["x", "y"];
+  const [other] = others;
+  return scene.joints.slice(0, MOST).map((joint) => {
+    const ideal = other?.scene.joints.find(({ name }) => name === joint.name)?.reaction ?? null;
+    const chart = polarChart(scene, { ...joint, ideal }, kinds.get(joint.name), crank.pick, seen);
+    if (ideal) chart.element.append(Object.assign(document.createElement("p"), { className: "remark", textContent: `Dashed: ${other.name}` }));
+    const parts = Object.entries(joint.reaction).map(([axis, values]) => ({ label: `F${axis}`, values: full(values, scene.count) }));
+    const columns = [...parts, { label: "magnitude", values: magnitude(joint.reaction, scene.count) }];
+    return tabled(chart, { scene, title: `reaction ${joint.name}`, columns, pick: crank.pick });
+  });
 }
 
 function Figures() {

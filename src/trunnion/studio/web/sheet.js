@@ -13,7 +13,7 @@ export const shown = computed(() => {
   if (!found || state.spatial.value) return null;
   if (!state.solved.value || !assembled(found.scene)) {
     const scene = sketch(found.entries, state.places.value, found.numbers);
-    return { scene, structure: scene, sketched: true };
+    return { scene: found.tracks ? { ...scene, points: found.tracks } : scene, structure: scene, sketched: true };
   }
   const scene = state.live.value?.points ? moved(found.scene, state.live.value) : found.scene;
   return { scene, structure: found, sketched: false };
@@ -35,6 +35,8 @@ export const sheet = {
   /** @type {ReturnType<typeof drawing> | null} */
   view: null,
   after: () => {},
+  /** Puts the picture behind the grid where it belongs. */
+  photo: () => {},
   fit() {
     const { width, height } = sheet.view.frame;
     const { scene } = shown.peek() ?? {};
@@ -91,5 +93,6 @@ function middle() {
 
 function look(frame) {
   reframe(sheet.view, frame);
+  sheet.photo();
   sheet.after();
 }

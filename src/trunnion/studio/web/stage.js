@@ -5,9 +5,13 @@ import { useEffect, useRef } from "preact/hooks";
 import { set, svg } from "../web/dom.js";
 import { build, drawTracks, drawing, pose } from "./drawing.js";
 import { others, poseGhosts } from "./ghosts.js";
+import { laid, listenToPlaces } from "./layers.js";
+import { addOverlay, poseOverlay } from "./overlay.js";
+import { compared } from "./variants.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
+import { watchPhoto } from "./photo.js";
 import * as state from "./state.js";
 import { pointer, toolOf, typed } from "./tools.js";
 import { html } from "./ui.js";
@@ -26,6 +30,7 @@ function mount(holder) {
   });
   holder.append(root);
   const view = drawing(root);
+  addOverlay(view);
   sheet.view = view;
   sheet.after = () => {
     chosen(view);
@@ -33,12 +38,17 @@ function mount(holder) {
   };
   const stop = [
     watchSize(holder, view),
+    watchPhoto(view),
     listenToPointer(root, view),
+    listenToPlaces(root, view),
     effect(() => show(view)),
     effect(() => {
       state.selection.value;
       state.locked.value;
       others.value;
+      laid.value;
+      compared.value;
+      state.layers.value;
       untracked(() => chosen(view));
     }),
     effect(() => preview(view)),
@@ -95,6 +105,7 @@ function chosen(view) {
   poseHandles(view, sheet.spots(), state.selection.value);
   markChosen(view, state.selection.value);
   poseGhosts(view, state.live.value ? [] : others.value);
+  poseOverlay(view);
 }
 
 /** The cross, the snap mark, and the line that is being drawn with its length. */

@@ -12,6 +12,10 @@ export const about = signal({ version: "", examples: [], laws: [] });
 export const folder = signal({ folder: "", names: [] });
 /** Name of the open file in the folder, or null for a sheet that was never saved. */
 export const fileName = signal(null);
+/** Picture behind the grid: null for none, undefined while it is not known; see photo.js. */
+export const photo = signal(undefined);
+/** How many sheets were opened. */
+export const opened = signal(0);
 export const savedText = signal("");
 export const text = signal("");
 /** World positions, m, by "link.point": what unfinished mechanisms are drawn from. */
@@ -33,7 +37,10 @@ export const past = signal([]);
 export const future = signal([]);
 /** "stated", "compare" (and without) or "off". */
 export const friction = signal("stated");
-export const layers = signal({ curves: true, reactions: true, names: true, grid: true, others: false });
+export const layers = signal({
+  curves: true, reactions: true, values: false, velocity: true, acceleration: true, centres: false, relative: false, circles: false,
+  transmission: false, variant: true, names: true, grid: true, others: false,
+}); // prettier-ignore
 export const snapping = signal(true);
 export const tab = signal("properties");
 export const dialog = signal(null);
@@ -115,11 +122,14 @@ export function begin({ name, saved, content, steps = null }) {
     live.value = null;
     index.value = 0;
     tool.value = "select";
+    photo.value = undefined;
+    opened.value += 1;
     recovered.value = steps && content !== saved ? steps.time : null;
   });
 }
 
-const keyOf = (name) => `trunnion studio ${folder.value.folder} ${name ?? ""}`;
+/** The key of a sheet in what the browser keeps. */
+export const keyOf = (name) => `trunnion studio ${folder.value.folder} ${name ?? ""}`;
 const LAST = "trunnion studio last sheet";
 
 /** What was left of a sheet when the page was closed: {text, saved, places, locked, past, future, time}, or null. */

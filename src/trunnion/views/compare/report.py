@@ -16,12 +16,11 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.cycle import names
+from trunnion.views.common.page import inputs_of, said, source, template
 from trunnion.views.compare.comparison import label, units
 from trunnion.views.compare.figure import efficiency, panels, small
 from trunnion.views.compare.notes import definitions
 from trunnion.views.compare.tables import conditions, efficiencies, files, headline, results, sensors, verdicts
-from trunnion.views.cycle.report import inputs_of, said
-from trunnion.views.tolerance.report import source, template
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from trunnion.files import whole
 from trunnion.views.common.bundle import bundle, web_text
-from trunnion.views.cycle.report import embedded, hashed
+from trunnion.views.common.page import hashed
+from trunnion.views.cycle.report import embedded
 from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:

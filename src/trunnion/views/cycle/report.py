@@ -7,31 +7,25 @@ their hashes and forbids everything else, so no name in a model can become code 
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 from collections.abc import Sequence
-from functools import cache
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.cycle.locking_states import HEAD
-from trunnion.results.attributes import attribute, summary_of
-from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, quantity
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
-from trunnion.views.common.markup import with_code
+from trunnion.views.common.page import hashed, headline, inputs_of, said, template
 from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:
     import xarray as xr
-    from jinja2 import Template
 
-__all__ = ["embedded", "hashed", "inputs_of", "page", "report", "said"]
+__all__ = ["embedded", "page", "report"]
 
 MOST_RANGES = 24  # rows of the table of states
 # Variable, label, unit, what a reader may make of it.
@@ -67,26 +61,17 @@ def page(
         "name": shown["name"] or "Mechanism", "formula": shown["formula"], "compared": compared,
         "motion": motion, "closed": shown["abscissa"]["closed"],
         "spatial": shown.get("space") == "spatial",
-        "positions": result.sizes["position"], "thinned": _ordinal(shown), "method": result.attrs.get("method", ""),
+        "positions": result.sizes["position"], "thinned": _ordinal(shown),
+        "drawn": shown["count"], "method": result.attrs.get("method", ""),
         "unanswered": sum(run.stop - run.start for run in runs),
-        "summary": _summary(result),
+        "summary": headline(result),
         "holding": _holding(result), "errors": error_rows(result), "losses": loss_rows(result),
         "seats": bool(shown["built"] and shown["built"]["seats"]),
         "balance": [*quality, *_balance(result)], "inputs": inputs_of(result),
         **said(result, style, _findings(result)), "script": Markup(script), "script_hash": hashed(script),
         "scene": Markup(embedded(shown)),
     }  # fmt: skip
-    return _template().render(context)
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    environment.filters["code"] = lambda text: Markup(with_code(text))
-    return environment.from_string(web_text("report.html.j2"))
+    return template("report.html.j2").render(context)
 
 
 def embedded(data: Any) -> str:
@@ -95,27 +80,6 @@ def embedded(data: Any) -> str:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text
-
-
-def said(result: xr.Dataset, style: str, found: Sequence[dict[str, str]] | None = None) -> dict[str, Any]:
-    """What every report says: findings, notes apart from them, and where the result comes from; with its style."""
-    from markupsafe import Markup
-
-    rows = attribute(result, "findings") if found is None else found
-    return {
-        "findings": [row for row in rows if row["severity"] != "note"],
-        "notes": [row for row in rows if row["severity"] == "note"],
-        "references": [line for line in str(result.attrs.get("references", "")).splitlines() if line.strip()],
-        "version": result.attrs.get("trunnion_version", ""),
-        "model_hash": result.attrs.get("model_hash", ""),
-        "style": Markup(style),
-        "style_hash": hashed(style),
-    }
-
-
-def hashed(text: str) -> str:
-    """The text's hash as a content security policy names it."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
 def _ordinal(shown: dict[str, Any]) -> str:
@@ -127,15 +91,6 @@ def _ordinal(shown: dict[str, Any]) -> str:
     return f"{stride}{suffix}"
 
 
-def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "maximum, at 24°")])."""
-    found = []
-    headline = [one for one in summary_of(result) if not one.numerical]
-    for subject, members in groupby(headline, key=lambda one: one.subject):
-        found.append((subject, [(_value(one), one.remark) for one in members]))
-    return found
-
-
 def _holding(result: xr.Dataset) -> dict[str, Any] | None:
     """The ranges of the states of locking as a table and a strip; None where the result has none."""
     found = attribute(result, "locking_ranges", "{}")
@@ -144,11 +99,6 @@ def _holding(result: xr.Dataset) -> dict[str, Any] | None:
     rows = found["rows"]
     strip = [row for row in rows if row["state"]]
     return {**found, "head": HEAD, "strip": strip, "rows": rows[:MOST_RANGES], "more": max(0, len(rows) - MOST_RANGES)}
-
-
-def _value(one: Figure) -> str:
-    text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
-    return f"> {text}" if one.aspect == MORE_THAN else text
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:
@@ -197,35 +147,3 @@ def _worst(label: str, values: Any, unit: str, meaning: str, over: Any) -> dict[
     text = quantity(worst, unit) if unit != "m" else f"{number(worst, 3)}\u00a0m"
     same = sizes.size > 1 and bool((sizes == worst).all())
     return {"label": label, "value": text, "place": "everywhere" if same else over.say(index), "meaning": meaning}
-
-
-def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:
-    """Input rows by section of the model, the first name of their path."""
-    rows = attribute(result, "inputs")
-    sections = []
-    for section, members in groupby(rows, key=lambda row: str(row["path"]).split(".")[0]):
-        lines = [{"path": str(row["path"]).removeprefix(f"{section}."), "text": _stated(row)} for row in members]
-        sections.append((section.replace("_", " ").capitalize(), lines))
-    return sections
-
-
-def _stated(row: dict[str, Any]) -> str:
-    """An input as it was written: a plain number with its SI unit, an expression with what it comes to."""
-    text, value = str(row.get("text") or ""), row.get("value")
-    unit = str(row.get("unit") or "")
-    unit = "" if unit in ("1", "SI") else unit  # a dimension is a length or an angle, as its own text says
-    if not text:
-        return quantity(value, unit)
-    if value is None:  # an expression of the motion
-        return text
-    if not text[0].isdigit() and text[0] not in "+-.":
-        return f"{text} = {quantity(value, unit)}"
-    return f"{text}\u00a0{unit}" if unit and _is_number(text) else text
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

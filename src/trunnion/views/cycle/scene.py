@@ -29,16 +29,20 @@ SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "
         "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
 
 
-def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: int = 720) -> dict[str, Any]:
+def scene(
+    result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: int = 720,
+    picked: NDArray[np.intp] | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """The result as JSON-able data, thinned evenly to `max_positions` (`thinned` then tells the full count).
 
-    ideal: the same run without friction, for comparison; it must have the same positions.
+    ideal: the same run without friction, for comparison; it must have the same positions. picked: the positions that
+    are shown instead, rising.
     """
     count = result.sizes["position"]
     if ideal is not None and ideal.sizes["position"] != count:
         raise ValueError(f"`ideal` has {ideal.sizes['position']} positions, the result {count}")
     result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
-    picked = _picked(count, max_positions)
+    picked = _picked(count, max_positions) if picked is None else picked
     over = abscissa(result)
     kept = result.isel(position=picked)
     other = None if ideal is None else ideal.isel(position=picked)
@@ -67,16 +71,15 @@ def scene(result: xr.Dataset, ideal: xr.Dataset | None = None, max_positions: in
         "drivers": _drivers(kept, other, stated),
         "sums": {name: series(column(kept, name)) for name in SUMS if name in kept},
         "efficiency": _single(result, "efficiency"),
-        "built": built(kept, _lost(result, count, int(picked.size))),
+        "built": built(kept, _lost(result, picked)),
     }  # fmt: skip
     return shown | space_scene(kept) if is_spatial(result) else shown
 
 
-def _lost(result: xr.Dataset, count: int, kept: int) -> list[int]:
-    """The shown positions that are nearest to those at which a joint loses contact."""
-    stride = -(-count // max(kept, 1))
-    found = {int(index) // stride for places in losses(result).values() for index in places}
-    return sorted(found)
+def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:
+    """The shown positions at or before those at which a joint loses contact."""
+    places = {int(index) for places in losses(result).values() for index in places}
+    return sorted({int(np.searchsorted(picked, index, side="right")) - 1 for index in places})
 
 
 def _picked(count: int, most: int) -> NDArray[np.intp]:

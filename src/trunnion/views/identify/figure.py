@@ -125,14 +125,15 @@ def residuals(result: xr.Dataset) -> Figure:
     rows = sheet.subplots(len(pairs), 2, sharex=True, squeeze=False)
     drive = str(result.attrs.get("drive", ""))
     angles = [_angles(result, condition) for _, condition in pairs]
-    turned = all(one is not None for one in angles)
+    turned, durations = all(one is not None for one in angles), attribute(result, "durations") or []
     for (left, right), angle, (channel, condition) in zip(rows, angles, pairs, strict=True):
         phase = np.asarray(result["phase"].values[condition], float)
-        x = angle if turned and angle is not None else phase
+        x = angle if turned and angle is not None else phase * (durations[condition] if durations else 1.0)
         _residual(left, result, (channel, condition), x, before=True)
         _residual(right, result, (channel, condition), x, before=False)
     for axes in rows[-1]:
-        dress(axes, plain(f"drive angle {drive} [°]") if turned else "share of the cycle", axes.get_ylabel())
+        other = "time [s]" if durations else "share of the cycle"
+        dress(axes, plain(f"drive angle {drive} [°]") if turned else other, axes.get_ylabel())
     for axes in rows[0]:
         legend(axes, least=1)
     return sheet
@@ -191,6 +192,7 @@ def _figures(result: xr.Dataset) -> Figure:
     sheet = new("Residuals, before and after", result, height=1.6 + 2.6 * len(there))
     rows = sheet.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
     title, short = shortened(names(result, "condition"))
+    every = sorted({k for i, _, _ in there for k in conditions(result, i)})
     for axes, (i, name, unit) in zip(rows, there, strict=True):
         own = conditions(result, i)
         before, after, spread = (
@@ -200,12 +202,12 @@ def _figures(result: xr.Dataset) -> Figure:
         factor, shown = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
         dress(axes, plain(title), plain(f"{name} [{shown}]" if shown else name))
         axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
-        x = np.arange(len(own))
+        x = np.searchsorted(every, own)
         axes.plot(x, before * factor, "D", color=BEFORE, markerfacecolor="none", markersize=5, label="before")
         axes.errorbar(x, after * factor, COVERED * np.nan_to_num(spread) * factor, fmt="o", color=AFTER, markersize=5,
                       capsize=3, label=f"after, ±{COVERED:g} u by scatter")  # fmt: skip
-        many = len(own) > FEW
-        axes.set_xticks(x, [plain(short[k]) for k in own], fontsize=7.5, rotation=90 if many else 0)
+        many, ticks = len(every) > FEW, [plain(short[k]) for k in every]
+        axes.set_xticks(range(len(every)), ticks, fontsize=7.5, rotation=90 if many else 0)
     legend(rows[0], least=1)
     return sheet
 

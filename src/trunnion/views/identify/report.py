@@ -13,14 +13,13 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.views.common.bundle import web_text
+from trunnion.views.common.page import inputs_of, said, source, template
 from trunnion.views.common.table import TextTable
 from trunnion.views.compare.report import of_file
 from trunnion.views.compare.tables import files
-from trunnion.views.cycle.report import inputs_of, said
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.identification import estimates
 from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors, stated
-from trunnion.views.tolerance.report import source, template
 
 if TYPE_CHECKING:
     import xarray as xr

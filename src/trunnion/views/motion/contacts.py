@@ -18,10 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["OF_CONTACTS", "OF_IMPACTS", "forces", "gaps", "in_play", "orbit", "spectrum"]
+__all__ = ["OF_CONTACTS", "forces", "gaps", "in_play", "orbit", "spectrum"]
 
 OF_CONTACTS = ("contacts", "gaps", "orbit", "spectrum")  # kinds of figures that need a joint in play
-OF_IMPACTS = ("impact", "lift-off", "closes")  # events that figures do not mark
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
 MOST_SPOKES = 240  # forces drawn around a hole
 DEEPEST = 1e-4  # of the largest amplitude: the lowest that is drawn

@@ -13,7 +13,7 @@ from trunnion.views.common.cycle import Abscissa, abscissa, names
 from trunnion.views.common.figures import MUTED, PALETTE, along, curve, dress, legend, new, style_of
 from trunnion.views.common.lettering import plain
 from trunnion.views.motion import contacts
-from trunnion.views.motion.shown import Shown, drivers_of, energies, shown
+from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,7 +124,7 @@ def _events(axes: Axes, motion: Shown, over: Abscissa) -> int:
     """Thin lines where something happens, with words above the axes, each in the lowest row where it meets no other;
     how many rows there are.
     """
-    events = [one for one in motion.events if one.word not in contacts.OF_IMPACTS]  # the curves show these
+    events = [one for one in motion.events if one.word not in OF_IMPACTS]  # the curves show these
     last = float(motion.rows["time"].values[-1])
     if len(events) > MOST_MARKED or not last > 0:
         return 0

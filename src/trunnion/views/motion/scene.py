@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.views.common.cycle import abscissa, series
 from trunnion.views.cycle.scene import scene
-from trunnion.views.motion.shown import Shown, drivers_of, energies
+from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,20 +22,26 @@ STATES = {RESTS: "at rest: friction holds it", NONE: "there is no motion"}
 
 
 def motion_scene(shown: Shown) -> dict[str, Any]:
-    """The motion as JSON-able data, its rows thinned evenly to MOST_ROWS; see `cycle.scene.scene`."""
+    """The motion as JSON-able data, its rows thinned to MOST_ROWS with the peaks of the reactions kept; see
+    `cycle.scene.scene`.
+    """
     rows = shown.rows
-    found = scene(rows, max_positions=MOST_ROWS)
-    kept = rows.isel(position=np.arange(0, rows.sizes["position"], -(-rows.sizes["position"] // MOST_ROWS)))
+    picked = _picked(rows)
+    found = scene(rows, picked=picked)
+    kept = rows.isel(position=picked)
     status = np.where(kept["resting"].values == 1, RESTS, kept["status"].values)
     status = np.where(np.isfinite(kept["kinetic_energy"].values), status, NONE)
     over = abscissa(rows)
     last = float(kept["time"].values[-1])
     factor = over.values[-1] / float(rows["time"].values[-1]) if last > 0 else 1.0
-    own = {
+    own: dict[str, Any] = {
         "duration": last,
         "free": _free(kept),
         "energies": [{"label": text, "values": series(values)} for _, text, values in energies(kept)],
-        "events": [{"at": float(f"{min(one.time, last) * factor:.9g}"), "word": one.word} for one in shown.events],
+        "events": [
+            {"at": float(f"{min(one.time, last) * factor:.9g}"), "word": one.word, "quiet": one.word in OF_IMPACTS}
+            for one in shown.events
+        ],
     }
     return found | {
         "status": [int(code) for code in status],
@@ -44,6 +51,21 @@ def motion_scene(shown: Shown) -> dict[str, Any]:
         "ease": [1.0],  # no peak is cut: a motion in time has no dead centre that forces it
         "motion": own,
     }
+
+
+def _picked(rows: xr.Dataset) -> NDArray[np.intp]:
+    """The rows that are shown: all, or of each of many stretches the first and that of the largest reaction, and the
+    last, so that no peak is lost.
+    """
+    count = rows.sizes["position"]
+    if count <= MOST_ROWS:
+        return np.arange(count)
+    sizes = np.nan_to_num(np.sqrt(np.sum(rows["reaction_force"].values ** 2, axis=1)))
+    most = sizes.max(axis=1, keepdims=True)
+    size = np.max(np.divide(sizes, most, out=np.zeros_like(sizes), where=most > 0), axis=0)
+    firsts = np.arange(0, count, -(-count // (MOST_ROWS // 2 - 1)))
+    peaks = [begin + int(part.argmax()) for begin, part in zip(firsts, np.split(size, firsts[1:]), strict=True)]
+    return np.unique([*firsts, *peaks, count - 1])
 
 
 def _free(rows: xr.Dataset) -> list[dict[str, Any]]:

@@ -13,13 +13,16 @@ from trunnion.results.quantities import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ENERGIES", "Happening", "Shown", "as_positions", "drivers_of", "energies", "happenings", "shown"]
+__all__ = [
+    "ENERGIES", "OF_IMPACTS", "Happening", "Shown", "as_positions", "drivers_of", "energies", "happenings", "shown",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 WORDS = {
     "break-away": "starts", "rest": "rests", "stick": "sticks", "lock": "locks", "motor-off": "motor off",
     "brake": "brake on", "clutch-slips": "clutch slips", "clutch-holds": "clutch holds", "clutch-opens": "clutch opens",
 }  # fmt: skip
+OF_IMPACTS = ("impact", "lift-off", "closes")  # events without a word in figures: the curves show them
 ENERGIES = (
     ("work_drive", "work of the drivers"),
     ("work_loads", "work of the loads"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,14 +27,18 @@ PANEL = 3.3  # height, inches
 HATCHES = ("", "//", "..", "xx")
 
 
-def figure(result: xr.Dataset) -> Figure:
-    """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed."""
-    over, names = abscissa_of(result), result["measure"].values[:MOST_PANELS]
-    sheet = new("Effect of the play of the joints", result, height=1.0 + PANEL * len(names))
+def figure(result: xr.Dataset, measures: Sequence[int] | None = None) -> Figure:
+    """A panel for each measure: the joints' worst cases on top of one another, their RSS dashed.
+
+    measures: their numbers; the first ones if not given.
+    """
+    over, names = abscissa_of(result), result["measure"].values
+    chosen = range(len(names))[:MOST_PANELS] if measures is None else measures
+    sheet = new("Effect of the play of the joints", result, height=1.0 + PANEL * len(chosen))
     units, limits = (attribute(result, key) for key in ("measure_units", "limits"))
-    panels = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for i, (axes, name) in enumerate(zip(panels, names, strict=True)):
-        _panel(axes, result.isel(measure=i), over, str(name), units[i], limits[i])
+    panels = sheet.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
+    for i, axes in zip(chosen, panels, strict=True):
+        _panel(axes, result.isel(measure=i), over, str(names[i]), units[i], limits[i])
         shade(axes, result, over)
         if axes is not panels[-1]:
             axes.set_xlabel("")

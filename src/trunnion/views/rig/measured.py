@@ -16,26 +16,27 @@ MOST = 40  # conditions shown
 def tables(measurement: Measurement) -> list[TextTable]:
     """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
     conditions = measurement.conditions
-    channels = list(conditions[0].courses)
-    units = {name: conditions[0].courses[name].shown for name in channels}  # of all files, whatever a file is in
+    channels = list(measurement.channels)
+    units = {name: one.shown for name, one in measurement.channels.items()}  # of all files, whatever a file is in
+    turns_of = "starts" if measurement.of_starts else "turns"
     speeds = np.isfinite([one.speed for one in conditions]).any()
     named, short = shortened([one.name for one in conditions])
     settings = [named] if named == "condition" else named.split(", ")
-    head = [*settings, "turns", *(["speed rpm"] if speeds else [])]
+    head = [*settings, turns_of, *(["speed rpm"] if speeds else [])]
     head += [f"{name} {_unit(units[name][0])}".strip() for name in channels]
     rows = []
     for one, name in list(zip(conditions, short, strict=True))[:MOST]:
         turns = max(course.turns.shape[0] for course in one.courses.values())
         speed = [f"{one.speed * 30 / np.pi:.5g}"] if speeds else []
         own = [name] if named == "condition" else [part.replace(" ", "\u00a0") for part in name.split(", ")]
-        means = (_figure(_overall(one.courses[key], units[key][1])) for key in channels)
+        means = (_figure(_overall(one.courses[key], units[key][1])) if key in one.courses else "" for key in channels)
         rows.append([*own, f"{turns:,}", *speed, *means])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown = [TextTable(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    shown = [TextTable(f"{measurement.name}\nconditions: mean over {turns_of} and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
-    rows = [[name, *_channel([one.courses[name] for one in conditions])] for name in channels]
-    title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
+    rows = [[name, *_channel([one.courses[name] for one in conditions if name in one.courses])] for name in channels]
+    title = f"channels: mean signal, scatter of {turns_of}, standard uncertainty of the mean"
     return [*shown, TextTable(title, head, rows)]
 
 

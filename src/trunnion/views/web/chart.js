@@ -9,10 +9,12 @@ const LINE = 12; // height of a row of their words
 const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
- * A chart of `series` [{label, values, kind, quiet}] in one unit; `kind` is a class that colours the curve.
+ * A chart of `series` [{label, values, kind, quiet, unlisted}] in one unit; `kind` is a class that colours the curve, `quiet`
+ * has no dot, `unlisted` no line in the legend.
  * `breaks` of a series are positions that no line leads to, `marks` positions that are marked in all of the chart.
  * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
- * `pick(index, firm)` is called when the reader points.
+ * `pick(index, firm)` is called when the reader points. Beside {element, show(index)} it tells the {factor, unit} it shows
+ * values in, and the largest of them, which decides on their decimals.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
   const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
@@ -20,7 +22,7 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   const scale = prefixed(scope, unit);
   const most = scope * scale.factor;
   const cut = !limits && scope < peak(...columns);
-  const remark = cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : note;
+  const remark = [cut ? `The peak of ${quantity(peak(...columns), unit)} ${OUTSIDE}` : "", note].filter(Boolean).join(" ");
   const plot = html("div", { class: "plot" });
   const values = series.map(() => html("span", { class: "value" }, "—"));
   const element = html(
@@ -52,6 +54,8 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   listen(chart, pick);
   return {
     element,
+    scale,
+    most,
     show(index) {
       chart.index = index;
       moveCursor(chart);
@@ -64,8 +68,8 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
 }
 
 function legend(series, values, band) {
-  const items = series.map((one, order) =>
-    html("li", {}, swatch(one.kind), html("span", { class: "label" }, one.label), values[order]),
+  const items = series.flatMap((one, order) =>
+    one.unlisted ? [] : [html("li", {}, swatch(one.kind), html("span", { class: "label" }, one.label), values[order])],
   );
   if (band)
     items.push(html("li", {}, html("span", { class: `swatch area ${band.kind}` }), html("span", {}, band.label)));
@@ -87,7 +91,7 @@ function draw(chart, width) {
   const right = width - MARGIN.right;
   const x = (value) => MARGIN.left + ((value - x0) / (x1 - x0)) * (right - MARGIN.left);
   const words = labels(scene, x, right);
-  const top = MARGIN.top + LINE * Math.max(0, ...words.map(({ row }) => row + 1));
+  const top = MARGIN.top + LINE * Math.max(0, ...words.map((one) => (one ? one.row + 1 : 0)));
   const height = Math.round(Math.min(Math.max(width * 0.46, 190), 270)) + top - MARGIN.top;
   const bottom = height - MARGIN.bottom;
   const frame = {
@@ -131,12 +135,16 @@ function draw(chart, width) {
   moveCursor(chart);
 }
 
-/** The words of the events, above the curves: each in the lowest row where it meets no other; none of many. */
+/**
+ * The words of the events, above the curves: each in the lowest row where it meets no other. None of many, and none of
+ * quiet ones, as of impacts, which the curves show: null.
+ */
 function labels(scene, x, right) {
   const list = scene.motion?.events ?? [];
-  if (list.length > MOST_LINES) return [];
+  const loud = list.filter((one) => !one.quiet).length;
   const ends = []; // of what stands in each row
-  return list.map(({ at, word }) => {
+  return list.map(({ at, word, quiet }) => {
+    if (quiet || loud > MOST_LINES) return null;
     const wide = 6 * word.length + 6;
     const left = Math.max(MARGIN.left, Math.min(x(at) - wide / 2, right - wide));
     let row = ends.findIndex((end) => end <= left);
@@ -146,19 +154,20 @@ function labels(scene, x, right) {
   });
 }
 
-/** The events of a motion in time: a dashed line each; of many, which would hide the curves, a mark on the axis. */
+/** The events of a motion in time: a dashed line each; of those without a word, which would hide the curves, a mark on the axis. */
 function events(scene, frame, words) {
-  const list = scene.motion?.events ?? [];
-  const many = list.length > MOST_LINES;
   const baseline = (row) => frame.top - 4 - LINE * row;
-  const lines = list.map(({ at, word }, order) => {
+  const lines = (scene.motion?.events ?? []).map(({ at, word }, order) => {
     const x = frame.x(at);
-    const y1 = many ? frame.bottom - 7 : baseline(words[order].row) + 2;
-    const line = svg("line", { class: many ? "event many" : "event", x1: x, x2: x, y1, y2: frame.bottom });
+    const y1 = words[order] ? frame.top - 2 : frame.bottom - 7;
+    const line = svg("line", { class: words[order] ? "event" : "event many", x1: x, x2: x, y1, y2: frame.bottom });
     line.append(svg("title", {}, word));
     return line;
   });
-  return [...lines, ...words.map(({ word, row, middle }) => svg("text", { class: "mark middle", x: middle, y: baseline(row) }, word))];
+  const texts = words
+    .filter(Boolean)
+    .map(({ word, row, middle }) => svg("text", { class: "mark middle", x: middle, y: baseline(row) }, word));
+  return [...lines, ...texts];
 }
 
 /** A dotted line up through the chart. */

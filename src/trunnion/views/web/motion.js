@@ -1,26 +1,25 @@
 // What a motion in time has beside a cycle: speeds and energies over time, its events, figures of the present time.
 
-import { lineChart } from "./chart.js";
 import { at, full, nearest, peak } from "./data.js";
 import { quantity } from "./format.js";
 
 /** The speeds of the free drivers; angles and lengths in charts of their own. */
-export function speedCharts(scene, pick) {
+export function speedCharts(scene) {
   return ["rad", "m"].flatMap((unit) => {
     const drivers = scene.motion.free.filter((one) => one.unit === unit);
     const series = drivers.map(({ name, rate }, order) => ({ label: name, values: full(rate, scene.count), kind: `k${order % 6}` }));
-    return series.length ? [lineChart(scene, { title: "Speed", unit: `${unit}/s`, series, pick })] : [];
+    return series.length ? [{ title: "Speed", unit: `${unit}/s`, series }] : [];
   });
 }
 
 /** Works since the start and energies; none where there is neither. */
-export function energyChart(scene, pick) {
+export function energyChart(scene) {
   const series = scene.motion.energies.map(({ label, values }, order) => ({
     label,
     values: full(values, scene.count),
     kind: `k${order % 6}`,
   }));
-  return series.length ? [lineChart(scene, { title: "Works and energies", unit: "J", series, pick })] : [];
+  return series.length ? [{ title: "Works and energies", unit: "J", series }] : [];
 }
 
 /** Coordinate and speed of every free driver at the present time, as [label, index => text]. */

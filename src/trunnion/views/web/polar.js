@@ -5,6 +5,7 @@ import { clipped, html, onWidth, set, svg } from "./dom.js";
 import { fixed, prefixed, quantity, tickLabel, ticks } from "./format.js";
 
 const MARGIN = { top: 10, right: 14, bottom: 42, left: 60 };
+const NEAR = 18; // px: a pointer without a button as near to the curve points at it
 
 /**
  * The diagram of a joint {name, reaction, ideal}, seen in the plane of two axes; `kind` colours it, `pick(index, firm)` is
@@ -36,11 +37,16 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, [across
   );
   const chart = { scene, joint, kind, scale, cut, plot, axes: [across, up], frame: null, index: 0 };
   onWidth(plot, (width) => draw(chart, width), 220);
-  const point = (event, firm) => chart.frame && pick(closest(chart, event), firm);
+  const point = (event, firm) => {
+    const found = chart.frame && closest(chart, event, firm ? Infinity : NEAR);
+    if (found !== null) pick(found, firm);
+  };
   plot.addEventListener("pointerdown", (event) => point(event, true));
-  plot.addEventListener("pointermove", (event) => event.buttons > 0 && point(event, true));
+  plot.addEventListener("pointermove", (event) => point(event, event.buttons > 0));
   return {
     element,
+    scale,
+    most: most * scale.factor,
     show(index) {
       chart.index = index;
       value.textContent =
@@ -217,12 +223,13 @@ function moveVector(chart) {
   set(chart.tip, { cx: x, cy: y, visibility: seen ? null : "hidden" });
 }
 
-function closest(chart, event) {
+/** The position whose force lies nearest to the pointer; null where all are farther away than `far` px. */
+function closest(chart, event, far) {
   const box = chart.plot.getBoundingClientRect();
   const grow = chart.frame.width / box.width;
   const [px, py] = [(event.clientX - box.left) * grow, (event.clientY - box.top) * grow];
-  let best = chart.index;
-  let least = Infinity;
+  let best = far === Infinity ? chart.index : null;
+  let least = far;
   for (let index = 0; index < chart.scene.count; index += 1) {
     const place = spot(chart, chart.joint.reaction, index);
     const gap = place ? Math.hypot(place[0] - px, place[1] - py) : Infinity;

@@ -17,24 +17,24 @@ export function kindOf(order) {
   return `k${order % 6} d${Math.floor(order / 6) % 4}`;
 }
 
-/** Every chart of the scene that has something to show, as [{show, element}]. */
-export function charts(scene, kinds, pick) {
+/** What `lineChart` draws of a scene, one entry for each chart that has something to show: {title, unit, series, …}. */
+export function charts(scene, kinds) {
   const { count, sums, drivers, joints, motion } = scene;
   const lost = total(
     joints.map((joint) => joint.friction_power),
     count,
   );
   const driven = motion ? drivers.filter((driver) => peak(driver.effort) > 0) : drivers;
-  const efforts = driven.map((driver) => effortChart(scene, driver, pick));
-  const losses = lossChart(scene, kinds, lost, pick);
-  const reactions = [reactionChart(scene, kinds, pick)];
-  if (scene.space === "spatial") reactions.push(momentChart(scene, kinds, pick));
-  const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost, pick)];
+  const efforts = driven.map((driver) => effortChart(scene, driver));
+  const losses = lossChart(scene, kinds, lost);
+  const reactions = [reactionChart(scene, kinds)];
+  if (scene.space === "spatial") reactions.push(momentChart(scene, kinds));
+  const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost)];
   const list = motion
-    ? [...speedCharts(scene, pick), ...efforts, ...energyChart(scene, pick), ...reactions, ...losses, ...power]
+    ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...reactions, ...losses, ...power]
     : [...efforts, ...losses, ...reactions, ...power];
-  if (sums.efficiency_instant) list.push(efficiencyChart(scene, pick));
-  return [...list, ...errorCharts(scene, kinds, pick)];
+  if (sums.efficiency_instant) list.push(efficiencyChart(scene));
+  return [...list, ...errorCharts(scene, kinds)];
 }
 
 /** Whether power goes through it; only masses exchange theirs where there is none. */
@@ -42,31 +42,30 @@ function moved(scene, lost) {
   return peak(lost, full(scene.sums.useful_power, scene.count), ...scene.drivers.map(({ power }) => power)) > 0;
 }
 
-function lossChart(scene, kinds, lost, pick) {
+function lossChart(scene, kinds, lost) {
   const losses = scene.joints
     .map((joint) => ({ label: joint.name, values: full(joint.friction_power, scene.count), kind: kinds.get(joint.name) }))
     .filter((one) => peak(one.values) > 0);
   if (!losses.length) return [];
   const series = [{ label: "all", values: lost, kind: "ink" }, ...losses];
-  return [lineChart(scene, { title: "Friction power by joint", unit: "W", pick, series })];
+  return [{ title: "Friction power by joint", unit: "W", series }];
 }
 
-function efficiencyChart(scene, pick) {
+function efficiencyChart(scene) {
   const values = full(scene.sums.efficiency_instant, scene.count).map((value) => (value === null ? null : 100 * value));
   const whole = scene.efficiency === null ? "" : `Over the whole run: ${quantity(100 * scene.efficiency, "%")}. `;
   const far = peak(values) > 100 ? "Values beyond ±100 %, near zero drive power, are not shown." : "";
-  return lineChart(scene, {
+  return {
     title: "Efficiency at each position",
     unit: "%",
-    pick,
     limits: [-100, 100],
     note: whole + far,
     series: [{ label: "efficiency", values, kind: "k2" }],
-  });
+  };
 }
 
 /** Errors of the worst points and of the outputs, and how the pins lie; dotted where a joint loses contact. */
-function errorCharts(scene, kinds, pick) {
+function errorCharts(scene, kinds) {
   const { built, count } = scene;
   if (!built) return [];
   const marks = built.lost;
@@ -74,20 +73,20 @@ function errorCharts(scene, kinds, pick) {
   const list = [];
   if (built.worst.length) {
     const series = built.worst.map(({ label, values }, order) => ({ label, values: full(values, count), kind: kindOf(order) }));
-    list.push(lineChart(scene, { title: "Position errors, largest", unit: "m", series, marks, note, pick }));
+    list.push({ title: "Position errors, largest", unit: "m", series, marks, note });
   }
   for (const { label, unit, values, worst } of built.outputs)
-    list.push(lineChart(scene, { title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play, first order" }, note, pick, series: [{ label: "error", values: full(values, count), kind: "k0" }] })); // prettier-ignore
+    list.push({ title: `Transmission error, ${label}`, unit, marks, band: worst && { low: full(worst.low, count), high: full(worst.high, count), kind: "k0", label: "worst case of the play, first order" }, note, series: [{ label: "error", values: full(values, count), kind: "k0" }] }); // prettier-ignore
   for (const [sign, title] of [["β", "β, between the seats of the ends"], ["ξ", "ξ, direction of the seats"]]) {
     const series = built.angles
       .filter((one) => one.sign === sign)
       .map(({ joint, values, breaks }) => ({ label: joint, values: full(values, count), breaks, kind: kinds.get(joint) }));
-    if (series.length) list.push(lineChart(scene, { title, unit: "°", series, marks, note, pick }));
+    if (series.length) list.push({ title, unit: "°", series, marks, note });
   }
   return list;
 }
 
-function effortChart(scene, driver, pick) {
+function effortChart(scene, driver) {
   const { count } = scene;
   const noun = driver.unit === "N" ? "force" : "torque";
   const series = [{ label: driver.ideal ? "with friction" : noun, values: full(driver.effort, count), kind: "k0" }];
@@ -96,16 +95,16 @@ function effortChart(scene, driver, pick) {
   const high = full(driver.effort_upper, count);
   const open = low.some((value, index) => value !== null && high[index] - value > 0.002 * usualPeak(scene, low, high));
   const band = open ? { low, high, kind: "k0", label: "range, friction at rest" } : null;
-  return lineChart(scene, { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band, pick });
+  return { title: `Drive ${noun} ${driver.name}`, unit: driver.unit, series, band };
 }
 
-function reactionChart(scene, kinds, pick) {
+function reactionChart(scene, kinds) {
   const series = scene.joints.map((joint) => ({
     label: joint.name,
     values: magnitude(joint.reaction, scene.count),
     kind: kinds.get(joint.name),
   }));
-  return lineChart(scene, { title: "Joint reactions, magnitude", unit: "N", series: joined(series), pick });
+  return { title: "Joint reactions, magnitude", unit: "N", series: joined(series) };
 }
 
 /** Series that are the same, drawn once with the names of all: "A = B". */
@@ -126,15 +125,15 @@ function joined(series) {
   return found;
 }
 
-function momentChart(scene, kinds, pick) {
+function momentChart(scene, kinds) {
   const series = scene.joints
     .map(({ name, moment }) => ({ label: name, values: magnitude(moment, scene.count), kind: kinds.get(name) }))
     .filter((one) => peak(one.values) > 0);
   const note = "About the middle of the bearing; without drive and friction.";
-  return lineChart(scene, { title: "Reaction moments, magnitude", unit: "N m", series, note, pick });
+  return { title: "Reaction moments, magnitude", unit: "N m", series, note };
 }
 
-function powerChart(scene, lost, pick) {
+function powerChart(scene, lost) {
   const { count } = scene;
   const drive = total(
     scene.drivers.map((driver) => driver.power),
@@ -151,7 +150,7 @@ function powerChart(scene, lost, pick) {
   ];
   if (peak(rest) > 1e-6 * peak(drive, useful, lost))
     series.push({ label: "masses, other loads", values: rest, kind: "quiet dashed" });
-  return lineChart(scene, { title: "Power", unit: "W", series, pick });
+  return { title: "Power", unit: "W", series };
 }
 
 /** The figures of the present position. */
@@ -261,7 +260,7 @@ export function start(scene, places) {
     if (firm) crank.go(index);
     else if (!crank.playing()) crank.go(index);
   };
-  const curves = places.charts ? charts(scene, kinds, pick) : [];
+  const curves = places.charts ? charts(scene, kinds).map((one) => lineChart(scene, { ...one, pick })) : [];
   const seats = places.seats ? seatCharts(scene, kinds) : [];
   places.seats?.append(...seats.map((chart) => chart.element));
   views.push(...curves, ...seats);

@@ -1,0 +1,92 @@
+"""What an integration in time found: stretches between events, the events, and why it ended early."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.dynamics.followed import Snapshot
+from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.touching import Onset
+
+__all__ = ["CLOSE", "Ended", "Event", "Solution", "Stretch"]
+
+Array = NDArray[np.float64]
+
+CLOSE = 1e-13  # of the time or coordinate: places that are one
+
+
+class Event(NamedTuple):
+    """Something that happens at a time, s: its kind, what it happens to, and a figure with its unit."""
+
+    time: float
+    kind: str
+    of: str
+    figure: float = np.nan
+    unit: str = ""
+
+
+class Stretch(NamedTuple):
+    """A time without events: begin and end, s, and the state in between, (time,) -> (number, time).
+
+    sense: of the motion of one coordinate, 0 while it rests; now: a time within it; snapshot: from which its assembly
+    goes on, where it is followed; onsets, senses, slips: of contacts, joints that may stick and a clutch, see `Moment`.
+    """
+
+    begin: float
+    end: float
+    state: Callable[[Array], Array]
+    sense: float
+    resting: bool
+    now: float
+    snapshot: Snapshot | None = None
+    onsets: tuple[Onset, ...] = ()
+    senses: tuple[int, ...] = ()
+    slips: float = 0.0
+
+
+class Ended(NamedTuple):
+    """Why an integration ended before its time."""
+
+    code: str
+    time: float
+    figures: dict[str, Any]
+
+
+@dataclass
+class Solution:
+    """What an integration found: stretches one after the other, events, and why it ended early, if it did.
+
+    notes: figures of findings by their code; stepped: whether some of it is stepped, to the first order.
+    """
+
+    layout: Layout
+    stretches: list[Stretch] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    ended: Ended | None = None
+    asked: int = 0
+    notes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    stepped: bool = False
+
+    @property
+    def end(self) -> float:
+        """The time until which there is a motion, s."""
+        return self.stretches[-1].end if self.stretches else 0.0
+
+    def at(self, time: Array) -> tuple[Array, NDArray[np.intp]]:
+        """State (number, time) and number of the stretch at rising times; NaN, −1 after the end."""
+        found = np.full((self.layout.size, len(time)), np.nan)
+        which = np.full(len(time), -1, np.intp)
+        ends = np.array([one.end for one in self.stretches])
+        # the end is reached but for rounding
+        time = np.where((time > self.end) & (time <= self.end * (1 + 2 * CLOSE)), self.end, time)
+        number = np.searchsorted(ends, time)
+        for k in np.unique(number[number < len(ends)]):
+            lanes = number == k
+            found[:, lanes] = self.stretches[k].state(time[lanes])
+            which[lanes] = k
+        return found, which

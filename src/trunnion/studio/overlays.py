@@ -1,0 +1,178 @@
+"""What the sheet can show over a mechanism in the plane: motion of a point, instant centres, friction circles,
+transmission angles; each for every position of the cycle, SI and rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.groups import prp, rpp, rpr, rrp, rrr
+from trunnion.solve.forward import Forward
+from trunnion.studies.design import instant_centre
+from trunnion.studio.placed import column
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["centres", "circles", "place_motion", "point_motion", "transmission"]
+
+Array = NDArray[np.float64]
+
+MOST_LINKS = 12  # whose centres against each other are told; of more only those against the ground
+MOTION = ("position", "velocity", "acceleration")
+RATES = ("", "_velocity", "_acceleration")
+FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
+DYADS = (rrr.RRRPose, rrp.RRPPose, rpr.RPRPose, prp.PRPPose, rpp.RPPPose)
+AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
+
+
+def point_motion(result: xr.Dataset, point: str) -> dict[str, Any]:
+    """Velocity, m/s, and acceleration, m/s², of a point "link.point" by axis; KeyError for one that is not known."""
+    axes = [str(axis) for axis in result["axis"].values]
+    rows = {name: _rows(result[f"point_{name}"].sel(point=point)) for name in MOTION[1:]}
+    return {"key": point, **{name: dict(zip(axes, row, strict=True)) for name, row in rows.items()}}
+
+
+def place_motion(result: xr.Dataset, place: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The same of any place on a link in the plane, with its path x, y, m, as that of a rigid body.
+
+    place: `link` and where it is `at` (x, y), m, in position `index`; or `start`, a point of the link, and `local`,
+    from there in the link's axes, m, which the answer tells: they hold when the model has changed. None where there is
+    no such link, or it stands nowhere at that position. With d from the known point, turned with the link:
+    v = v₀ + ω × d, a = a₀ + α × d − ω² d.
+    """
+    link = str(place["link"])
+    start = str(place.get("start") or next((str(key) for key in result["point"].values if _link(key) == link), ""))
+    if start not in result["point"].values or _link(start) != link:
+        return None
+    known = [_rows(result[f"point_{name}"].sel(point=start)) for name in MOTION]
+    angle, turn, second = (result[f"link_angle{name}"].sel(link=link).values for name in RATES)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    if "local" in place:
+        u, v = (float(part) for part in place["local"])
+    else:
+        index = int(place["index"]) % len(angle)
+        dx, dy = (float(part) - float(own[index]) for part, own in zip(place["at"], known[0], strict=True))
+        u, v = (float(one[index]) for one in (cosine * dx + sine * dy, cosine * dy - sine * dx))
+    if not np.isfinite(u + v):
+        return None
+    d = np.array([cosine * u - sine * v, sine * u + cosine * v])
+    across = np.array([-d[1], d[0]])
+    found = known[0] + d, known[1] + turn * across, known[2] + second * across - turn**2 * d
+    parts = {name: dict(zip("xy", rows, strict=True)) for name, rows in zip(MOTION, found, strict=True)}
+    return {"key": f"a place on {link}", "link": link, "start": start, "local": [u, v], **parts}
+
+
+def _rows(vector: xr.DataArray) -> Array:
+    """(axis, position)."""
+    return np.asarray(vector.transpose("axis", "position"), float)
+
+
+def _link(key: Any) -> str:
+    return str(key).rpartition(".")[0]
+
+
+@np.errstate(all="ignore")
+def centres(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Instant centre of each pair of links: place x, y, m, where they have the same velocity.
+
+    Where it lies at infinity, for the two turn alike, x, y are NaN and `far` is the unit vector towards it; where they
+    move as one there is neither. `joint`: the revolute that holds the two, in which the centre stays; `ground`: whether
+    one of them is it. Of many links only the centres against the ground. Source: R. L. Norton, Design of Machinery,
+    "Instant centers of velocity".
+    """
+    mechanism = walk.system.mechanism
+    ground, links = mechanism.fixed_link, list(mechanism.links)
+    links.sort(key=lambda link: link != ground)
+    pairs = [(a, b) for i, a in enumerate(links) for b in links[i + 1 :] if a == ground or len(links) <= MOST_LINKS]
+    held = {frozenset(ends): name for name, (kind, ends) in walk.system.joints.items() if kind == "revolute"}
+    return [
+        {"pair": [a, b], "ground": a == ground, "joint": held.get(frozenset((a, b))), **_centre(walk, a, b, steps)}
+        for a, b in pairs
+    ]
+
+
+def _centre(walk: Forward, first: str, second: str, steps: int) -> dict[str, Any]:
+    one, two = walk.motions[first], walk.motions[second]
+    x, y = (column(part, steps) for part in instant_centre(walk, first, second))
+    # velocity of the second against the first at the second's origin; the centre lies across it
+    w = column(one.twist.w, steps)
+    dx, dy = column(two.frame.x - one.frame.x, steps), column(two.frame.y - one.frame.y, steps)
+    vx = column(two.twist.x - one.twist.x, steps) + w * dy
+    vy = column(two.twist.y - one.twist.y, steps) - w * dx
+    size, pace = column(walk.size, steps), column(walk.pace, steps)
+    turn = np.abs(column(two.twist.w - one.twist.w, steps))
+    speed = np.hypot(vx, vy)
+    still = (turn <= AT_REST * pace) & (speed <= AT_REST * pace * size)
+    away = ~(np.hypot(x, y) <= FAR * size) & (speed > AT_REST * pace * size)
+    sign = np.where(two.twist.w - one.twist.w < 0, -1.0, 1.0)
+    place = {"x": np.where(away | still, np.nan, x), "y": np.where(away | still, np.nan, y)}
+    if not np.any(away):
+        return {**place, "far": None}
+    far = {"x": np.where(away, -sign * vy / speed, np.nan), "y": np.where(away, sign * vx / speed, np.nan)}
+    return {**place, "far": far}
+
+
+@np.errstate(all="ignore")
+def circles(result: xr.Dataset, rubbing: Collection[str]) -> list[dict[str, Any]]:
+    """Friction circle of each journal that rubs: its radius |M|/|F|, m, for Coulomb's law f′ r.
+
+    M, N m, and F, N, are friction torque and reaction on the second link. `offset`, m: of the line of action of both
+    together from the middle of the pin, M/|F|, to the right of F where positive, as r × F = M asks; NaN where the joint
+    rests, for friction is an interval there, and the radius that of the positions beside it.
+    """
+    rows = []
+    for joint in rubbing:
+        if joint not in result["joint"].values or result.attrs.get("kind") != "cycle":
+            continue
+        force = np.hypot(*(result["reaction_force"].sel(joint=joint, axis=axis).values for axis in "xy"))
+        offset = result["friction_torque"].sel(joint=joint).values / force
+        offset = np.where((offset == 0) | ~np.isfinite(offset), np.nan, offset)
+        known = np.flatnonzero(np.isfinite(offset))
+        if not known.size:
+            continue
+        count = len(offset)
+        radius = np.interp(np.arange(count), known, np.abs(offset[known]), period=count)
+        radius[np.isnan(force)] = np.nan
+        rows.append({"joint": joint, "radius": radius, "offset": offset})
+    return rows
+
+
+def transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
+    """Transmission angle of each dyad as it is drawn: at x, y, m, from the direction `first`, rad, on by `angle`, rad.
+
+    The angle's size is that of `studies.design.transmission_angles`, 0 … π/2; the directions are those of the two
+    lines that it lies between. Source: R. L. Norton, Design of Machinery, "Transmission angle".
+    """
+    rows = []
+    with np.errstate(all="ignore"):
+        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
+            found = _lines(walk, module.joints, pose)
+            if found is None:
+                continue
+            (x, y), one, two = found
+            first, second = (column(np.arctan2(line[1], line[0]), steps) for line in (one, two))
+            angle = np.mod(second - first + np.pi / 2, np.pi) - np.pi / 2  # lines have no sense: the acute one
+            rows.append({"name": "-".join(module.joints), "x": column(x, steps), "y": column(y, steps),
+                         "first": first, "angle": angle})  # fmt: skip
+    return rows
+
+
+def _lines(walk: Forward, joints: Collection[str], pose: Any) -> tuple[Any, Any, Any] | None:
+    """Where a dyad's transmission angle is drawn, and directions of the force's line and the normal of the path."""
+    if not isinstance(pose, DYADS):
+        return None
+    b, c, d = (walk.ends(joint)[0] for joint in joints)
+    match pose:
+        case rrr.RRRPose():
+            return (c.x, c.y), (b.x - c.x, b.y - c.y), (d.x - c.x, d.y - c.y)
+        case rrp.RRPPose():
+            return (c.x, c.y), (b.x - c.x, b.y - c.y), (-pose.u[1], pose.u[0])
+        case rpr.RPRPose():
+            return (b.x, b.y), (d.x - b.x, d.y - b.y), (-pose.u[1], pose.u[0])
+        case _:
+            return (c.x, c.y), pose.u, pose.v

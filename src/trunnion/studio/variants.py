@@ -1,0 +1,165 @@
+"""Variants of a model beside each other: the figures one looks at first, and a scene to lay over that of the present.
+
+A variant is another text, or the same without friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from trunnion.errors import MechanismError, Status
+from trunnion.model.units import unit
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, quantity
+from trunnion.solve.system import rubbing
+from trunnion.studio.loaded import Loaded
+from trunnion.studio.margin import margin_of
+from trunnion.views.common.cycle import Abscissa, abscissa, column, names
+from trunnion.views.cycle.scene import scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Figure", "compared", "figures", "overlaid"]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a cycle: what it is, SI value (NaN where there is none), SI unit; `beyond`: it is more than that."""
+
+    label: str
+    value: float
+    unit: str
+    beyond: bool = False
+
+    @property
+    def text(self) -> str:
+        """With its unit."""
+        if self.unit == "%":
+            return f"{number(100 * self.value)} %" if np.isfinite(self.value) else "—"
+        return f"{'> ' if self.beyond else ''}{quantity(self.value, self.unit)}"
+
+    def since(self, before: Figure) -> str:
+        """Its change against a figure before: a share of efforts, a difference of what is a share itself."""
+        change = self.value - before.value
+        if not np.isfinite(change) or self.beyond or before.beyond:
+            return "—"
+        if self.unit == "%":
+            return f"{_percent(100 * change)} points"
+        if self.unit == "1":
+            return _signed(change)
+        if before.value == 0:
+            return f"{'+' if change > 0 else ''}{quantity(change, self.unit)}"
+        return f"{_percent(100 * change / abs(before.value))} %"
+
+
+def _percent(value: float) -> str:
+    text = f"{value:+.0f}" if abs(value) >= 100 else f"{value:+.1f}"
+    return "0" if float(text) == 0 else text.replace("-", "−")
+
+
+def _signed(value: float) -> str:
+    text = number(value, 3) if abs(value) >= 0.0005 else "0"
+    return f"+{text}" if value >= 0.0005 else text
+
+
+def figures(result: xr.Dataset, rubs: bool) -> Iterator[Figure]:
+    """Peak effort of each driver, efficiency, least locking margin, largest reaction, mean friction power."""
+    units = attribute(result, "driver_units")
+    for driver, of in zip(names(result, "driver"), units, strict=False):
+        effort = result["drive_effort"].sel(driver=driver).values
+        yield Figure(f"peak {'force' if of == 'N' else 'torque'}, drive {driver}", _most(np.abs(effort)), of)
+    efficiency = column(result, "efficiency")
+    works = efficiency is not None and efficiency != 0  # where useful loads do no net work there is nothing to share
+    yield Figure("efficiency", float(efficiency) if works and efficiency is not None else float("nan"), "%")
+    least = margin_of(result, rubs)["margin_least"] or {"value": float("nan"), "beyond": False}
+    yield Figure("least locking margin", least["value"], "1", least["beyond"])
+    force = np.asarray(result["reaction_force"].transpose("axis", ...))
+    yield Figure("largest reaction", _most(np.linalg.norm(force, axis=0)), "N")
+    yield Figure("mean friction power", float(result["friction_power_mean"].sum()), "W")
+    known = np.count_nonzero(result["status"].values < Status.NOT_CONVERGED)
+    yield Figure("positions solved", float(known), "")
+
+
+def _most(values: Any) -> float:
+    return float(np.nanmax(values)) if np.any(np.isfinite(values)) else float("nan")
+
+
+def compared(before: xr.Dataset, rubbed: bool, after: xr.Dataset, rubs: bool) -> list[dict[str, Any]]:
+    """Rows of the table: label, SI values a and b, their texts and that of the change; None of a figure one lacks.
+
+    Positions solved are told only where they are not all.
+    """
+    was = {one.label: one for one in figures(before, rubbed)}
+    rows = []
+    for one in figures(after, rubs):
+        other = was.get(one.label, Figure(one.label, float("nan"), one.unit))
+        if not one.unit and one.value == after.sizes["position"] and other.value == before.sizes["position"]:
+            continue
+        change = "" if not one.unit else one.since(other)
+        rows.append({"label": one.label, "unit": one.unit, "a": other.value, "b": one.value,
+                     "texts": [other.text, one.text, change]})  # fmt: skip
+    return rows
+
+
+def overlaid(state: Loaded, friction: bool, steps: int, present: xr.Dataset, rubs: bool) -> dict[str, Any]:
+    """A variant to lay over the present result: its scene at the positions of that, its margin, the table.
+
+    `shifted`: its drive runs over another range, and each position shows the nearest of its own; `why`: it has no
+    cycle, or none that runs over the same drive.
+    """
+    try:
+        result = state.result(steps, friction)
+    except MechanismError as error:
+        found = error.findings[0]
+        return {"scene": None, "why": f"cannot be solved: {found.where} {found.what}".strip(), "rows": []}
+    rubbed = friction and bool(rubbing(state.run.system))
+    rows = compared(result, rubbed, present, rubs)
+    own, over = abscissa(result), abscissa(present)
+    if (own.label, own.closed) != (over.label, over.closed):
+        why = f"runs over {own.label}, the present one over {over.label}: its curves cannot be laid over"
+        return {"scene": None, "why": why, "rows": rows}
+    index, inside = _nearest(own, over)
+    shown = scene(result, None, max_positions=result.sizes["position"])
+    margin = margin_of(result, rubbed)["margin"]
+    same = bool(np.array_equal(index, np.arange(len(own.values))) and np.all(inside))
+    if not same:
+        shown = _picked(shown, result.sizes["position"], index, inside)
+        margin = None if margin is None else np.where(inside, margin[index], np.nan)
+    return {"scene": shown, "margin": margin, "why": None, "shifted": not same, "rows": rows}
+
+
+def _nearest(own: Abscissa, over: Abscissa) -> tuple[Any, Any]:
+    """For each position the index of the nearest of another drive, and whether it lies within that one's range."""
+    known = own.values * _size(own.unit) / _size(over.unit)
+    order = np.argsort(known)
+    ranked = known[order]
+    above = np.clip(np.searchsorted(ranked, over.values), 1, max(len(ranked) - 1, 1))
+    above = np.minimum(above, len(ranked) - 1)
+    below = np.maximum(above - 1, 0)
+    nearer = np.abs(ranked[below] - over.values) <= np.abs(ranked[above] - over.values)
+    index = order[np.where(nearer, below, above)]
+    step = float(np.max(np.diff(ranked))) if len(ranked) > 1 else 0.0
+    return index, np.abs(known[index] - over.values) <= 0.5 * step + 1e-9 * float(np.max(np.abs(ranked)))
+
+
+def _size(unit_of: str) -> float:
+    """How many SI units one of an abscissa is; degrees, counts: 1."""
+    return float(unit(unit_of)[0]) if unit_of not in ("", "°") else 1.0
+
+
+def _picked(tree: Any, count: int, index: Any, inside: Any) -> Any:
+    """A scene with its series taken at some of its positions."""
+    if isinstance(tree, dict):
+        return {key: _picked(one, count, index, inside) for key, one in tree.items()}
+    if (
+        isinstance(tree, list)
+        and len(tree) == count
+        and all(one is None or isinstance(one, (int, float)) for one in tree)
+    ):
+        return [tree[i] if near else None for i, near in zip(index, inside, strict=True)]
+    return [_picked(one, count, index, inside) for one in tree] if isinstance(tree, list) else tree

@@ -1,0 +1,239 @@
+// What lies over the mechanism on the sheet: motion of the chosen point, instant centres, friction circles, transmission
+// angles, values at the arrows, and the outlines of variant A. Python works it out; here it is only drawn.
+
+import { arrow } from "../web/arrow.js";
+import { at, hull, magnitude, peak, place } from "../web/data.js";
+import { svg } from "../web/dom.js";
+import { quantity, roundBelow, stated } from "../web/format.js";
+import { KEY, perNewton, trackPath } from "./drawing.js";
+import { roundAbove } from "./geometry.js";
+import { laid } from "./layers.js";
+import { shown } from "./sheet.js";
+import * as state from "./state.js";
+import { compared } from "./variants.js";
+
+const CIRCLE = 12; // px: smaller friction circles are drawn enlarged
+const ROOM = 26; // px between the frame and what points out of it
+const LETTER = 7; // px, its width in what is written
+const LINE = 15; // px, its height
+const VECTORS = [["velocity", "v", "m/s"], ["acceleration", "a", "m/s²"]];
+
+/** Where words stand already, [{left, right, y}] px. */
+let taken = [];
+
+/** Make room for it: variants under the mechanism, all else over it. */
+export function addOverlay({ root, layers }) {
+  layers.variants = svg("g", { class: "layer variants-of-sheet" });
+  layers.overlay = svg("g", { class: "layer overlay" });
+  root.insertBefore(layers.variants, layers.ground);
+  root.insertBefore(layers.overlay, layers.names);
+}
+
+/** Draw it for the position that is shown: variants also while a joint is dragged, the rest once there is an answer. */
+export function poseOverlay(view) {
+  const { layers, scene } = view;
+  const known = state.solved.peek() && !state.live.peek() && !shown.peek()?.sketched;
+  const wanted = state.layers.peek();
+  const told = known && laid.peek()?.scene === scene ? laid.peek() : {};
+  const key = []; // lines of the key, from below
+  taken = wanted.names ? names(view) : [];
+  layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
+  layers.overlay.replaceChildren(
+    ...(told.circles ? circles(view, told.circles, key) : []),
+    ...(told.transmission ? told.transmission.flatMap((one) => angle(view, one)) : []),
+    ...(told.centres ? centres(view, told.centres, wanted) : []),
+    ...(known && wanted.reactions && wanted.values ? values(view) : []),
+    ...(told.point ? motion(view, told.point, wanted, key) : []),
+    ...key.map((draw, order) => draw(view.frame.height - 16 - 20 * (order + 1))),
+  );
+}
+
+/** Words that take no room of others: they step down until they are free. */
+function words(x, y, text, kind = "") {
+  const wide = LETTER * text.length;
+  const left = kind === "to-left" ? x - wide : x;
+  const meets = (one) => left < one.right && left + wide > one.left && Math.abs(one.y - y) < LINE;
+  while (taken.some(meets)) y += LINE;
+  taken.push({ left, right: left + wide, y });
+  return svg("text", { class: `laid ${kind}`, x: x.toFixed(1), y: y.toFixed(1) }, text);
+}
+
+/** Words beyond the tip of an arrow from a spot. */
+function beyond([x, y], [dx, dy], text) {
+  const size = Math.hypot(dx, dy) || 1;
+  return words(x + dx + (9 * dx) / size, y + dy + (13 * dy) / size + 4, text, dx < 0 ? "to-left" : "");
+}
+
+/** A line of the key, at the right edge of the sheet. */
+function keyed({ frame }, wide, text, drawn) {
+  return (y) => {
+    const x = frame.width - wide - KEY;
+    return svg("g", {}, drawn(x, y), svg("text", { class: "of-key", x: x + wide + 8, y, dy: "0.32em" }, text));
+  };
+}
+
+// ---- the chosen point -----------------------------------------------------------------------------------------------
+
+function motion(view, point, wanted, key) {
+  const { frame, index, scene } = view;
+  const scenery = point.position ? { ...scene, points: { [point.key]: point.position } } : scene;
+  const found = place(scenery, point.key, index);
+  if (!found) return [];
+  const [x, y] = frame.to(found);
+  const path = point.position ? [curve(view, scenery, point), svg("circle", { class: "clicked-place", cx: x, cy: y, r: 4 })] : [];
+  return path.concat(VECTORS.filter(([name]) => wanted[name]).flatMap(([name, sign, unit]) => {
+    const parts = point[name];
+    const sizes = magnitude(parts, scene.count);
+    const scale = (0.2 * Math.min(frame.width, frame.height)) / peak(sizes);
+    if (!Number.isFinite(scale)) return [];
+    const one = roundBelow(110 / scale);
+    key.push(keyed(view, one * scale, `${name} ${stated(one, unit)}`, (left, low) => svg("path", { class: `motion ${name}`, d: arrow(left, low, one * scale, 0) })));
+    const [dx, dy] = [at(parts.x, index), at(parts.y, index)];
+    if (dx === null || dy === null) return [];
+    const vector = svg("path", { class: `motion ${name}`, d: arrow(x, y, dx * scale, -dy * scale) });
+    return [vector, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(sizes[index], unit, peak(sizes))}`)];
+  }));
+}
+
+/** The path of a place that was clicked; it is drawn in metres once. */
+function curve({ frame }, scenery, point) {
+  point.path ??= trackPath(scenery, point.key);
+  const transform = `matrix(${frame.scale},0,0,${-frame.scale},${frame.left},${frame.foot})`;
+  return svg("path", { class: "track free", d: point.path, transform, "vector-effect": "non-scaling-stroke" });
+}
+
+// ---- instant centres ------------------------------------------------------------------------------------------------
+
+function centres(view, list, wanted) {
+  const { frame, index } = view;
+  return list
+    .filter((one) => (one.ground ? wanted.centres : wanted.relative))
+    .flatMap(({ pair, joint, x, y, far, ground }) => {
+      const name = `${pair[1]} / ${pair[0]}`;
+      const kind = ground ? "centre absolute" : "centre";
+      const [a, b] = [at(x, index), at(y, index)];
+      const title = svg("title", {}, `instant centre of ${pair[1]} against ${pair[0]}`);
+      if (a !== null && b !== null) {
+        const spot = frame.to([a, b]);
+        if (!inside(frame, spot)) return edge(frame, spot, kind, `${name}, ${stated(Math.hypot(...less(frame, spot)) / frame.scale, "m")} away`);
+        const mark = svg("path", { class: kind, d: `M${spot[0].toFixed(1)},${spot[1].toFixed(1)}m-6,0l6,-6l6,6l-6,6Z` }, title);
+        return joint ? [mark] : [mark, words(spot[0] + 10, spot[1] + 16, name)];
+      }
+      const [ux, uy] = far ? [at(far.x, index), at(far.y, index)] : [null, null];
+      if (ux === null || uy === null) return [];
+      const long = 4 * (frame.width + frame.height);
+      return edge(frame, [frame.width / 2 + long * ux, frame.height / 2 - long * uy], kind, `${name}, at infinity`);
+    });
+}
+
+function inside({ width, height }, [x, y]) {
+  return x >= 0 && x <= width && y >= 0 && y <= height;
+}
+
+/** From the middle of the window to a spot, px. */
+function less({ width, height }, [x, y]) {
+  return [x - width / 2, y - height / 2];
+}
+
+/** A mark at the edge of the window that points to a spot outside it. */
+function edge(frame, spot, kind, text) {
+  const [dx, dy] = less(frame, spot);
+  const reach = Math.min((frame.width / 2 - ROOM) / Math.abs(dx), (frame.height / 2 - 2 * ROOM) / Math.abs(dy));
+  const [x, y] = [frame.width / 2 + dx * reach, frame.height / 2 + dy * reach];
+  const size = Math.hypot(dx, dy);
+  const right = x > frame.width / 2;
+  const mark = svg("path", { class: kind, d: arrow(x - (14 * dx) / size, y - (14 * dy) / size, (14 * dx) / size, (14 * dy) / size) });
+  return [mark, words(x + (right ? -20 : 20), y + 4, text, right ? "to-left" : "")];
+}
+
+// ---- friction circles -----------------------------------------------------------------------------------------------
+
+function circles(view, list, key) {
+  const { frame, scene, index } = view;
+  const most = peak(...list.map(({ radius }) => radius)) * frame.scale;
+  if (!(most > 0)) return [];
+  const times = most >= CIRCLE ? 1 : roundAbove(CIRCLE / most);
+  const told = times > 1 ? `friction circles × ${times}` : "friction circles";
+  key.push(keyed(view, 22, told, (x, y) => svg("circle", { class: "friction-circle", cx: x + 11, cy: y, r: 6 })));
+  return list.flatMap(({ joint: name, radius, offset }) => {
+    const joint = scene.joints.find((one) => one.name === name);
+    const found = joint && place(scene, joint.at, index);
+    const size = at(radius, index);
+    if (!found || size === null) return [];
+    const [x, y] = frame.to(found);
+    const r = size * frame.scale * times;
+    const circle = svg("circle", { class: "friction-circle", cx: x.toFixed(1), cy: y.toFixed(1), r: r.toFixed(1) });
+    const told = words(x + 12 + r * 0.7, y + 18 + r * 0.4, `${name}: r = ${quantity(size, "m")}`);
+    const arm = at(offset, index);
+    const [fx, fy] = [at(joint.reaction.x, index), at(joint.reaction.y, index)];
+    const force = Math.hypot(fx, fy);
+    if (arm === null || !(force > 0)) return [circle, told];
+    // to the right of the force, seen along it; y points down on the screen
+    const shift = (arm * frame.scale * times) / force;
+    const [tx, ty] = [x + shift * fy, y + shift * fx];
+    const [ux, uy] = [(64 * fx) / force, (-64 * fy) / force];
+    const line = svg("path", { class: "line-of-action", d: `M${tx - ux},${ty - uy}L${tx + ux},${ty + uy}` });
+    return [line, circle, told];
+  });
+}
+
+// ---- transmission angles --------------------------------------------------------------------------------------------
+
+function angle({ frame, index }, { x, y, first, angle: turn }) {
+  const [a, b, from, by] = [x, y, first, turn].map((one) => at(one, index));
+  if ([a, b, from, by].includes(null)) return [];
+  const spot = frame.to([a, b]);
+  const on = (way, far) => [spot[0] + far * Math.cos(way), spot[1] - far * Math.sin(way)];
+  const pair = ([px, py]) => `${px.toFixed(1)},${py.toFixed(1)}`;
+  const [start, end] = [on(from, 38), on(from + by, 38)];
+  const rays = [from, from + by].map((way) => `M${pair(on(way, 10))}L${pair(on(way, 58))}`).join("");
+  const middle = on(from + by / 2, 66);
+  const text = `transmission angle ${((Math.abs(by) * 180) / Math.PI).toFixed(1)}°`;
+  return [
+    svg("path", { class: "transmission rays", d: rays }),
+    svg("path", { class: "transmission", d: `M${pair(start)}A38,38 0 0 ${by > 0 ? 0 : 1} ${pair(end)}` }),
+    words(middle[0], middle[1], text, middle[0] < spot[0] ? "to-left" : ""),
+  ];
+}
+
+// ---- values of the reactions ----------------------------------------------------------------------------------------
+
+function values(view) {
+  const { scene, frame, index } = view;
+  const scale = perNewton(view);
+  return scene.joints.flatMap(({ name, at: key, reaction }) => {
+    const [fx, fy] = [at(reaction.x, index), at(reaction.y, index)];
+    const found = place(scene, key, index);
+    if (!found || fx === null || fy === null) return [];
+    const [x, y] = frame.to(found);
+    return [beyond([x, y], [fx * scale, -fy * scale], `${name} ${quantity(Math.hypot(fx, fy), "N")}`)];
+  });
+}
+
+/** The names of joints and points as words that stand already. */
+function names({ parts, scene, frame, posed }) {
+  return (parts?.names ?? []).flatMap(({ key, other, beside, node }) => {
+    const found = place(scene, key, posed) ?? place(scene, other, posed);
+    if (!found) return [];
+    const [x, y] = frame.to(found);
+    const half = (LETTER * node.textContent.length) / 2 + 3;
+    return [{ left: x + beside[0] - half, right: x + beside[0] + half, y: y + beside[1] }];
+  });
+}
+
+// ---- variant A ------------------------------------------------------------------------------------------------------
+
+function variants(view, key) {
+  const { frame, index, scene } = view;
+  const other = compared.peek().find((one) => one.ghost && one.scene?.count === scene.count);
+  if (!other) return [];
+  const line = (x, y) => svg("path", { class: "outline-of-variant", d: `M${x},${y}h22` });
+  key.push(keyed(view, 22, other.name, line));
+  return other.scene.links
+    .filter((link) => !link.ground)
+    .map((link) => {
+      const spots = link.points.map((name) => place(other.scene, name, index)).filter(Boolean);
+      const corners = hull(spots.map(frame.to)).map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`);
+      return svg("path", { class: "outline-of-variant", d: corners.length > 1 ? `M${corners.join("L")}Z` : "" });
+    });
+}

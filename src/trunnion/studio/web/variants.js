@@ -1,0 +1,87 @@
+// Variant A: the state that was kept, beside the present one in plots, sheet and a table; and the same without friction.
+
+import { effect, signal, untracked } from "@preact/signals";
+import { askOf, takeText } from "./actions.js";
+import * as state from "./state.js";
+import { Button, html } from "./ui.js";
+
+const PLACE = "trunnion studio variant A";
+
+/** {text, friction, time} of the state that was kept, or null. */
+export const kept = signal(stored());
+/** Variants beside the present scene: [{name, ghost, heads, scene, margin, shifted, why, rows}]. */
+export const compared = signal([]);
+
+function stored() {
+  try {
+    return JSON.parse(sessionStorage.getItem(PLACE) ?? "null");
+  } catch {
+    return null; // storage is off, or of another version
+  }
+}
+
+/** Ask for the variants whenever one is wanted and there is a new answer. */
+export function keepCompared() {
+  effect(() => {
+    try {
+      sessionStorage.setItem(PLACE, JSON.stringify(kept.value));
+    } catch {
+      // no storage or no room: the variant lives as long as the page
+    }
+  });
+  effect(() => {
+    const found = state.solved.value ? state.answer.value : null;
+    const wanted = found ? variants(kept.value, found, state.friction.value === "compare") : [];
+    untracked(() => {
+      if (!wanted.length) compared.value = [];
+      else
+        askOf("compare", { others: wanted.map(({ text, friction }) => ({ text, friction })) }).then((told) => {
+          if (told) compared.value = told.others.map((one, order) => ({ ...wanted[order], ...one }));
+        });
+    });
+  });
+}
+
+/** The variants of an answer: A where it is another than that, and the same without friction. */
+export function variants(own, { text, friction }, free) {
+  const list = [];
+  if (own && (own.text !== text || own.friction !== friction))
+    list.push({ name: "variant A", ghost: own.text !== text, heads: ["variant A", "now"], ...own });
+  if (free) list.push({ name: "without friction", ghost: false, heads: ["without", "with"], text, friction: "off" });
+  return list;
+}
+
+function keep() {
+  const { text, friction } = state.answer.value;
+  kept.value = { text, friction, time: new Date().toISOString() };
+  state.say("Kept as variant A: change the mechanism, and both are shown.");
+}
+
+/** The buttons that keep a variant, and the tables of what it changes. */
+export function Variants() {
+  const own = kept.value;
+  const clock = own && new Date(own.time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+  const same = own && state.answer.value?.text === own.text && state.answer.value.friction === own.friction;
+  return html`<section class="variants" aria-label="Variants">
+    <p class="row-of-buttons">
+      <${Button} label=${own ? "Keep this instead" : "Keep as variant A"} title="Keep the present state as variant A, to compare with what follows" disabled=${!state.solved.value || same} onClick=${keep} />
+      ${own && html`<${Button} label="Go back to A" disabled=${state.text.value === own.text} onClick=${() => takeText(own.text, "Go back to variant A")} />
+        <${Button} label="Drop A" onClick=${() => (kept.value = null)} />
+        <span class="calm">${same ? `Variant A, kept ${clock}, is what is shown.` : `A kept ${clock}.`}</span>`}
+    </p>
+    ${compared.value.map((one) => html`<${Changes} one=${one} />`)}
+  </section>`; // prettier-ignore
+}
+
+function Changes({ one: { name, heads, rows, why, shifted } }) {
+  const title = `${name[0].toUpperCase()}${name.slice(1)}`;
+  return html`<div class="changes">
+    ${why && html`<p class="calm">${title} ${why}.</p>`}
+    ${shifted && html`<p class="calm">${title} runs over another range of the drive: each position shows the nearest of its own.</p>`}
+    ${rows.length > 0 && html`<table>
+      <caption class="unseen">${title} and the present state</caption>
+      <thead><tr><th scope="col"><span class="unseen">Figure</span></th>${[...heads, "change"].map((head) => html`<th scope="col" class="figure">${head}</th>`)}</tr></thead>
+      <tbody>${rows.map(({ label, texts }) => html`<tr><th scope="row">${label}</th>${texts.map((text) => html`<td class="figure">${text}</td>`)}</tr>`)}</tbody>
+    </table>`}
+  </div>`; // prettier-ignore
+}

@@ -1,0 +1,313 @@
+"""The frame of the studio's page in a real browser: first picture, gallery, links, picture behind the grid, files."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+import subprocess
+import sys
+import threading
+import time
+import zlib
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import trunnion
+from browsing import CHROMIUM, User
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+
+ROOT = Path(__file__).resolve().parents[2]
+FOURBAR = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
+MOST_GIF = 3.0  # s
+
+FOREIGN = """<!doctype html><title>evil</title><iframe src="{address}"></iframe><img src="{home}/studio/main.js">
+<script>
+const tried = {{}};
+const fetched = (name, path, asked) => fetch("{home}" + path, asked).then((reply) => reply.text()).then(
+  (text) => (tried[name] = text), () => (tried[name] = null));
+const opened = new Promise((done) => {{
+  const socket = new WebSocket("{home}/socket".replace("http", "ws"));
+  socket.onopen = () => done("open");
+  socket.onclose = () => done(null);
+}});
+window.done = Promise.all([
+  fetched("page", "/", {{ credentials: "include" }}),
+  fetched("token", "{query}", {{ credentials: "include" }}),
+  fetched("file", "/file/four-bar.yaml", {{ credentials: "include" }}),
+  fetched("written", "/file/four-bar.yaml", {{ method: "PUT", body: "evil", credentials: "include" }}),
+  fetched("simple", "/file/four-bar.yaml", {{ method: "POST", body: "evil", mode: "no-cors", credentials: "include" }}),
+  opened.then((state) => (tried.socket = state)),
+]).then(() => tried);
+</script>"""
+
+
+def encoded(content):
+    """Behind `#m=`, made by another hand than the page's: raw deflate, base64 for addresses."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return base64.urlsafe_b64encode(packer.compress(content) + packer.flush()).decode().rstrip("=")
+
+
+if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
+
+    def choose(user, menu, words):
+        user.page.click(f"summary:has-text('{menu}')")
+        user.page.locator(".menu button", has_text=words).click()
+
+    def exported(user, what):
+        """The bytes of a file, and how long it took."""
+        user.page.click("summary:has-text('Export')")
+        begin = time.perf_counter()
+        with user.page.expect_download(timeout=60000) as told:
+            user.page.locator(".menu button", has_text=what).click()
+        return Path(told.value.path()).read_bytes(), time.perf_counter() - begin
+
+    def test_the_first_picture_is_where_the_solved_one_is(user):
+        page = user.page
+        page.route("**/socket", lambda route: route.abort())  # it needs no answer over the socket
+        page.reload()
+        page.wait_for_selector('.handle[data-name="C"]')
+        user.wrong.clear()
+        first = {name: user.handle(name) for name in "ABCD"}
+        page.unroute("**/socket")
+        page.reload()
+        user.until("s.solved.value")
+        for name, place in first.items():
+            assert np.hypot(*np.subtract(user.handle(name), place)) < 6  # px: the player takes its place below
+
+    def test_a_sheet_begun_while_the_file_is_read_stays(user):
+        held = []
+        user.page.route("**/first/*", lambda route: held.append(route))
+        user.page.reload()
+        user.page.wait_for_selector(".sheet svg")
+        user.page.wait_for_timeout(300)
+        choose(user, "File", "New sheet")
+        assert len(held) == 1
+        held[0].continue_()
+        user.page.unroute("**/first/*")
+        user.until("s.about.value.version")
+        assert user.state("s.text.value") == ""
+        assert user.state("s.fileName.value") is None
+
+    def test_a_refused_name_is_told_in_the_dialog(user):
+        choose(user, "File", "Save as")
+        user.page.locator("dialog input").fill("../elsewhere.yaml")
+        user.page.click("dialog button:has-text('Save')")
+        user.page.wait_for_selector("dialog [role=alert]:not(:empty)")
+        assert "is not the name of a model file" in user.page.locator("dialog [role=alert]").inner_text()
+        user.wrong.clear()  # the console tells of the answer 400
+        user.page.locator("dialog input").fill("mine.yaml")
+        user.page.click("dialog button:has-text('Save')")
+        user.idle()
+        assert user.page.locator("dialog").count() == 0
+        (user.studio.folder / "mine.yaml").write_text("trunnion: 1\n", encoding="utf-8")
+        user.page.evaluate("import('/studio/actions.js').then(a => a.typed('trunnion: 1\\nname: other\\n'))")
+        user.idle()
+        choose(user, "File", "Save as")
+        user.page.click("dialog button:has-text('Save')")
+        user.page.wait_for_selector("dialog [role=alert]:not(:empty)")
+        assert "changed elsewhere" in user.page.locator("dialog [role=alert]").inner_text()
+        user.page.keyboard.press("Escape")
+        assert user.page.locator("dialog").count() == 0
+
+    @pytest.mark.slow
+    def test_examples_have_pictures(user):
+        choose(user, "File", "Examples")
+        assert user.page.locator(".gallery li").count() > 40
+        user.page.locator("dialog input").fill("four-bar of durango")
+        user.page.wait_for_selector(".gallery .thumbnail .body")
+        assert user.page.locator(".gallery li").count() == 1
+        assert user.page.locator(".thumbnail .body").count() == 3  # crank, coupler, rocker
+        user.page.locator(".gallery button").click()
+        user.until("s.solved.value")
+        assert user.state("s.text.value") == FOURBAR
+        assert user.state("s.fileName.value") is None
+
+    @pytest.mark.slow
+    def test_a_link_carries_a_model(user):
+        link = user.page.evaluate(
+            "text => import('/studio/links.js').then(l => l.linkOf(text, location.href))", FOURBAR + "# Ö\n"
+        )
+        assert len(link) < 2000
+        other = User(user.page.context.new_page(), user.studio)
+        other.page.goto(link)
+        other.until("s.solved.value")
+        assert other.state("s.text.value") == FOURBAR + "# Ö\n"
+        assert "#" not in other.page.url
+        assert not other.wrong
+        other.page.evaluate("hash => location.hash = hash", f"#m={encoded(FOURBAR.encode())}")
+        other.until("!s.text.value.includes('Ö')")
+        assert other.state("s.text.value") == FOURBAR
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        ("signs", "told"),
+        [
+            ("AAAA", "damaged"),
+            (encoded(FOURBAR.encode())[:-40], "damaged"),
+            ("a%22%3E%3Cscript%3E", "no link has"),
+            ("A" * 150_000, "120,000 at most"),
+            (encoded(b"\xff\xfe\xfd"), "damaged"),
+            (encoded(b"a" * 300_001), "more than 300,000 signs"),
+            (encoded(bytes(60_000_000)), "more than 300,000 signs"),  # a bomb: 60 MB in 58 kB
+        ],
+        ids=["nonsense", "cut", "markup", "long", "bytes", "large", "bomb"],
+    )
+    def test_hostile_links_are_refused_in_words(user, signs, told):
+        before = user.state("s.text.value")
+        user.page.evaluate("hash => location.hash = hash", f"#m={signs}")
+        user.until("s.notice.value.bad")
+        assert told in user.state("s.notice.value.words")
+        assert user.state("s.text.value") == before
+
+    @pytest.mark.slow
+    def test_a_long_model_makes_no_link(user):
+        noise = "".join(f"# {k * 7919 % 104729:x}{k * 104729 % 7919:x}\n" for k in range(4000))
+        told = user.page.evaluate(
+            "text => import('/studio/links.js').then(l => l.linkOf(text, location.href)).catch(e => e.message)", noise
+        )
+        assert "16,000 at most" in told
+
+    @pytest.mark.slow
+    def test_a_picture_behind_the_grid(user, tmp_path):
+        Image.effect_noise((400, 200), 60).save(tmp_path / "drawing.png")
+        choose(user, "Show", "Picture behind the grid")
+        user.page.locator(".photo-card input[type=file]").set_input_files(tmp_path / "drawing.png")
+        user.until("s.photo.value")
+        box = user.page.locator(".layer.photo image").bounding_box()
+        user.page.click("text=Scale by two points")
+        ends = [(box["x"] + (0.5 + share) * box["width"], box["y"] + 0.3 * box["height"]) for share in (0, 0.25)]
+        for end in ends:
+            user.page.mouse.click(*end)
+        user.page.wait_for_selector(".photo-card form")
+        user.page.keyboard.type("3 in")
+        user.page.keyboard.press("Enter")
+        photo = user.state("({ ...s.photo.value, image: s.photo.value.image.type })")
+        assert photo["pixel"] == pytest.approx(3 * 0.0254 / 100, rel=0.02)  # 100 of its 400 px; clicks are whole px
+        assert user.state("s.past.value.length") == 0  # no click reached the mechanism
+        user.page.locator(".photo-card input[type=range]").fill("0.8")
+        left = user.page.locator(".layer.photo image").bounding_box()["x"]
+        user.page.click("button:has-text('Move')")
+        user.page.mouse.click(700, 200)
+        user.page.mouse.click(740, 200)
+        user.page.wait_for_timeout(100)
+        assert user.page.locator(".layer.photo image").bounding_box()["x"] == pytest.approx(left + 40, abs=1.5)
+        kept = user.state("({ ...s.photo.value, image: 0 })")
+        user.page.wait_for_timeout(200)
+        user.page.reload()
+        user.until("s.solved.value && s.photo.value")
+        assert user.state("({ ...s.photo.value, image: 0 })") == kept
+        assert kept["opacity"] == 0.8
+        user.page.evaluate("import('/studio/actions.js').then(a => a.save('with-picture.yaml'))")
+        user.idle()
+        assert (user.studio.folder / "with-picture.yaml").read_text("utf-8") == FOURBAR
+        assert user.state("Boolean(s.photo.value)")
+        choose(user, "File", "New sheet")
+        user.until("s.photo.value === null")
+        assert user.page.locator(".layer.photo image").count() == 0
+
+    @pytest.mark.slow
+    def test_no_picture_is_told(user, tmp_path):
+        (tmp_path / "no.png").write_bytes(b"no picture")
+        choose(user, "Show", "Picture behind the grid")
+        user.page.locator(".photo-card input[type=file]").set_input_files(tmp_path / "no.png")
+        user.until("s.notice.value.bad")
+        assert "no picture" in user.state("s.notice.value.words")
+
+    # ---- files ----------------------------------------------------------------------------------------------------
+
+    @pytest.mark.slow
+    def test_tables_and_the_script_say_what_the_analysis_says(user, tmp_path):
+        result = trunnion.analyse(Mechanism(**entries_of(FOURBAR)[0]), 360)
+        table, _ = exported(user, "CSV")
+        columns = np.genfromtxt(io.BytesIO(table), delimiter=",", names=True, deletechars="")
+        np.testing.assert_allclose(columns["A.effort"], result["drive_effort"].values[0], rtol=1e-9)
+        script, _ = exported(user, "Python")
+        (tmp_path / "session.py").write_bytes(script)
+        subprocess.run([sys.executable, "session.py"], cwd=tmp_path, check=True, capture_output=True, timeout=120)
+        again = np.genfromtxt(tmp_path / "result.csv", delimiter=",", names=True, deletechars="")
+        np.testing.assert_allclose(again["A.effort"], columns["A.effort"], rtol=1e-12)
+
+    @pytest.mark.slow
+    def test_pictures_and_the_report_are_whole(user):
+        picture = Image.open(io.BytesIO(exported(user, "PNG")[0]))
+        assert min(picture.size) > 300
+        assert len(picture.convert("RGB").getcolors(1 << 24)) > 50  # not blank
+        drawn = ElementTree.fromstring(exported(user, "SVG")[0])
+        assert len(list(drawn.iter("{http://www.w3.org/2000/svg}path"))) > 20
+        report = exported(user, "Report")[0].decode()
+        assert "Four-bar of Durango" in report
+        assert not re.search(r'(?:src|href)="https?:', report)
+
+    @pytest.mark.slow
+    def test_an_animation_of_60_pictures_within_3_s(user):
+        exported(user, "GIF")  # loads what draws
+        content, took = exported(user, "GIF")
+        animation = Image.open(io.BytesIO(content))
+        assert animation.n_frames == 60
+        assert took < 2 * MOST_GIF  # the figure is that of a machine that does nothing else
+
+    # ---- who else -------------------------------------------------------------------------------------------------
+
+    @pytest.mark.slow
+    def test_a_page_of_another_origin_neither_reads_nor_writes(user):
+        home, query = user.studio.address.split("/?")
+        page = FOREIGN.format(address=user.studio.address, home=home, query=f"/?{query}").encode()
+
+        class Foreign(BaseHTTPRequestHandler):
+            def do_GET(self):
+                self.send_response(200)
+                self.send_header("Content-Type", "text/html")
+                self.end_headers()
+                self.wfile.write(page)
+
+            def log_message(self, *_):
+                pass
+
+        server = ThreadingHTTPServer(("127.0.0.1", 0), Foreign)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        before = (user.studio.folder / "four-bar.yaml").read_text("utf-8")
+        try:
+            other = user.page.context.new_page()  # of the same browser, with the cookie of the studio
+            other.goto(f"http://127.0.0.1:{server.server_port}/")
+            tried = other.evaluate("window.done")
+            assert set(tried.values()) <= {None, ""}, json.dumps(tried)[:500]
+            inside = other.frames[1].evaluate("document.body ? document.body.innerText : ''")
+            assert "Trunnion" not in inside
+        finally:
+            server.shutdown()
+            server.server_close()
+        assert (user.studio.folder / "four-bar.yaml").read_text("utf-8") == before
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        "text",
+        [
+            FOURBAR.replace("2.00 m", "1e308 m"),
+            FOURBAR.replace("2.00 m", "9" * 4000),
+            FOURBAR.replace("2.00 m", "=" + "9**" * 3000 + "9"),
+            "trunnion: 1\nlinks: " + "{a: " * 3000 + "}" * 3000,
+            "a: &a [x, x]\n" + "".join(f"b{k}: &b{k} [*{'a' if k == 0 else f'b{k - 1}'}, *a]\n" for k in range(60)),
+            "trunnion: 1\nlinks:\n" + "".join(f"  l{k}: {{}}\n" for k in range(100_000)),
+        ],
+        ids=["1e308", "digits", "powers", "nested", "aliases", "links"],
+    )
+    def test_a_hostile_model_does_not_freeze_the_page(user, text):
+        begin = time.perf_counter()
+        user.page.evaluate("text => import('/studio/actions.js').then(a => a.typed(text))", text)
+        user.page.wait_for_timeout(500)
+        user.idle()
+        assert time.perf_counter() - begin < 20
+        waited = user.page.evaluate(
+            "new Promise(done => { const from = performance.now(); setTimeout(() => done(performance.now() - from)); })"
+        )
+        assert waited < 1000  # ms
+        user.page.evaluate("text => import('/studio/actions.js').then(a => a.typed(text))", FOURBAR)
+        user.until("s.solved.value && s.answer.value.text === s.text.value")

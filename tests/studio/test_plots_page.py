@@ -1,0 +1,231 @@
+"""Plots, layers and variants of the studio's page in a real browser, where there is one, against `analyse`.
+
+Every test fails on an error of the page, on one in its console, and on a request to anywhere but this machine.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trunnion
+from browsing import CHROMIUM
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
+FLOAT = 1e-6  # of the peak
+
+
+def analysed(text, friction=True):
+    mechanism = Mechanism(**entries_of(text)[0])
+    return trunnion.analyse(mechanism if friction else mechanism.with_friction("off"), 360)
+
+
+def number(text):
+    """A number as the page writes it."""
+    return float(text.replace("\u202f", "").replace("−", "-").split("\u00a0")[0].split()[0])
+
+
+if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
+
+    def laid(user, words):
+        return user.page.evaluate(f'import("/studio/layers.js").then(l => {words})')
+
+    def variant(user, words):
+        return user.page.evaluate(f'import("/studio/variants.js").then(v => {words})')
+
+    def until(user, module, words):
+        """Wait for what a module knows."""
+        for _ in range(400):
+            if user.page.evaluate(f'import("/studio/{module}.js").then(m => Boolean({words}))'):
+                return user.idle()
+            user.page.wait_for_timeout(25)
+        return pytest.fail(f"never: {words}")
+
+    def written(user, text):
+        user.page.evaluate("content => import('/studio/actions.js').then(a => a.takeText(content, 'Edit'))", text)
+        user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
+
+    def show(user, *names):
+        user.page.click("summary:has-text('Show')")
+        for name in names:
+            user.page.get_by_label(name, exact=True).click()
+        user.keys("Escape")
+
+    def go(user, index):
+        user.page.evaluate(f"import('/studio/motion.js').then(m => m.crank.go({index}))")
+
+    def laid_words(user):
+        return user.page.locator(".layer.overlay text").all_text_contents()
+
+    @pytest.mark.slow
+    def test_one_click_on_a_link_gives_the_curve_of_the_place_with_its_velocity_and_acceleration(user):
+        until(user, "sheet", "m.sheet.view.sized && !m.sheet.view.fresh")
+        user.page.wait_for_timeout(300)  # the page may ask for its first answer twice
+        user.idle()
+        (bx, by), (cx, cy) = user.handle("B"), user.handle("C")
+        tracks = user.page.locator(".track.free").count()
+        user.page.mouse.click(0.5 * (bx + cx), 0.5 * (by + cy) - 10)
+        until(user, "layers", "m.laid.value?.point?.link === 'coupler'")
+        user.page.wait_for_selector(".overlay .track.free")
+        assert user.page.locator(".track.free").count() == tracks + 1
+        user.page.click("role=tab[name=Plots]")
+        assert "Velocity of a place on coupler" in user.page.locator(".chart .title").all_inner_texts()
+        traced = laid(user, "l.laid.value.point")
+        user.page.click("button:has-text('Make it a point')")
+        user.until("s.selection.value?.kind === 'points' && s.solved.value")
+        key = user.state("s.selection.value.name")
+        assert key.startswith("coupler.")
+        until(user, "layers", f"m.laid.value?.point?.key === '{key}'")
+        result = analysed(user.state("s.text.value"))
+        go(user, 60)
+        told = {words[0]: number(words[4:]) for words in laid_words(user) if words[1:4] == " = "}
+        for sign, name in (("v", "velocity"), ("a", "acceleration")):
+            own = result[f"point_{name}"].sel(point=key).values
+            for axis, row in zip("xy", own, strict=True):
+                near = {"rtol": 0, "atol": FLOAT * np.abs(own).max()}
+                np.testing.assert_allclose(laid(user, f"l.laid.value.point.{name}.{axis}"), row, **near)
+                near["atol"] *= 1e3  # the file has it to a tenth of the grid
+                np.testing.assert_allclose(traced[name][axis], row, **near)
+            assert told[sign] == pytest.approx(float(np.hypot(*own[:, 60])), rel=2e-3)
+        words = " ".join(laid_words(user))
+        assert "m/s²" in words
+        assert re.search(r"velocity \d+", words)
+        titles = user.page.locator(".chart .title").all_inner_texts()
+        assert {f"Velocity of {key}", f"Acceleration of {key}"} <= set(titles)
+
+    @pytest.mark.slow
+    def test_layers_are_switched(user):
+        names = (
+            "Friction circles",
+            "Transmission angles",
+            "Instant centres against the ground",
+            "Instant centres between links",
+        )
+        kinds = {"circle.friction-circle": 5, "path.transmission": 2, "path.centre": 6}  # one circle is of the key
+        for kind in kinds:
+            assert user.page.locator(kind).count() == 0
+        show(user, *names, "Values of the reactions")
+        user.page.wait_for_selector("path.centre")
+        go(user, 60)
+        for kind, count in kinds.items():
+            assert user.page.locator(kind).count() == count, kind
+        result, words = analysed(user.state("s.text.value")), laid_words(user)
+        reaction = result["reaction_force"].sel(joint="B").values[:, 60]
+        (told,) = [one for one in words if re.match(r"B \d", one)]
+        assert told.endswith("kN")
+        assert 1000 * number(told[2:]) == pytest.approx(float(np.hypot(*reaction)), rel=1e-3)
+        assert [one for one in words if one.startswith("C: r = ")] == ["C: r = 3.000\u00a0mm"]
+        assert any("friction circles × " in one for one in words)
+        (angle,) = [one for one in words if one.startswith("transmission angle")]
+        assert angle.endswith("°")
+        show(user, *names)
+        user.idle()
+        assert sum(user.page.locator(kind).count() for kind in kinds) == 0
+
+    @pytest.mark.slow
+    def test_a_table_and_its_plot_and_the_mechanism_move_each_other(user):
+        user.page.click("role=tab[name=Plots]")
+        chart = user.page.locator(".chart").first
+        button = chart.get_by_role("button", name="Table of Drive torque A")
+        button.focus()
+        user.keys("Enter")
+        assert button.get_attribute("aria-expanded") == "true"
+        rows = chart.locator("tbody tr")
+        torque = analysed(user.state("s.text.value"))["drive_effort"].values[0]
+        assert rows.count() == 360
+        assert chart.locator("thead th").all_inner_texts() == ["drive angle A [°]", "torque [kN m]"]
+        for index in (0, 59, 340):
+            assert number(rows.nth(index).locator("td").inner_text()) == pytest.approx(torque[index] / 1000, abs=5e-3)
+        rows.nth(5).hover()
+        user.page.wait_for_timeout(60)
+        assert user.state("s.index.value") == 5
+        box = chart.locator(".plot").bounding_box()
+        user.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 40)
+        user.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 50)
+        user.page.wait_for_timeout(60)
+        index = user.state("s.index.value")
+        assert 100 < index < 300
+        marked = chart.locator("tr[aria-current=true]")
+        assert marked.get_attribute("data-index") == str(index)
+        inner, outer = marked.bounding_box(), chart.locator(".numbers").bounding_box()
+        assert outer["y"] <= inner["y"] <= outer["y"] + outer["height"] - inner["height"] + 1
+        chart.locator(".numbers").focus()
+        user.keys("ArrowDown", "PageDown")
+        assert user.state("s.index.value") == index + 11
+        user.keys("Home")
+        assert user.state("s.index.value") == 0
+
+    @pytest.mark.slow
+    def test_two_variants_are_compared(user):
+        user.page.click("role=tab[name=Plots]")
+        user.page.click("button:has-text('Keep as variant A')")
+        before = user.state("s.text.value")
+        after = before.replace("BC: 6.00 m", "BC: 5.50 m")
+        written(user, after)
+        user.page.wait_for_selector(".changes td")
+        results = [analysed(text) for text in (before, after)]
+        peaks = [float(np.abs(one["drive_effort"]).max()) / 1000 for one in results]
+        cells = user.page.locator(".changes tr", has_text="peak torque").locator("td").all_inner_texts()
+        assert [number(one) for one in cells[:2]] == pytest.approx(peaks, rel=1e-3)
+        assert number(cells[2]) == pytest.approx(100 * (peaks[1] / peaks[0] - 1), abs=0.06)
+        legend = user.page.locator(".chart").first.locator(".legend .label").all_inner_texts()
+        assert legend == ["torque", "torque, variant A"]
+        overlaid = variant(user, "v.compared.value[0].scene.drivers[0].effort")
+        own = results[0]["drive_effort"].values[0]
+        np.testing.assert_allclose(overlaid, own, atol=FLOAT * np.abs(own).max())
+        assert user.page.locator("path.outline-of-variant").count() == 4  # three links and the key
+        user.page.click("button:has-text('Go back to A')")
+        user.until("s.solved.value && s.text.value.includes('BC: 6.00 m')")
+        assert user.page.locator(".changes").count() == 0
+        assert user.page.locator("path.outline-of-variant").count() == 0
+        user.page.locator(".sheet > svg").focus()
+        user.keys("Control+z")
+        assert user.state("s.text.value") == after
+        user.page.click("button:has-text('Drop A')")
+        user.idle()
+        assert user.page.locator(".changes").count() == 0
+
+    @pytest.mark.slow
+    def test_with_and_without_friction_are_laid_over_each_other(user):
+        user.page.click("role=tab[name=Plots]")
+        user.page.locator(".choice select").first.select_option("compare")
+        user.page.wait_for_selector(".changes td")
+        free = analysed(user.state("s.text.value"), friction=False)["drive_effort"].values[0]
+        overlaid = variant(user, "v.compared.value[0].scene.drivers[0].effort")
+        np.testing.assert_allclose(overlaid, free, atol=FLOAT * np.abs(free).max())
+        legend = user.page.locator(".chart").first.locator(".legend .label").all_inner_texts()
+        assert legend == ["torque", "torque, without friction"]
+        user.page.locator(".polars summary").focus()
+        user.keys("Enter")
+        loops = user.page.locator(".chart.polar")
+        assert loops.count() == 4
+        assert loops.first.locator("path.curve").count() == 2
+        loops.first.get_by_role("button", name="Table of reaction A").click()
+        go(user, 60)
+        force = analysed(user.state("s.text.value"))["reaction_force"].sel(joint="A").values[:, 60] / 1000
+        cells = loops.first.locator("tr[aria-current=true] td").all_inner_texts()
+        assert [number(one) for one in cells] == pytest.approx([*force, np.hypot(*force)], abs=6e-3)
+
+    @pytest.mark.slow
+    def test_the_margin_is_always_in_view(user):
+        margin = user.page.locator(".bar.bottom .margin")
+        assert "> 10 everywhere" in margin.inner_text()
+        press = EXAMPLES["drawing-press"]
+        for text, told in (
+            (press, "3.45 here, least 3.45 at 0 mm"),
+            (press.replace("friction: 0.1", "friction: 0.4"), "0.862 here: it locks, least 0.862 at 0 mm"),
+            (EXAMPLES["pezzuti-cardan"], "least 4.32 at 1°"),
+        ):
+            written(user, text)
+            go(user, 0)
+            user.idle()
+            assert told in margin.inner_text()
+            box = margin.bounding_box()
+            assert box["x"] + box["width"] < 1280
+            assert margin.is_visible()

@@ -1,8 +1,12 @@
 """The studio in a real browser: start to first picture and to the solved cycle, drags solved and drawn a second,
-pictures a second while it is scrubbed. `python -m benchmarks.studio`; needs Chromium and the extra dev."""
+pictures a second while it is scrubbed; memory while it plays. Needs Chromium and the extra dev.
+
+    python -m benchmarks.studio [--play MINUTES]
+"""
 
 from __future__ import annotations
 
+import argparse
 import shutil
 import subprocess
 import sys
@@ -61,6 +65,9 @@ SCRUB = """async (seconds) => {
 
 def main() -> None:
     """Print the figures of both mechanisms."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.studio", description=__doc__)
+    parser.add_argument("--play", type=int, default=0, metavar="MINUTES", help="of play whose memory is measured")
+    minutes = parser.parse_args().play
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         for name, joint in DRAGGED.items():
@@ -72,6 +79,8 @@ def main() -> None:
                     address = process.stdout.readline().split()[-1]
                     page = browser.new_page(viewport={"width": 1280, "height": 720})
                     _measure(page, name, joint, address, begin)
+                    if minutes and name == next(iter(DRAGGED)):
+                        _played(page, minutes, process.pid)
                     page.close()
                 finally:
                     process.terminate()
@@ -93,6 +102,25 @@ def _measure(page: Page, name: str, joint: str, address: str, begin: float) -> N
     plots = page.evaluate(SCRUB, SECONDS)
     print(f"{name}: first picture {cold:.2f} s, solved {whole:.2f} s, {rate:.0f} drags solved and drawn/s, ", end="")
     print(f"scrubbing {frames:.0f} frames/s, with plots {plots:.0f}")
+
+
+def _played(page: Page, minutes: int, served: int) -> None:
+    """Memory of the page after its rubbish is collected, its nodes and listeners, and memory of the server."""
+    watched = page.context.new_cdp_session(page)
+    watched.send("Performance.enable")
+    page.evaluate('import("/studio/motion.js").then(({ crank }) => crank.player.playing() || crank.player.toggle())')
+    for minute in range(minutes + 1):
+        watched.send("HeapProfiler.collectGarbage")
+        told = {one["name"]: one["value"] for one in watched.send("Performance.getMetrics")["metrics"]}
+        status = Path(f"/proc/{served}/status").read_text(encoding="ascii")
+        resident = int(status.split("VmRSS:")[1].split()[0]) / 1024
+        print(
+            f"  {minute} min of play: page {told['JSHeapUsedSize'] / 2**20:.1f} MiB, {told['Nodes']:.0f} nodes, ",
+            end="",
+        )
+        print(f"{told['JSEventListeners']:.0f} listeners; server {resident:.0f} MiB", flush=True)
+        if minute < minutes:
+            page.wait_for_timeout(60_000)
 
 
 if __name__ == "__main__":

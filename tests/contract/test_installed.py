@@ -8,11 +8,13 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 import trunnion
+from browsing import CHROMIUM, QUIET, User
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = Path(__file__).with_name("every_name.py")
@@ -85,3 +87,25 @@ def test_it_runs_as_a_module_and_completes_in_a_shell(installed: Path, tmp_path:
     assert run(sys.executable, command, **at, **asked).split() == ["--steps"]
     run(sys.executable, command, "--install-completion", "bash", **at, HOME=str(tmp_path))
     assert list(tmp_path.rglob("*trunnion*"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no browser here")
+def test_the_studio_is_served_without_node(installed: Path, tmp_path: Path) -> None:
+    """With nothing on the PATH: every module that the browser asks for is in the wheel, and the answers come."""
+    from playwright.sync_api import sync_playwright
+
+    (tmp_path / "m.yaml").write_text((ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8"), encoding="utf-8")
+    command = [sys.executable, "-m", "trunnion", "studio", "m.yaml", "--no-open", "--port", "0"]
+    bare = {"PYTHONPATH": str(installed), "PATH": "", "HOME": str(tmp_path)}
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, env=bare) as process:
+        assert process.stdout is not None
+        address = process.stdout.readline().split()[-1]
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+            user = User(browser.new_page(), SimpleNamespace(address=address))
+            user.open()
+            user.page.wait_for_selector(".motion .player")
+            browser.close()
+        process.terminate()
+    assert user.wrong == []

@@ -10,6 +10,7 @@ import pytest
 
 from timed import slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate, sweep
+from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -128,3 +129,24 @@ def test_a_dimension_goes_before_a_measure_of_its_name() -> None:
     one = pressed("-30 N - 1000 N/m * way", dimensions={"way": "5 mm"})
     other = pressed("-35 N")
     assert analyse(one, 12)["drive_effort"].values == pytest.approx(analyse(other, 12)["drive_effort"].values)
+
+
+@pytest.mark.parametrize(("free_length", "rows"), [(0.0, 0), (0.01, 1)])
+def test_a_spring_whose_ends_meet_at_the_start(free_length: float, rows: int) -> None:
+    """Without a free length x = v/w sin w t; with one there is no direction at 0 s, which is said and marked."""
+    slide = {"at": [0, 0], "axis": [1, 0]}
+    block = Mechanism(
+        links={
+            "ground": {"points": {"S": slide, "F": [0, 0]}},
+            "block": {"points": {"S": slide, "P": [0, 0]}, "mass": 1},
+        },
+        joints={"S": {"type": "prismatic", "links": ["ground", "block"]}},
+        drivers={"S": {"range": [-1, 1], "speed": 1, "free": True, "initial": {"coordinate": 0, "speed": 0.5}}},
+        springs={"k": {"between": ["ground.F", "block.P"], "stiffness": 100, "free_length": free_length}},
+    )
+    result = simulate(block, 0.2, 4)
+    assert np.sum(result["status"] == Status.LOAD_UNDEFINED) == rows
+    assert [one.code for one in result.trunnion.findings] == ["simulate.undefined"] * rows
+    if not rows:
+        wanted = 0.05 * np.sin(10 * result["time"].values)
+        assert result["drive_coordinate"].values[0] == pytest.approx(wanted, abs=1e-9)

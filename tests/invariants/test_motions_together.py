@@ -52,7 +52,7 @@ def courses_of(run: Run, values: dict[str, Any], count: int, duration: float, to
 
 def alone(run: Run, values: dict[str, Any], i: int, duration: float) -> dict[str, float]:
     with np.errstate(all="ignore"):
-        return batch._alone(run, run.system.plan.modules[0].driven[0], picked(values, i), duration, 1e-10)
+        return batch._alone(run, run.system.plan.modules[0].driven[0], picked(values, i), duration, 1e-10, None)
 
 
 # ---- closed forms ---------------------------------------------------------------------------------------------

@@ -130,3 +130,13 @@ def test_it_is_written_and_read_again() -> None:
     mechanism = Mechanism(**sprung(stiffness=900.0, free_length=FREE, only="pull"))
     assert json.loads(json.dumps(mechanism.data()))["springs"]["S"]["only"] == "pull"
     assert Mechanism(**mechanism.data()) == mechanism
+
+
+def test_a_spring_without_free_length_needs_no_direction() -> None:
+    """Its ends meet at 0°: it pulls by k times the way between them, and turns the crank by k r² sin θ everywhere."""
+    data = sprung()
+    data["springs"]["S"] = {"between": ["ground.S", "crank.B"], "stiffness": 10.0, "free_length": 0}
+    x, y = data["links"]["ground"]["points"]["S"] = list(data["links"]["crank"]["points"]["B"])
+    result = run(data, 12)
+    turn = np.arange(12) * np.pi / 6
+    assert result["drive_effort"].values[0] == pytest.approx(10.0 * (x * x + y * y) * np.sin(turn), abs=1e-12)

@@ -37,3 +37,13 @@ def test_no_steady_cycle_is_a_finding_with_its_cause(program: Run) -> None:
     assert code == 1
     assert "there is no steady cycle" in err
     assert "O does not start" in err
+
+
+@pytest.mark.parametrize("name", ["b.spectrum.csv", "b.impacts.csv", "b.events.csv --steady", "b.png --kind orbit"])
+def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found(
+    program: Run, tmp_path: Path, name: str
+) -> None:
+    code, _, err = program("simulate", PRESS, "--time=1h", "--out", *name.split())
+    assert code == 2
+    assert "there is no table" in err or "no joint of this motion is in play" in err
+    assert not list(tmp_path.glob("b.*"))

@@ -105,6 +105,13 @@ def test_after_an_overload_it_holds_again() -> None:
     balanced(result, last(result, "work_drive"))
 
 
+def test_it_holds_what_is_just_its_capacity() -> None:
+    """T − J₁ T/(J₁ + J₂), without a load: it carries the whole of C, by rounding more, and holds."""
+    result = simulate(wheel({**RUN_UP, "off_from": 5, "clutch": 4 - ROTOR * 4 / (ROTOR + WHEEL)}, drag=0.0), 1.0, 2)
+    assert events(result) == []
+    assert last(result, "drive_rate") == pytest.approx(4 / (ROTOR + WHEEL), rel=1e-9)
+
+
 def test_the_rotor_turns_while_the_load_holds_the_mechanism() -> None:
     """1 N m comes through the clutch, 3 N m are needed: the wheel rests, and the rotor gets faster by 3 N m."""
     result = simulate(wheel({**RUN_UP, "clutch": 1}, drag=3.0), 0.4, 4, 1e-11)

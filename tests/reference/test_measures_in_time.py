@@ -50,6 +50,21 @@ def test_first_order_of_the_starting_time() -> None:
     assert float(found["yield_all"]) == 1.0
 
 
+def test_a_duration_too_short_is_told() -> None:
+    """Turns of the nominal wheel come to differ by less than 2 %, those of a heavier one do not yet."""
+    duration = 1.15 * 0.05 * 150 / 4
+    mechanism = stated(
+        wheel(LINEAR),
+        tolerances={"links.wheel.inertia": 0.005},
+        measures={"start": {"starting_time": "A", "duration": duration}},
+    )
+    found = trunnion.tolerance(mechanism, methods=("linear", "worst-case"), jobs=1)
+    assert "first_order.corner_not_steady" in [one.code for one in found.trunnion.findings]
+    short = stated(mechanism, measures={"start": {"starting_time": "A", "duration": 1.0}})
+    found = trunnion.tolerance(short, methods=("linear",), jobs=1)
+    assert "tolerance.nominal_not_steady" in [one.code for one in found.trunnion.findings]
+
+
 def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     """Torques about the drag: half of them do not start."""
     motor = {**LINEAR, "stall_effort": 0.6}
@@ -72,6 +87,10 @@ def test_a_sweep_has_the_figures_of_each_point() -> None:
     )
     # ten cycles at 100 rad/s: too short for it to run steadily, so that there is none
     assert np.all(np.isnan(swept["starting_time:A"]))
+    (said,) = [one for one in swept.trunnion.findings if one.code == "sweep.not_steady"]
+    assert said.where == "measures.starting_time:A"
+    assert "no value at 3 of 3 points" in said.what
+    assert "within 628.3 ms A does not come to run steadily" in said.what
     np.testing.assert_allclose(swept["peak_effort:A"], 4.0, rtol=1e-8)
     longer = stated(mechanism, measures={"start": MEASURE})
     found = trunnion.sweep(longer, {"links.wheel.inertia": inertias}, 24, measures=["start"])["start"].values

@@ -149,6 +149,18 @@ def test_a_speed_control_holds_the_speed() -> None:
     assert at(result, "drive_rate", 3.0) == pytest.approx(wanted.y[1, -1], rel=1e-8)
 
 
+def test_a_controller_on_the_brink_breaks_the_wheel_away_at_once() -> None:
+    """K_p ω* is what the loss holds, and ∫ grows: J ω̈ + K_p ω̇ + K_i ω = K_i ω* from rest at t = 0."""
+    motor = {"kind": "speed-control", "target": 100, "proportional": 0.006, "integral": 1e-6, "limit": 5}
+    result = simulate(wheel(motor), 2.0, 4, 1e-11)
+    fast, slow = np.roots([0.05, 0.006, 1e-6])
+    time = result["time"].values[1:]
+    wanted = 100 * (1 - (fast * np.exp(slow * time) - slow * np.exp(fast * time)) / (fast - slow))
+    assert result["drive_rate"].values[0, 1:] == pytest.approx(wanted, rel=1e-8)
+    assert len(events(result, "rest")) == 1
+    assert events(result, "break-away") == pytest.approx([0.0], abs=1e-9)
+
+
 # Andrews' squeezer, from the test set of Mazzia and Magherini: β, Θ, γ, Φ, δ, Ω, ε at the start and at 0.03 s
 START = np.array([
     -0.0617138900142764496, 0.0, 0.455279819163070380, 0.222668390165885884, 0.487364979543842550,
@@ -238,6 +250,19 @@ def test_a_pulled_mass_with_bristles() -> None:
     steady, damping = 1 + 0.5 * np.exp(-((speed / 1e-3) ** 2)), np.sqrt(1e5)
     bristles = (force - (damping + 0.4) * speed) / (1e5 - damping * 1e5 * abs(speed) / steady)
     assert bristles == pytest.approx(1.18168e-5, abs=5e-11)
+
+
+def test_stiff_bristles_take_a_slider_crank_past_its_dead_centre() -> None:
+    """At 148.6 ms the integrator first asks far off, where the friction has no solution; a shorter step finds one."""
+    law = {
+        "law": "lugre", "coefficient": 0.1, "static": 0.15, "stribeck_speed": 1e-3, "stiffness": 1e5, "damping": 300,
+        "viscous": 0.4,
+    }  # fmt: skip
+    result = simulate(slider_crank(law), 0.155, 1)
+    assert not result.trunnion.findings
+    finer = 3.405241456  # at a tolerance of 1e-12
+    assert at(result, "drive_coordinate", 0.155) == pytest.approx(finer, rel=1e-8)
+    assert abs(float(result["energy_residual"].values[-1])) < 1e-8 * float(result["work_drive"].values.sum())
 
 
 # ---- against an integration in maximal coordinates, written here --------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 
 Array = NDArray[np.float64]
+EXAMPLE = Path(__file__).parents[2] / "examples" / "tilting-gudgeon-pin.yaml"
 
 
 def test_a_long_pin_is_a_pin_in_the_plane() -> None:
@@ -252,3 +254,9 @@ def test_other_loops_stay_determined() -> None:
     with pytest.raises(MechanismError) as raised:
         trunnion.simulate(Mechanism(**data), 1e-3)
     assert [one.what.partition(" constrain")[0] for one in raised.value.findings] == ["O, B, C, D"]
+
+
+def test_a_body_without_mass_that_only_slides_is_named() -> None:
+    with pytest.raises(MechanismError) as raised:
+        trunnion.simulate(trunnion.read(EXAMPLE).with_values({"links.piston.mass": 0.0}), 1e-3)
+    assert [finding.where for finding in raised.value.findings] == ["links.piston"]

@@ -72,12 +72,22 @@ def simulate(
 
     The motion of drivers that are free or have a motor, with friction, stick and slip, forces, energy and events.
     """
+    from trunnion.dynamics.opened import in_play
     from trunnion.dynamics.simulate import simulated
     from trunnion.dynamics.steady_cycle import UnsteadyError
+    from trunnion.results.tables import check_table
 
-    check_files(out or [], report, of="cycle" if steady else "motion", kind=kind if out else None)
+    of = "cycle" if steady else "motion"
+    check_files(out or [], report, of=of, kind=kind if out else None)
     duration, step = seconds(time, "--time", "2s"), seconds(impact_step, "--impact-step", "1us")
     mechanism = stated(file, set_, table, friction)
+    if not in_play(mechanism):
+        for path in out or []:
+            check_table(path, of, in_play=False)
+        if kind and out:
+            from trunnion.views.motion.contacts import check_kind
+
+            check_kind(kind, in_play=False)
     with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
 
         def told(reached: float) -> None:

@@ -54,7 +54,8 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
     if condition < SINGULAR:
         return
     joints = dict.fromkeys(one.joint for one in motion.contacts.each)
-    light = [link for one in motion.contacts.each for link in (one.body, one.other) if not _weighs(motion, link)]
+    touching = dict.fromkeys(link for one in motion.contacts.each for link in (one.body, one.other))
+    light = [link for link in touching if not _weighs(motion, link)]
     light = [link for link in light if any(name.startswith(f"{link}_in_play_") for name in motion.names)] or light
     if not light:  # what turns without inertia
         weakest = motion.names[int(np.argmax(np.abs(np.linalg.eigh(matrix)[1][:, 0])))]
@@ -66,6 +67,9 @@ def refuse_massless(motion: FreeMotion, row: Array) -> None:
             for link in links
             if "_in_play_" not in link and not _weighs(motion, link, whole=True)
         ]
+    if not light:  # what only slides: its inertia does not help it
+        ground, values = motion.system.mechanism.fixed_link, motion.values
+        light = [link for link in touching if link != ground and not np.any(values[f"links.{link}.mass"])]
     names = ", ".join(dict.fromkeys(light)) or "some link"
     what = (
         f"{names} has no mass, or no inertia, where nothing holds it while the pins of {', '.join(joints)} are in play"

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 LOOKED = 8  # parts of a step at whose ends slip and carried effort are looked at
 LANES = ("time", "q", "rate", "integral", "bristles", "slip")
 EXACT = 1e-14  # of the time: to which an event is located
+ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
 
 
 def _drive(motion: FreeMotion) -> Drive:
@@ -117,7 +118,11 @@ class ClutchMotion(Integration):
             rests = sense == 0.0
         at = self.layout.moment(np.array([time]), row[:, None], sense, now)
         carried = float(self._carried(at, rests)[0])
-        return float(np.sign(carried)) if abs(carried) > self.drive.clutch else 0.0
+        return float(np.sign(carried)) if abs(carried) > self._capacity else 0.0
+
+    @property
+    def _capacity(self) -> float:
+        return self.drive.clutch * (1.0 + ROUNDING)
 
     def _carried(self, at: Moment, rests: bool) -> Array:
         """Effort through a clutch that holds, (lane,): the motor's, less what the rotor takes."""
@@ -166,7 +171,7 @@ class ClutchMotion(Integration):
             return slip
         if not self.drive.engaged(stretch.now):
             return np.ones_like(times)
-        left: Array = self.drive.clutch - np.abs(self._carried(self._held(stretch, times), stretch.resting))
+        left: Array = self._capacity - np.abs(self._carried(self._held(stretch, times), stretch.resting))
         return left
 
     def _held(self, stretch: Stretch, times: Array) -> Moment:

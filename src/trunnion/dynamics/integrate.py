@@ -37,6 +37,7 @@ Array = NDArray[np.float64]
 MOST_EVENTS = 100_000
 CREEPING, CREPT = 400, 1e-9  # steps that get on by less of the duration: it does not get on
 STUCK = 50  # events at one time
+RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 SECANTS = 8  # rounds to the place of a time in a step along another number
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
 
@@ -191,7 +192,8 @@ class Integration:
             self.end("range", time, {"coordinate": float(row[0])})
             return time, row, None
         first = min(step, 0.5 * (until - time)) if step else None
-        solver, marks = self._solver(rate, time, row, until, self._absolute(row), first), [time]
+        absolute, marks = self._absolute(row), [time]
+        solver = self._solver(rate, time, row, until, absolute, first)
         dead_centre = DeadCentre(self.motion, self.layout)
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
@@ -199,7 +201,7 @@ class Integration:
             if len(marks) > CREEPING and before - marks[-CREEPING] < CREPT * self.duration:
                 return self._failed(before, row, sense, now, "")
             near = self._near(row, between, self._next(solver, until), rate, before)
-            failed = None if near else solver.step()
+            solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
                 return self._failed(before, row, sense, now, failed)
             passed = near or self._passed(row, np.array(solver.y), sense, between)
@@ -246,6 +248,19 @@ class Integration:
         if first is None and not np.all(np.isfinite(rate(begin, row))):
             first = 1e-12 * abs(end - begin)  # SciPy would look for one without end; so the first step fails
         return kind(rate, begin, row, end, rtol=self.tolerance, atol=absolute, first_step=first)
+
+    def _stepped(
+        self, solver: OdeSolver, rate: Callable[[float, Array], Array], absolute: Array
+    ) -> tuple[OdeSolver, str | None]:
+        """One step, and why there is none. LSODA does not get over an unknown rate: it begins anew, shorter."""
+        begin, state, failed = float(solver.t), np.array(solver.y), solver.step()
+        for k in range(1, RETRIES + 1 if self.motion.bristles else 0):
+            if solver.status != "failed" and np.all(np.isfinite(solver.y)):
+                break
+            end = float(solver.t_bound)
+            solver = self._solver(rate, begin, state, end, absolute, 0.01**k * abs(end - begin))
+            failed = solver.step()
+        return solver, failed
 
     @staticmethod
     def _next(solver: OdeSolver, until: float) -> float:
@@ -314,7 +329,7 @@ class Integration:
         solver = self._solver(by_number, begin, state, to.value, absolute)
         while solver.status == "running":
             last, held = float(solver.t), np.array(solver.y)
-            failed = solver.step()
+            solver, failed = self._stepped(solver, by_number, absolute) if last == begin else (solver, solver.step())
             wrong, before = solver.status == "failed" or not np.all(np.isfinite(solver.y)), held.copy()
             before[k] = last
             if wrong and k == 0 and before[n] != 0.0:  # it turns round before the place

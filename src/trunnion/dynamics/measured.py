@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.batch import figures_in_time, one_by_one
+from trunnion.dynamics.prepared import CYCLES
 from trunnion.errors import Finding
 from trunnion.measures.evaluation import Courses, NumpyKernel, shape_of
 from trunnion.measures.measures import Measure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 
-__all__ = ["MotionKernel", "courses_in_time", "numbers_in_time", "slow_motions"]
+__all__ = ["MotionKernel", "courses_in_time", "numbers_in_time", "slow_motions", "unfound"]
 
 Array = NDArray[np.float64]
 
@@ -43,6 +44,12 @@ def slow_motions(run: Run, measures: Iterable[Measure], varied: Iterable[str]) -
     timed = [measure.name for measure in measures if measure.in_time]
     if timed and (why := one_by_one(run, varied)):
         yield finding_for("motions.one_by_one", f"measures.{timed[0]}", phrases={"why": why}, measures=timed)
+
+
+def unfound(run: Run, measure: Measure) -> dict[str, Any]:
+    """What is to be said of a measure of a motion in time that has no value."""
+    duration = CYCLES * run.cycle.duration if measure.duration is None else measure.duration
+    return {"measure": measure.name, "driver": measure.subject, "duration": duration}
 
 
 def courses_in_time(

@@ -22,7 +22,7 @@ from trunnion.dynamics.spectrum import FEWEST, FREQUENCY, SPECTRUM, spectrum
 from trunnion.dynamics.started import steady_figures
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import SLOWEST
-from trunnion.errors import Finding
+from trunnion.errors import Finding, Status
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
 from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
@@ -94,6 +94,7 @@ def result_of(
     findings = [
         *motion_findings(motion, solution, run, impacts),
         *_unbalanced(books, residual, turned_over, solution.stepped),
+        *_undefined(books),
     ]
     attributes = encoded(
         {
@@ -231,6 +232,13 @@ def _unbalanced(books: Books, residual: Array, turned_over: float, stepped: bool
     if turned_over > 0 and worst > max(WORST * turned_over, rounding):
         code = "simulate.energy_stepped" if stepped else "simulate.energy"
         yield finding_for(code, share=worst / turned_over)
+
+
+def _undefined(books: Books) -> Iterator[Finding]:
+    """Rows of a motion that goes on, without forces."""
+    rows = np.flatnonzero(books.arrays["status"] == Status.LOAD_UNDEFINED)
+    if len(rows):
+        yield finding_for("simulate.undefined", "loads", count=len(rows), time=float(books.time[rows[0]]))
 
 
 # ---- findings -------------------------------------------------------------------------------------------------

@@ -295,21 +295,28 @@ def _elongation(walk: Forward, path: str, joint: str, turns: bool) -> Number:
 
 
 def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> tuple[LoadAction, SpringState]:
-    """A spring along the line between two points; no value where they meet, for the line has no direction there."""
+    """A spring along the line between two points; no value where they meet, for the line has no direction there.
+
+    One without free length, preload or damping pulls by its stiffness times the way between them, there too.
+    """
     one, other = (end.partition(".")[0] for end in ends)
     a, b = (walk.point(link, point) for link, _, point in (end.partition(".") for end in ends))
     apart = _difference(b.place, a.place)
     square = _dot(apart, apart)
     xp = namespace(square)
-    there, meeting = primal(square) > 0, 1.0 if only == "pull" else np.nan  # a slack rope needs no direction
-    length = xp.sqrt(xp.where(there, square, meeting))
-    direction = tuple(part / length for part in apart)
-    rate = _dot(_difference(b.velocity, a.velocity), direction)
-    elongation = xp.where(there, length, 0.0 * length) - walk.values.get(f"{path}.free_length", 0.0)
+    free, preload, damping, stiffness = (
+        walk.values.get(f"{path}.{key}", 0.0) for key in ("free_length", "preload", "damping", "stiffness")
+    )
+    directed = abs(primal(free)) + abs(primal(preload)) + abs(primal(damping))
+    there, needs = primal(square) > 0, 0.0 if only == "pull" else directed  # a slack rope needs no direction
+    length = xp.sqrt(xp.where(there, square, namespace(needs).where(needs > 0, np.nan, 1.0)))
+    rate = _dot(_difference(b.velocity, a.velocity), apart) / length
+    elongation = xp.where(there, length, 0.0 * length) - free
     state = spring_state(walk, path, elongation, rate, only)
+    along = namespace(state.force, stiffness).where(primal(square) + directed > 0, state.force / length, stiffness)
     on = []
     for link, end, sign in ((one, a, 1.0), (other, b, -1.0)):
-        pull = tuple(sign * state.force * part for part in direction)
+        pull = tuple(sign * along * part for part in apart)
         on.append((link, walk.algebra.load(walk.motions[link].frame, pull, walk.algebra.NO_MOMENT, end.place)))
     return LoadAction(on, state.power), state
 

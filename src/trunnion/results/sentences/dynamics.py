@@ -49,6 +49,11 @@ DYNAMICS: dict[str, Sentence] = {
         "the integration needs steps below rounding at {time:~s} (coordinate {coordinate:.6g}, rate {rate:.6g})",
         "check the forces there: one of them jumps or grows without bound",
     ),
+    "simulate.undefined": Sentence(
+        ERROR,
+        "a load or spring has no value in {count:#row} of the result, first at {time:~s}: there are no forces there",
+        "extend its tables, check divisions and roots; the line of a spring has no direction where its ends coincide",
+    ),
     "simulate.events": Sentence(
         ERROR,
         "there are {count:.0f} events up to {time:~s}: the motion is not followed farther",

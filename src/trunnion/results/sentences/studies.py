@@ -10,6 +10,8 @@ from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 __all__ = ["STUDIES"]
 
 RELY = "use the samples"
+NOT_STEADY = "within {duration:~s} {driver} does not come to run steadily, or its motion ends before"
+LONGER = "state a longer duration of the measure in the model; `trunnion simulate` with these values shows the motion"
 MAGNITUDES = "check the orders of magnitude of costs and bounds"
 WIDER = "allow narrower tolerances, widen a limit or ask for a lower yield"
 
@@ -111,6 +113,9 @@ SWEEP = {
         "{status}",
         "run `trunnion analyse` with these values to see where in the cycle, and why",
     ),
+    "sweep.not_steady": Sentence(
+        WARNING, f"{{measure}} has no value at {{points:,}} of {{of:#point}}, the first at {{at}}: {NOT_STEADY}", LONGER
+    ),
     "sweep.measures_left_out": Sentence(
         NOTE,
         lambda measures: (
@@ -195,6 +200,9 @@ TOLERANCE = {
         "{measure}: undefined for the nominal mechanism",
         "take it at a position, or over a range, where it is defined",
     ),
+    "tolerance.nominal_not_steady": Sentence(
+        ERROR, f"{{measure}}: undefined for the nominal mechanism: {NOT_STEADY}", LONGER
+    ),
     "first_order.one_sided": Sentence(
         WARNING, "a joint is momentarily at rest there: friction jumps, and the first-order result is one-sided", RELY
     ),
@@ -203,6 +211,9 @@ TOLERANCE = {
         WARNING,
         "the mechanism cannot be solved at the tolerance limits that give the {end} deviation to first order",
         "within these tolerances it cannot always be assembled",
+    ),
+    "first_order.corner_not_steady": Sentence(
+        WARNING, f"at the tolerance limits that give the {{end}} deviation to first order, {NOT_STEADY}", LONGER
     ),
     "first_order.worst_case_differs": Sentence(
         NOTE,

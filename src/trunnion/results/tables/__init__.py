@@ -18,6 +18,8 @@ __all__ = ["KINDS", "Column", "check_table", "columns", "kind_of", "table_of"]
 
 TABULAR = (".csv", ".parquet", ".xlsx")  # files whose name says which table; the others hold the whole result
 
+OF_CONTACTS = ("impacts", "spectrum")  # tables of a motion in which a joint is in play
+
 Tables = Mapping[str, Callable[[Any], list[Column]]]
 
 
@@ -70,20 +72,26 @@ def columns(result: xr.Dataset, table: str = "") -> list[Column]:
 def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:
     """The table that a file of this name holds: of `x.positions.csv` the positions; MechanismError as `check_table`."""
     kind = kind_of(result)
-    check_table(path, kind)
+    check_table(path, kind, "contact" in result.dims)
     inner = _inner(path)
     return inner if inner in KINDS[kind] else next(iter(KINDS[kind]))
 
 
-def check_table(path: str | os.PathLike[str], kind: str) -> None:
+def check_table(path: str | os.PathLike[str], kind: str, in_play: bool = True) -> None:
     """MechanismError for a name such as `x.contributions.csv`, which asks for a table that a kind of result has not.
 
-    Only of kinds with several tables; a part of a name with other characters than letters (`x.2.csv`) asks for none.
+    Only of kinds with several tables, and of a cycle those of a motion in time; a part of a name with other characters
+    than letters (`x.2.csv`) asks for none. in_play: of a motion, whether a joint is in play.
     """
-    tables, inner = KINDS[kind], _inner(path)
-    if Path(path).suffix.lower() in TABULAR and len(tables) > 1 and inner.isalpha() and inner not in tables:
-        remedy = f"use x.{Path(path).suffix.lstrip('.')} or x.TABLE{Path(path).suffix}, TABLE: {', '.join(tables)}"
-        raise MechanismError(Finding(f"there is no table '{inner}'", str(path), remedy))
+    inner, suffix = _inner(path), Path(path).suffix
+    tables = [name for name in KINDS[kind] if in_play or name not in OF_CONTACTS]
+    others = set(KINDS["motion"]) - {"times"} if kind in ("cycle", "motion") else set()
+    if suffix.lower() not in TABULAR or not inner.isalpha() or inner in tables:
+        return
+    if inner in others or len(tables) > 1:
+        named = f" or x.TABLE{suffix}, TABLE: {', '.join(tables)}" if len(tables) > 1 else ""
+        why = ": no joint is in play" if inner in KINDS[kind] else " of a cycle" if kind == "cycle" else ""
+        raise MechanismError(Finding(f"there is no table '{inner}'{why}", str(path), f"use x{suffix}{named}"))
 
 
 def _inner(path: str | os.PathLike[str]) -> str:

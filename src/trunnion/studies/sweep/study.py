@@ -7,7 +7,7 @@ of the cycle but its status, and the efficiency of the ideal mechanism if that h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, inputs, references
 from trunnion.deprecation import renamed
-from trunnion.dynamics.measured import slow_motions
+from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
+from trunnion.measures.measures import Measure
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
@@ -87,6 +88,7 @@ def sweep(
         if progress:
             progress(done)
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    found += _not_steady(points, watched.values(), arrays)
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")
     for name in of_errors:
@@ -126,6 +128,18 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             "sweep.no_answer", " and ".join(one.name for one in swept), points=len(where), of=status.size,
             at=say(swept, first), positions=count, status=code.text,
         )  # fmt: skip
+
+
+def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
+    """A warning for every measure of a motion in time that has no value at some points."""
+    for measure in watched:
+        where = np.argwhere(~np.isfinite(arrays[measure.name]))
+        if measure.in_time and len(where):
+            first = tuple(int(i) for i in where[0])
+            yield finding_for(
+                "sweep.not_steady", f"measures.{measure.name}", points=len(where), of=arrays[measure.name].size,
+                at=say(points.swept, first), **unfound(points.run, measure),
+            )  # fmt: skip
 
 
 # ---- the result -----------------------------------------------------------------------------------------------

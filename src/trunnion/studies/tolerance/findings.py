@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle import shared_dimensions
 from trunnion.cycle.summary import model_notes
-from trunnion.dynamics.measured import slow_motions
+from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import NOT_NEGATIVE
 from trunnion.results.figure import Figure
@@ -165,7 +165,10 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
     for of in study.linear.measures:
         if not np.isfinite(of.reference.figure):
             name = of.measure.name
-            yield finding_for("tolerance.nominal_no_figure", f"measures.{name}", measure=name)
+            if of.measure.in_time:
+                yield finding_for("tolerance.nominal_not_steady", f"measures.{name}", **unfound(study.run, of.measure))
+            else:
+                yield finding_for("tolerance.nominal_no_figure", f"measures.{name}", measure=name)
 
 
 def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
@@ -182,7 +185,10 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     i = [one.measure for one in outcome.study.linear.measures].index(of.measure)
     least, most = outcome.worst[i]
     for end, corner in (("least", least), ("largest", most)):
-        if not corner.assembles:
+        if not corner.assembles and of.measure.in_time:
+            motion = unfound(outcome.study.run, of.measure)
+            yield finding_for("first_order.corner_not_steady", where, end=end, **motion)
+        elif not corner.assembles:
             yield finding_for("first_order.corner_open", where, end=end)
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
@@ -219,9 +225,11 @@ def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
 
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     failed, done = counted.arrays["failed"], counted.done
+    timed = any(of.measure.in_time for of in outcome.study.linear.measures)
+    absent = "a figure does not exist" + (", or a motion does not run steadily within its duration" if timed else "")
     for code in range(CAUSES):
         if failed[code]:
-            text = list(Status)[code].text if code < CAUSES - 1 else "a figure does not exist"
+            text = list(Status)[code].text if code < CAUSES - 1 else absent
             count = int(failed[code])
             yield finding_for(
                 "samples.no_answer", "tolerances", count=count, samples=done, share=count / done, why=text

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["OF_CONTACTS", "forces", "gaps", "in_play", "orbit", "spectrum"]
+__all__ = ["OF_CONTACTS", "check_kind", "forces", "gaps", "in_play", "orbit", "spectrum"]
 
 OF_CONTACTS = ("contacts", "gaps", "orbit", "spectrum")  # kinds of figures that need a joint in play
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
@@ -33,11 +33,16 @@ def in_play(result: xr.Dataset) -> bool:
     return "contact" in result.dims
 
 
-def refuse(result: xr.Dataset, kind: str) -> None:
-    """MechanismError for a figure of contacts where there are none."""
-    if kind in OF_CONTACTS and not in_play(result):
+def check_kind(kind: str, in_play: bool) -> None:
+    """MechanismError for a figure of contacts where no joint is in play."""
+    if kind in OF_CONTACTS and not in_play:
         remedy = "state a contact of a joint with play, such as contact: {restitution: 0.8, modulus: 210 GPa}"
         raise MechanismError(Finding("no joint of this motion is in play", f"--kind {kind}", remedy))
+
+
+def refuse(result: xr.Dataset, kind: str) -> None:
+    """MechanismError for a figure of contacts where there are none."""
+    check_kind(kind, in_play(result))
     if kind == "orbit" and not _pins(result):
         raise MechanismError(Finding("no pin of this motion is in play", "--kind orbit", "use --kind gaps for guides"))
 

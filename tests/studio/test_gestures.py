@@ -114,10 +114,12 @@ def test_gears_mesh_as_they_are_drawn(typed, written, ratio):
         {"do": "spring", "between": ["A", {"ground": [0.2, 0.2]}]}, {"do": "load", "at": [0, 0], "force": ["1 N", 0]},
         {"do": "lock", "point": "nothing"}, {"do": "rename", "what": ["joints", "A"], "to": "B"},
         {"do": "set", "path": ["gears", "gear1", "ratio"], "value": None},
+        {"do": "move", "point": "D", "to": [0, 0]}, {"do": "move", "point": "link1.Z", "to": [0, 0.04]},
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_refused_in_words(gesture):
-    text, places = edited("", {}, *WHITWORTH)
+    text, places = edited("", {}, *WHITWORTH, {"do": "add-point", "link": "link1", "at": [0.03, 0.08]})
+    text, places = edited(text, places, {"do": "rename", "what": ["points", "link1.H"], "to": "Z"})
     if gesture["do"] == "spring":
         gesture = gesture | {"between": [{"ground": [0.1, 0.2]}, {"ground": [0.2, 0.2]}]}
     found = ask(ask="edit", text=text, places=places, gestures=[gesture])
@@ -156,6 +158,17 @@ def test_a_spring_begins_on_a_link_and_ends_on_the_ground():
 def test_a_typed_length_stays_as_it_was_typed():
     text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [0.0635, 0], "length": "2.5 in"})
     assert entries_of(text)[0]["links"]["link1"]["points"]["B"] == ["2.5 in", 0]
+
+
+@pytest.mark.parametrize(("fine", "written"), [(0.0, "84.852814 mm"), (2e-5, "84.85 mm"), (1e-2, "84.9 mm")])
+def test_lengths_are_written_no_finer_than_they_are_drawn(fine, written):
+    given = {"text": "", "places": {}, "fine": fine}
+    drawn = ask(ask="edit", gestures=[{"do": "link", "from": {"ground": [0, 0.04]}, "to": [0.06, 0.1]}], **given)
+    assert entries_of(drawn["text"])[0]["links"]["link1"]["points"]["B"] == [written, 0]
+    asked = {"text": drawn["text"], "places": drawn["places"], "fine": fine}
+    pinned = ask(ask="edit", gestures=[{"do": "pin", "point": "link1.B"}], **asked)
+    if fine < 1e-3:  # the grid again, and not what rounding left of it
+        assert entries_of(pinned["text"])[0]["links"]["ground"]["points"]["B"] == ["60 mm", "100 mm"]
 
 
 def test_a_half_drawn_linkage_is_no_error():

@@ -176,7 +176,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
     sketch = _shown(state, steps, index)
-    sketch.locked = set(map(str, asked.get("locked") or ()))
+    sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
     changes = sketch.moved(point, to)
     back = _walked(state, {change.path: change.value for change in changes}, steps)
@@ -250,7 +250,7 @@ def _edit(asked: Asked) -> dict[str, Any]:
         else {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     )
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
-    sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())))
+    sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
     says = [done(sketch, given) for given in asked["gestures"]]
     empty = ("drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}

@@ -142,7 +142,8 @@ def doubled(sketch: Sketch, link: str, point: str) -> str:
 def put(sketch: Sketch, link: str, point: str, place: Vector, axis: float | None = None) -> None:
     """A point on a link where a place is; axis: its direction in the plane, rad."""
     frame = sketch.frame(link)
-    at = [sketch.length(value) if abs(value) > SHORTEST else 0 for value in frame.into(place)]
+    least = max(SHORTEST, sketch.fine / 20.0)  # a smaller one is what rounding left
+    at = [sketch.length(value) if abs(value) > least else 0 for value in frame.into(place)]
     stated: Any = at
     if axis is not None:
         c, s = cos(axis), sin(axis)

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
-from math import atan2, copysign, cos, dist, hypot, isfinite, sin, sqrt
+from math import atan2, copysign, cos, dist, floor, hypot, isfinite, log10, sin, sqrt
 from typing import Any, NamedTuple
 
 from pydantic import ValidationError
@@ -68,12 +68,14 @@ class Sketch:
 
     locked: joints, and free points "link.point", that stay where they are while others are dragged.
     made: section and name of what a gesture made whose numbers are to be looked at.
+    fine: what the hand can tell apart in the picture, m: lengths are rounded to a power of ten below it.
     """
 
     entries: Entries
     places: dict[str, Vector] = field(default_factory=dict)
     locked: set[str] = field(default_factory=set)
     made: tuple[str, str] | None = None
+    fine: float = 0.0
 
     # ---- what is there ----------------------------------------------------------------------------------------
 
@@ -170,7 +172,10 @@ class Sketch:
             link, _, name = point.partition(".")
             if name not in self.points(link):
                 raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
-            return list(self._at(link, name, self.frame(link).into(to)))
+            local = {one: self.local(link, one) for one in self.points(link)}
+            there = self.frame(link).into(to)
+            self._apart(link, local, local | {name: there})
+            return list(self._at(link, name, there))
         found: list[Change] = []
         for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
             mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
@@ -246,12 +251,12 @@ class Sketch:
             yield from self._at(link, point, (fixed[0], 0.0) if point == ahead and frame is not old else fixed)
 
     def _apart(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
-        """Refuse to bring joints of a link together that are apart."""
+        """Refuse to bring points of a link together that are apart."""
         for one, two in combinations(local, 2):
             before, after = (dist(spots[one], spots[two]) for spots in (local, places))
             if after <= SHORT * self.size < before:
                 what = f"would have no length: {one} would lie on {two}"
-                raise MechanismError(Finding(what, f"links.{link}", "keep its joints apart"))
+                raise MechanismError(Finding(what, f"links.{link}", "keep them apart"))
 
     def _slot(self, link: str) -> str | None:
         """The sliding joint whose guide is on a moving link."""
@@ -318,10 +323,11 @@ class Sketch:
         return length_unit(self.entries) or suiting
 
     def length(self, value: float) -> str:
-        """A length as it is written."""
+        """A length as it is written: no finer than it was drawn, but one that is much smaller keeps three figures."""
         factor = float(unit(self.unit)[0])
-        digits = round(value / factor, 6)
-        return f"{digits + 0.0:.{FIGURES}g} {self.unit}"
+        fine = min(self.fine, abs(value) / 100.0) if abs(value) > SHORT * self.size else self.fine
+        places = min(-floor(log10(fine / factor)), 6) if fine > 0.0 else 6
+        return f"{round(value / factor, places) + 0.0:.{FIGURES}g} {self.unit}"
 
     def write(self, changes: list[Change]) -> None:
         """Put changed lengths into the entries; a tolerance that is stated stays."""

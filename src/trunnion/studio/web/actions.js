@@ -5,6 +5,7 @@ import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
+import { sheet } from "./sheet.js";
 import { connection, decode } from "./socket.js";
 
 const STEPS = 360; // positions of a run
@@ -104,7 +105,7 @@ export function edit(gestures, merge = null) {
 
 async function carryOut(gestures, merge) {
   const before = present();
-  const done = await link.ask("edit", { ...before, gestures });
+  const done = await link.ask("edit", { ...before, gestures, fine: sheet.fine() });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
@@ -132,7 +133,7 @@ export function setValue(path, value, merge = null) {
 
 /** Where the mechanism would be with a point at another place. */
 export function drag(fields) {
-  return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, ...fields });
+  return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, fine: sheet.fine(), ...fields });
 }
 
 /** Ask something else of the mechanism that is shown; null where it has changed meanwhile or there is no answer. */

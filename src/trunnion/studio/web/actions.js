@@ -92,7 +92,8 @@ export function present() {
   return { text: state.text.value, places, locked: state.locked.value };
 }
 
-let queue = Promise.resolve();
+/** @type {Promise<boolean>} */
+let queue = Promise.resolve(true);
 
 /**
  * Carry out gestures as one step to undo; one after the other, for each starts from what the one before left.

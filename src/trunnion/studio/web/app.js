@@ -13,7 +13,7 @@ import { Stage } from "./stage.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
 import { choose } from "./tools.js";
-import { Button, html } from "./ui.js";
+import { Button, focusOn, html } from "./ui.js";
 
 const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
 
@@ -42,7 +42,7 @@ function Panel() {
     const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!by) return;
     state.tab.value = names[(names.indexOf(open) + by + names.length) % names.length];
-    requestAnimationFrame(() => document.querySelector("[role=tab][aria-selected=true]")?.focus());
+    requestAnimationFrame(() => focusOn("[role=tab][aria-selected=true]"));
   };
   const [title, Body] = TABS[open];
   return html`<aside class="panel">

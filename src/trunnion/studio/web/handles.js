@@ -37,7 +37,8 @@ function padlock([x, y]) {
 
 function build(view, spots, names) {
   const { handles } = view.layers;
-  const held = handles.contains(document.activeElement) ? document.activeElement.dataset : null;
+  const active = document.activeElement;
+  const held = active instanceof SVGElement && handles.contains(active) ? active.dataset : null;
   view.handled = names;
   handles.replaceChildren(
     ...spots.map(({ kind, name, key }) =>

@@ -6,6 +6,7 @@ import { crank } from "./motion.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
+import { focusOn } from "./ui.js";
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const WRITES = "input:not([type=range]), textarea, select, dialog, [contenteditable]";
@@ -105,7 +106,7 @@ function enter({ target, shiftKey: shift }) {
   if (part && state.tool.value === "select") {
     state.selection.value = part;
     state.tab.value = "properties";
-    requestAnimationFrame(() => document.querySelector(".properties input")?.focus());
+    requestAnimationFrame(() => focusOn(".properties input"));
     return true;
   }
   const spot = part ? sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name) : crossed();

@@ -6,7 +6,7 @@ import { set, svg } from "../web/dom.js";
 import { lengthOf, lengthText, lengthUnit } from "./geometry.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
-import { Button, html } from "./ui.js";
+import { Button, focusOn, html } from "./ui.js";
 
 const LARGEST = 2400; // px that are kept along a side
 const STORE = "photos";
@@ -195,7 +195,7 @@ function Placing({ photo }) {
 function Distance({ unit }) {
   const [typed, setTyped] = useState("");
   const [wrong, setWrong] = useState("");
-  useEffect(() => document.querySelector(".photo-card form input")?.focus(), []);
+  useEffect(() => focusOn(".photo-card form input"), []);
   const submit = (event) => {
     event.preventDefault();
     const [a, b] = picking.value.points;

@@ -80,7 +80,7 @@ export const sheet = {
 };
 
 /** The one moving link at a joint or point, beside `own`; null where there are several. */
-export function linkOf({ kind, key, name, link }, own = null) {
+export function linkOf({ kind, name, link }, own = null) {
   if (kind === "points") return link;
   const joint = kind === "joints" && sheet.view.scene.joints.find((one) => one.name === name);
   const ground = sheet.view.scene.links.find((one) => one.ground)?.name;

@@ -6,7 +6,7 @@ const STEPS = 100; // that can be undone
 const ROOM = 2e6; // characters of them that are kept over a reload
 
 export const connected = signal(false);
-/** Of the program: {version, examples, laws}. */
+/** Of the program: {version, examples, laws}. @type {import("@preact/signals").Signal<Record<string, any>>} */
 export const about = signal({ version: "", examples: [], laws: [] });
 /** Of the opened folder: {folder, names}. */
 export const folder = signal({ folder: "", names: [] });

@@ -15,7 +15,10 @@ export const typed = signal("");
 /** Where the pointer or the keyboard's cross is: {at, spot, keyboard, shift}, or null. */
 export const pointer = signal(null);
 
-/** Tools; of those with two clicks `tells` says what the second would make, `begins` is how a typed value begins. */
+/**
+ * Tools; of those with two clicks `tells` says what the second would make, `begins` is how a typed value begins.
+ * @type {{ id: string, label: string, key: string, hint: string[], click?: Function, tells?: Function, begins?: RegExp, on?: boolean }[]}
+ */
 export const TOOLS = [
   { id: "select", label: "Select", key: "V", hint: ["Drag a joint: the mechanism follows. Drag the sheet to shift it, turn the wheel to zoom."] },
   { id: "link", label: "Link", key: "L", hint: ["Click the first end of a link: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
@@ -215,7 +218,7 @@ function putLoad(aim) {
   return true;
 }
 
-function tellForce(a, b) {
+function tellForce(_, b) {
   const letters = typed.value || FORCE;
   return `${letters}${/[a-z]/i.test(letters) ? "" : " N"}, ${Math.round((turnTo(b.at) * 180) / Math.PI)}°${typed.value ? " ⏎" : ""}`;
 }

@@ -6,6 +6,12 @@ import htm from "htm";
 
 export const html = htm.bind(h);
 
+/** Bring what is typed or chosen next into focus, if it is there. */
+export function focusOn(/** @type {string} */ selector) {
+  const found = document.querySelector(selector);
+  if (found instanceof HTMLElement) found.focus();
+}
+
 /** A button that tells its key in the tooltip. */
 export function Button({ label, title, onClick, disabled = false, pressed, kind = "", children }) {
   return html`<button type="button" class=${`plain ${kind}`} title=${title ?? label} aria-label=${label} aria-pressed=${pressed} disabled=${disabled} onClick=${onClick}>

@@ -242,6 +242,21 @@ def test_a_locked_joint_is_not_dragged():
     assert ask(ask="edit", **asked, gestures=[{"do": "lock", "point": "D"}])["locked"] == []
 
 
+@pytest.mark.parametrize(
+    "old", ["36 mm, 0]", "[0, 0]", "[ground, link1]", "{A: [0, 0]}", "revolute", "{speed: 60 rpm}", "-100 N"]
+)
+def test_a_text_that_is_not_sound_is_answered_with_what_is_found(old):
+    text = (
+        "trunnion: 1\nlinks:\n  ground: {points: {A: [0, 0]}}\n  link1: {points: {A: [0, 0], B: [36 mm, 0]}}\n"
+        "joints: {A: {type: revolute, links: [ground, link1]}}\ndrivers: {A: {speed: 60 rpm}}\n"
+        "loads: {load1: {link: link1, at: B, force: [-100 N, 0]}}\n"
+    )
+    assert old in text
+    for odd in ("abc", "3.5", "[[1], {a: 2}]", "{a: [b]}", "null", "1e999"):
+        found = ask(ask="model", text=text.replace(old, f"{odd}]" if old.startswith("36") else odd), steps=4)
+        assert found["findings"] or found["solved"], (odd, found)
+
+
 # ---- values and names ----------------------------------------------------------------------------------------------
 
 

@@ -101,7 +101,7 @@ class Sketch:
     @property
     def joints(self) -> Mapping[str, Any]:
         """Joints with their two links."""
-        return {name: one for name, one in self.of("joints").items() if len(one.get("links") or ()) == 2}
+        return {name: one for name, one in self.of("joints").items() if _pair(one.get("links"))}
 
     def points(self, link: str) -> Mapping[str, Any]:
         """Points of a link, as stated."""
@@ -113,7 +113,7 @@ class Sketch:
         """Every number of the model in SI, by path."""
         try:
             return Numbers(**self.entries).parameter_set.nominal
-        except (ValidationError, TypeError):
+        except (ValidationError, TypeError, KeyError):  # the last of a name that is no dimension
             what = "has entries that cannot be read"
             raise MechanismError(Finding(what, "the model", "correct what is found in its text first")) from None
 
@@ -341,6 +341,10 @@ class Sketch:
             )
             group[last] = self.length(value) + (limits[0] if limits else "")
         self.forget()
+
+
+def _pair(links: Any) -> bool:
+    return isinstance(links, list) and len(links) == 2 and all(isinstance(one, str) for one in links)
 
 
 def length_unit(entries: Entries) -> str:

@@ -42,12 +42,15 @@ assembly: {D: [-20 mm, -30 mm], F: [150 mm, -30 mm], S: 72 mm}
 if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the page's own part
 
     def draw(user, *strokes):
-        """Strokes of the mouse: the key of a tool, and places in px, with Shift where a third is given."""
+        """Strokes of the mouse: the key of a tool, and places in px, with Shift where a third is given, or letters."""
         for tool, *places in strokes:
             steps = user.state("s.past.value.length")
             user.keys(tool)
-            for x, y, *shift in places:
-                user.click(x, y, shift=bool(shift))
+            for place in places:
+                if isinstance(place, str):
+                    user.page.keyboard.type(place)
+                else:
+                    user.click(*place[:2], shift=len(place) > 2)
             user.until(f"s.past.value.length > {steps}")
         user.keys("v")
 
@@ -92,6 +95,28 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.page.mouse.up()
         user.idle()
         return x, y
+
+    @pytest.mark.slow
+    def test_gears_springs_forces_and_a_ternary_link_with_typed_values(user):
+        user.new_sheet()
+        draw(
+            user,
+            ("l", (250, 300, 1), "30\n"),  # towards the pointer
+            ("l", (430, 300, 1), (500, 240)),
+            ("l", (500, 240), (640, 240)),
+            ("l", (570, 240), (570, 380, 1)),  # its end on the middle of the third: a ternary link
+            ("e", (250, 300), "20:40", (430, 300)),
+            ("d", (250, 300)),
+            ("f", (640, 240), "250 N", (640, 340)),
+            ("s", (640, 240), "2", (740, 240)),
+        )
+        entries = entries_of(user.state("s.text.value"))[0]
+        assert entries["gears"]["gear1"]["ratio"] == "-20/40"
+        assert entries["links"]["link1"]["points"]["B"] == ["30 mm", 0]
+        assert len(entries["links"]["link3"]["points"]) == 3
+        assert entries["springs"]["spring1"]["stiffness"] == "2 N/mm"
+        assert entries["loads"]["load1"]["force"] == ["0 N", "-250 N"]
+        assert user.state("s.solved.value")
 
     @pytest.mark.slow
     def test_a_locked_joint_stays_while_another_is_dragged(user):

@@ -92,7 +92,8 @@ def free(sketch: Sketch, name: str) -> tuple[str, str]:
     if point not in sketch.points(link):
         raise refused("is not a free point", str(name), "choose the free end of a link")
     if point in sketch.joints:
-        raise refused("is a joint already", f"links.{link}.points.{point}", "delete the joint first, or draw another link from it")
+        remedy = "delete the joint first, or draw another link from it"
+        raise refused("is a joint already", f"links.{link}.points.{point}", remedy)
     return link, point
 
 

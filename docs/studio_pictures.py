@@ -17,7 +17,7 @@ SIZE = {"width": 1280, "height": 720}
 
 def main() -> None:
     """Write all pictures, those of the press with layers and a variant last."""
-    four_bar = {"light": _at_rest, "dark": _compared}
+    four_bar = {"light": _at_rest, "dark": _compared, "drawing": _drawing}
     press = {"layers": _layers, "variants": _variants}
     for model, shots in (("durango-fourbar", four_bar), ("drawing-press", press)):
         with _studio(model) as address, sync_playwright() as begun:
@@ -57,6 +57,31 @@ def _compared(page: Page) -> None:
     _go(page, 48)
     page.locator(".choice select").first.select_option("compare")
     page.click("role=tab[name=Plots]")
+
+
+def _drawing(page: Page) -> None:
+    """A quick return half drawn: the pin of its crank slides along the lever, the rod is being drawn."""
+    page.click("summary:has-text('File')")
+    page.click("button:has-text('New sheet')")
+    page.wait_for_timeout(500)
+    box = page.locator(".sheet").bounding_box()
+    assert box is not None
+    for tool, *places in (
+        ("l", (330, 240, "Shift"), (403, 185)),
+        ("l", (330, 295, "Shift"), (293, 350)),
+        ("g", (403, 185), (311, 323)),
+        ("l", (293, 350)),
+    ):
+        page.keyboard.press(tool)
+        for x, y, *held in places:
+            page.mouse.move(box["x"] + x, box["y"] + y)
+            for key in held:
+                page.keyboard.down(key)
+            page.mouse.click(box["x"] + x, box["y"] + y)
+            for key in held:
+                page.keyboard.up(key)
+            page.wait_for_timeout(800)
+    page.mouse.move(box["x"] + 604, box["y"] + 350)
 
 
 def _layers(page: Page) -> None:

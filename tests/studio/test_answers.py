@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import trunnion
+from studio.asking import ask, edited
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
@@ -19,19 +19,6 @@ from trunnion.studio.message import packed, unpacked
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
 FOURBAR = "durango-fourbar"
-
-
-def ask(**question):
-    return unpacked(answer(json.dumps(question | {"revision": 1}).encode()))
-
-
-def edited(text, places, *gestures):
-    """Text and places after some gestures, one question each."""
-    for gesture in gestures:
-        found = ask(ask="edit", text=text, places=places, gestures=[gesture])
-        assert "error" not in found, found
-        text, places = found["text"], found["places"]
-    return text, places
 
 
 def drawn_four_bar():
@@ -144,7 +131,7 @@ def test_a_four_bar_drawn_from_nothing_is_that_of_analyse():
     text, _ = edited(
         text, places,
         {"do": "set", "path": ["joint_defaults"], "value": {"pin": {"radius": "5 mm"}, "friction": 0.1}},
-        {"do": "load", "link": "link3", "at": "C", "force": ["-100 N", "0 N"]},
+        {"do": "load", "at": "C", "force": ["-100 N", "0 N"]},
     )  # fmt: skip
     shown = ask(ask="model", text=text)["scene"]["drivers"][0]["effort"]
     result = trunnion.analyse(Mechanism(**entries_of(text)[0]), 360)
@@ -299,7 +286,9 @@ def test_a_ground_without_joints_is_to_be_pinned():
 
 def test_a_step_says_what_a_value_was_set_to():
     text, path = EXAMPLES[FOURBAR], ["dimensions", "BC"]
-    for value, said in (("5 m", "Set dimensions.BC to 5 m"), (None, "Remove dimensions.BC")):
+    assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": "5 m"}])["says"] == "Set BC to 5 m"
+    path = ["links", "crank", "mass"]
+    for value, said in (("2 kg", "Set mass of link crank to 2 kg"), (None, "Remove mass of link crank")):
         assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
 
 

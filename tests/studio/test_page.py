@@ -33,7 +33,8 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.draw_four_bar()
         assert user.state("s.solved.value"), user.state("s.text.value")
         user.keys("f")
-        user.click(520, 180)  # a load
+        user.click(520, 180)  # a load,
+        user.click(520, 260)  # downwards
         user.idle()
         user.keys("v")
         text = user.state("s.text.value")

@@ -15,6 +15,7 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
@@ -25,25 +26,30 @@ from trunnion.results.quantities import quantity
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
+from trunnion.studio.ends import held
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.margin import margin_of
 from trunnion.studio.message import packed
+from trunnion.studio.missing import missing
 from trunnion.studio.overlays import centres, circles, place_motion, point_motion, transmission
 from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
 from trunnion.studio.variants import overlaid
+from trunnion.studio.words import spoken
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
 
 __all__ = ["ANSWERS", "answer", "examples"]
 
 Asked = Mapping[str, Any]
+Array = NDArray[np.float64]
 
 STEPS = 360
 MOST_STEPS = 3600
+KEPT = 1e-2  # of the size: a locked joint that stays may be off by as much as a position is fine
 
 
 def answer(request: bytes) -> bytes:
@@ -66,7 +72,7 @@ def answer(request: bytes) -> bytes:
 
 def _sentence(finding: Finding) -> str:
     return " ".join(
-        part for part in (finding.where, finding.what, f"— {finding.remedy}" if finding.remedy else "") if part
+        part for part in (spoken(finding.where), finding.what, f"— {finding.remedy}" if finding.remedy else "") if part
     )
 
 
@@ -120,13 +126,15 @@ def _model(asked: Asked) -> dict[str, Any]:
             found = state.placed(tuple(findings_of(result))) or found
         except MechanismError as error:
             found += state.placed(error.findings)
-    numbers = plain(state.mechanism.parameters()) if state.mechanism else {}
+    drawn = Sketch(copy.deepcopy(dict(state.entries or {})))
+    lacks = missing(drawn, found) if result is None else []
     head = {
         "findings": [_row(one) for one in found],
+        "missing": lacks,
         "entries": state.entries,
-        "numbers": numbers,
+        "numbers": _numbers(state, drawn),
         "solved": result is not None,
-        "ready": readiness(state.mechanism, result, found),
+        "ready": readiness(state.mechanism, result, found, lacks),
         "scene": None,
     }
     if result is None:
@@ -147,7 +155,17 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 def _row(one: Finding) -> dict[str, Any]:
     keys = ("code", "what", "where", "remedy", "line")
-    return {"severity": one.severity.value} | {key: getattr(one, key) for key in keys}
+    return {"severity": one.severity.value, "place": spoken(one.where)} | {key: getattr(one, key) for key in keys}
+
+
+def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
+    """Every number in SI, by path; of what is half drawn those that can be read."""
+    if state.mechanism:
+        return plain(state.mechanism.parameters())
+    try:
+        return plain(drawn.numbers)
+    except MechanismError:
+        return {}
 
 
 # ---- dragging -----------------------------------------------------------------------------------------------------
@@ -158,6 +176,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
     sketch = _shown(state, steps, index)
+    sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
     changes = sketch.moved(point, to)
     back = _walked(state, {change.path: change.value for change in changes}, steps)
@@ -168,7 +187,18 @@ def _drag(asked: Asked) -> dict[str, Any]:
     near = index if not np.any(np.isfinite(far)) else int(np.nanargmin(far))
     if np.isfinite(far[index]) and far[index] <= far[near] + 1e-6 * sketch.size:
         near = index
+    if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
+        near = index
     return columns | {"solved": True, "index": near, "changes": _told(sketch, changes)}
+
+
+def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
+    """Whether locked joints and points are where they were, to the fineness of the positions."""
+    keys = [".".join(held(sketch, name)) for name in sketch.locked if name in sketch.joints or name in points]
+    gone = (
+        np.hypot(*(points[key][axis][index] - sketch.places[key][i] for i, axis in enumerate("xy"))) for key in keys
+    )
+    return all(far <= KEPT * sketch.size for far in gone)
 
 
 def _shown(state: Loaded, steps: int, index: int) -> Sketch:
@@ -220,14 +250,20 @@ def _edit(asked: Asked) -> dict[str, Any]:
         else {"trunnion": 1, "name": "New mechanism", "space": "planar"}
     )
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
-    sketch = Sketch(entries, places)
+    sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
     says = [done(sketch, given) for given in asked["gestures"]]
-    empty = ("drivers", "loads", "springs", "assembly", "dimensions", "joints")
+    empty = ("drivers", "loads", "springs", "gears", "assembly", "dimensions", "joints")
     after = {key: one for key, one in sketch.entries.items() if one or key not in empty}
     changed = changed_text(text, after) if text.strip() else text_of(after)
     known = {f"{link}.{point}" for link in sketch.of("links") for point in sketch.points(link)}
     kept = {key: place for key, place in sketch.places.items() if key in known}
-    return {"text": changed, "places": {key: list(place) for key, place in kept.items()}, "says": ", ".join(says)}
+    return {
+        "text": changed,
+        "places": {key: list(place) for key, place in kept.items()},
+        "locked": sorted(sketch.locked & (known | set(sketch.joints))),
+        "says": ", ".join(says),
+        "made": sketch.made,
+    }
 
 
 def _assemblies(asked: Asked) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 from trunnion.solve.system import rubbing
+from trunnion.studio.words import spoken
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,22 +20,27 @@ __all__ = ["readiness"]
 
 
 def readiness(
-    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding]
+    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding], lacks: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """For motion, forces, friction, play, tolerance and time: whether there is what it takes, and why."""
+    """For motion, forces, friction, play, tolerance and time: whether there is what it takes, and why.
+
+    lacks: what is not drawn yet.
+    """
     rows = zip(
-        ("motion", "forces", "friction", "play", "tolerance", "time"), _said(mechanism, result, findings), strict=True
+        ("motion", "forces", "friction", "play", "tolerance", "time"),
+        _said(mechanism, result, findings, lacks),
+        strict=True,
     )
     return [{"what": what, "ok": ok, "why": why} for what, (ok, why) in rows]
 
 
 def _said(
-    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding]
+    mechanism: Mechanism | None, result: xr.Dataset | None, findings: Sequence[Finding], lacks: Sequence[str]
 ) -> Iterator[tuple[bool, str]]:
     errors = [one for one in findings if one.severity is Severity.ERROR]
     if mechanism is None or result is None:
-        why = f"{errors[0].where} {errors[0].what}".strip() if errors else "Draw links and drive a joint."
-        yield False, why
+        why = f"{spoken(errors[0].where)} {errors[0].what}".strip() if errors else "Draw links and drive a joint."
+        yield False, " ".join(lacks) or why
         yield from [(False, "The motion comes first.")] * 5
         return
     status = result["status"].values

@@ -10,7 +10,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import atan2, cos, hypot, isfinite, sin
+from itertools import combinations
+from math import atan2, copysign, cos, dist, floor, hypot, isfinite, log10, sin, sqrt
 from typing import Any, NamedTuple
 
 from pydantic import ValidationError
@@ -20,12 +21,13 @@ from trunnion.model.fields import FIXED_NAMES
 from trunnion.model.numbers import Numbers
 from trunnion.model.units import unit
 
-__all__ = ["Change", "Frame", "Sketch", "length_unit"]
+__all__ = ["TOGETHER", "Change", "Frame", "Sketch", "length_unit"]
 
 Vector = tuple[float, float]
 Entries = dict[str, Any]
 
 TOGETHER = 1e-9  # of the size: joints nearer than this lie on one spot
+SHORT = 1e-5  # of the size: a link that a hand made so short was to have no length
 FIGURES = 9
 LENGTH = re.compile(r"[\d.]\s*(mm|cm|µm|um|m|in|ft)\b")
 NAME = re.compile(r"\s*(-?)\s*([^\W\d]\w*)\s*")
@@ -62,10 +64,18 @@ class Change(NamedTuple):
 
 @dataclass
 class Sketch:
-    """entries: plain data of the model, changed in place; places: of "link.point" in the plane, m, as shown."""
+    """entries: plain data of the model, changed in place; places: of "link.point" in the plane, m, as shown.
+
+    locked: joints, and free points "link.point", that stay where they are while others are dragged.
+    made: section and name of what a gesture made whose numbers are to be looked at.
+    fine: what the hand can tell apart in the picture, m: lengths are rounded to a power of ten below it.
+    """
 
     entries: Entries
     places: dict[str, Vector] = field(default_factory=dict)
+    locked: set[str] = field(default_factory=set)
+    made: tuple[str, str] | None = None
+    fine: float = 0.0
 
     # ---- what is there ----------------------------------------------------------------------------------------
 
@@ -91,7 +101,7 @@ class Sketch:
     @property
     def joints(self) -> Mapping[str, Any]:
         """Joints with their two links."""
-        return {name: one for name, one in self.of("joints").items() if len(one.get("links") or ()) == 2}
+        return {name: one for name, one in self.of("joints").items() if _pair(one.get("links"))}
 
     def points(self, link: str) -> Mapping[str, Any]:
         """Points of a link, as stated."""
@@ -103,7 +113,7 @@ class Sketch:
         """Every number of the model in SI, by path."""
         try:
             return Numbers(**self.entries).parameter_set.nominal
-        except (ValidationError, TypeError):
+        except (ValidationError, TypeError, KeyError):  # the last of a name that is no dimension
             what = "has entries that cannot be read"
             raise MechanismError(Finding(what, "the model", "correct what is found in its text first")) from None
 
@@ -155,12 +165,17 @@ class Sketch:
 
     def moved(self, point: str, to: Vector) -> list[Change]:
         """What changes where a joint, or a free point "link.point", is dragged to a place."""
-        if point not in self.joints:
+        joints = self._together(point) if point in self.joints else []
+        if held := sorted(self.locked & {point, *joints}):
+            raise MechanismError(Finding("is locked where it is", held[0], "unlock it first (key K)"))
+        if not joints:
             link, _, name = point.partition(".")
             if name not in self.points(link):
                 raise MechanismError(Finding("is not a joint or a point", point, "drag one that is drawn"))
-            return list(self._at(link, name, self.frame(link).into(to)))
-        joints = self._together(point)
+            local = {one: self.local(link, one) for one in self.points(link)}
+            there = self.frame(link).into(to)
+            self._apart(link, local, local | {name: there})
+            return list(self._at(link, name, there))
         found: list[Change] = []
         for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
             mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
@@ -170,6 +185,8 @@ class Sketch:
                 found += self._shifted(guide, to)
             elif mine:
                 found += self._relocated(link, mine, to)
+            elif slot := self._slot(link):
+                found += self._turned(link, slot, to)
         return found
 
     def _turns(self, joint: str) -> bool:
@@ -208,21 +225,23 @@ class Sketch:
     def _relocated(self, link: str, moving: list[str], to: Vector) -> Iterator[Change]:
         """New coordinates of the joints of a link where some of them go to a place and the others stay.
 
-        A link whose frame begins at one joint and has its x through another keeps that form.
+        A link whose frame begins at one joint and has its x through another keeps that form, unless it has a slot.
         """
         old = self.frame(link)
         own = [one for one in self.points(link) if one in self.joints and self._turns(one)]
         local = {point: self.local(link, point) for point in own}
         places = {point: to if point in moving else old.out(local[point]) for point in own}
+        self._apart(link, local, places)
         origin = next((point for point in own if local[point] == (0.0, 0.0)), None)
         ahead = next((point for point in own if local[point][1] == 0.0 and local[point][0] != 0.0), None)
-        frame = old
-        if origin and ahead and {origin, ahead} & set(moving):
+        slot, frame = self._slot(link), old
+        if slot:
+            ahead = None
+            frame = self._aimed(link, slot, to) if self._pivot(link) in moving else old
+        elif origin and ahead and {origin, ahead} & set(moving):
             sign = 1.0 if local[ahead][0] > 0 else -1.0
             (x, y), (a, b) = places[origin], places[ahead]
             length = hypot(a - x, b - y)
-            if length <= TOGETHER * self.size:
-                raise MechanismError(Finding("would have no length", f"links.{link}", "keep its joints apart"))
             frame = Frame(x, y, sign * (a - x) / length, sign * (b - y) / length)
         elif origin in moving:
             frame = old._replace(x=to[0], y=to[1])
@@ -230,6 +249,55 @@ class Sketch:
             place = frame.into(places[point])
             fixed = (0.0, 0.0) if point == origin and frame is not old else place
             yield from self._at(link, point, (fixed[0], 0.0) if point == ahead and frame is not old else fixed)
+
+    def _apart(self, link: str, local: Mapping[str, Vector], places: Mapping[str, Vector]) -> None:
+        """Refuse to bring points of a link together that are apart."""
+        for one, two in combinations(local, 2):
+            before, after = (dist(spots[one], spots[two]) for spots in (local, places))
+            if after <= SHORT * self.size < before:
+                what = f"would have no length: {one} would lie on {two}"
+                raise MechanismError(Finding(what, f"links.{link}", "keep them apart"))
+
+    def _slot(self, link: str) -> str | None:
+        """The sliding joint whose guide is on a moving link."""
+        slides = (name for name, one in self.joints.items() if one["links"][0] == link and not self._turns(name))
+        return next(slides, None) if link != self.ground else None
+
+    def _pivot(self, link: str) -> str | None:
+        """The pin that a link with a slot turns about: that on the ground, or its first."""
+        pins = [name for name, one in self.joints.items() if link in one["links"] and self._turns(name)]
+        return next((name for name in pins if self.ground in self.joints[name]["links"]), pins[0] if pins else None)
+
+    def _turned(self, link: str, slot: str, to: Vector) -> Iterator[Change]:
+        """Where the block in a slot is dragged the link turns; locked joints of the link keep their places."""
+        frame, pivot = self._aimed(link, slot, to, block=True), self._pivot(link)
+        for point in self.points(link):
+            if {point, f"{link}.{point}"} & self.locked and point != pivot:
+                yield from self._at(link, point, frame.into(self.places[f"{link}.{point}"]))
+
+    def _aimed(self, link: str, slot: str, to: Vector, block: bool = False) -> Frame:
+        """The frame of a link whose slot is led over a block, with its pivot at a place; or, with block, that there.
+
+        The slot passes the pivot at the distance e at which it lies in the link, the pivot being e to the left: with
+        d from the pivot to the block, the block is √(d² − e²) along the slot, on the side where it was.
+        """
+        pivot, second = self._pivot(link), self.joints[slot]["links"][1]
+        if pivot is None:
+            return self.frame(link)
+        here = self.places[f"{second}.{slot}"]
+        centre, end = (self.places[f"{link}.{pivot}"], to) if block else (to, here)
+        (x, y), (a, b) = self.local(link, pivot), self.local(link, slot)
+        c, s = (float(self.numbers.get(f"links.{link}.points.{slot}.axis.{axis}", 0.0)) for axis in "xy")
+        turn, (u, v) = atan2(s, c), self.frame(link).into(here)
+        beside = cos(turn) * (y - b) - sin(turn) * (x - a)
+        far = dist(centre, end)
+        if far <= abs(beside) + SHORT * self.size:
+            raise MechanismError(Finding("would not reach its block", f"links.{link}", "keep them apart"))
+        along = copysign(sqrt(far**2 - beside**2), cos(turn) * (u - x) + sin(turn) * (v - y))
+        angle = atan2(end[1] - centre[1], end[0] - centre[0]) - atan2(-beside, along) - turn
+        turned = Frame(0.0, 0.0, cos(angle), sin(angle))
+        p, q = turned.out((x, y))
+        return turned._replace(x=centre[0] - p, y=centre[1] - q)
 
     def _at(self, link: str, point: str, local: Vector) -> Iterator[Change]:
         """The numbers to be changed so that a point has these coordinates: dimensions, where they are stated so."""
@@ -255,10 +323,11 @@ class Sketch:
         return length_unit(self.entries) or suiting
 
     def length(self, value: float) -> str:
-        """A length as it is written."""
+        """A length as it is written: no finer than it was drawn, but one that is much smaller keeps three figures."""
         factor = float(unit(self.unit)[0])
-        digits = round(value / factor, 6)
-        return f"{digits + 0.0:.{FIGURES}g} {self.unit}"
+        fine = min(self.fine, abs(value) / 100.0) if abs(value) > SHORT * self.size else self.fine
+        places = min(-floor(log10(fine / factor)), 6) if fine > 0.0 else 6
+        return f"{round(value / factor, places) + 0.0:.{FIGURES}g} {self.unit}"
 
     def write(self, changes: list[Change]) -> None:
         """Put changed lengths into the entries; a tolerance that is stated stays."""
@@ -272,6 +341,10 @@ class Sketch:
             )
             group[last] = self.length(value) + (limits[0] if limits else "")
         self.forget()
+
+
+def _pair(links: Any) -> bool:
+    return isinstance(links, list) and len(links) == 2 and all(isinstance(one, str) for one in links)
 
 
 def length_unit(entries: Entries) -> str:

@@ -17,14 +17,17 @@ assert.equal(geometry.onGrid(0.30000000000000004, 0.1), 0.3);
 assert.equal(geometry.lengthOf("60", "mm"), 0.06);
 assert.equal(geometry.lengthOf("2,5 in", "mm"), 0.0635);
 assert.equal(geometry.lengthOf("1.2m", "mm"), 1.2);
-for (const wrong of ["", "0", "-3 mm", "3 kg", "a", "1 2"]) assert.equal(geometry.lengthOf(wrong, "mm"), null, wrong);
+for (const wrong of ["", "0", "-3 mm", "3 kg", "a", "1 2", "1,000"]) assert.equal(geometry.lengthOf(wrong, "mm"), null, wrong);
 assert.equal(geometry.lengthText(0.0512, "mm", 0.001), "51 mm");
 
 // ---- what a pointer takes
 const spots = [{ kind: "joints", name: "A", key: "crank.A", at: [0, 0] }, { kind: "points", name: "bar.E", key: "bar.E", at: [0.01, 0] }];
-assert.equal(geometry.snap(spots, [0.004, 0], { near: 0.02, step: 0.01 }).end, "A");
-assert.equal(geometry.snap(spots, [0.006, 0], { near: 0.02, step: 0.01 }).end, "bar.E");
-assert.deepEqual(geometry.snap(spots, [0.112, 0.058], { near: 0.02, step: 0.01 }).end, [0.11, 0.06]);
+assert.equal(geometry.snap(spots, [0.004, 0], { near: 0.02, step: 0.01 }).name, "A");
+assert.equal(geometry.snap(spots, [0.006, 0], { near: 0.02, step: 0.01 }).name, "bar.E");
+assert.deepEqual(geometry.snap(spots, [0.112, 0.058], { near: 0.02, step: 0.01 }).at, [0.11, 0.06]);
+
+assert.deepEqual(geometry.onLine([[0, 0], [1, 0]], [0.3, 0.01], 0.02), [0.3, 0]);
+assert.deepEqual(geometry.onLine([[0, 0], [1, 0]], [0.3, 0.03], 0.02), [0.3, 0.03]);
 
 // ---- a mechanism that is only drawn
 const entries = {
@@ -46,12 +49,22 @@ assert.deepEqual([0, 1, 2, 3, 4].map((index) => geometry.posedAt(track, index)),
 assert.ok(geometry.assembled(track));
 assert.ok(!geometry.assembled({ count: 2, points: { "a.P": { x: [null], y: [0] } } }));
 
+// ---- a picture behind the grid: what was at (1, 2) stays, what was 1 m right of it is 3 m above it
+const turned = geometry.enlarged({ x: 0, y: 2, pixel: 0.01 }, [1, 2], 3, Math.PI / 2);
+const near = (found, stated) => found.forEach((one, order) => assert.ok(Math.abs(one - stated[order]) < 1e-12));
+near([turned.x, turned.y, turned.pixel, turned.turn], [1, -1, 0.03, Math.PI / 2]); // its corner was 1 m left of it
+
 // ---- values as the file writes them
 assert.equal(fields.written(" 0.3 "), 0.3);
 assert.equal(fields.written("2 kg"), "2 kg");
 assert.equal(fields.written("  "), null);
 assert.equal(fields.written("60", "mm"), "60 mm"); // never 60 m for who leaves off the unit
 assert.equal(fields.written("0", "mm"), 0);
+assert.equal(fields.written("5,5", "mm"), "5.5 mm");
+assert.equal(fields.written(",5 mm"), "0.5 mm");
+assert.equal(fields.written("max(1,2)"), "max(1,2)");
+assert.ok(fields.ambiguous("1,000 mm") && !fields.ambiguous("1,25 mm"));
+assert.equal(fields.usualUnit({ dimensions: { a: "3 m", b: "2 m" }, links: { c: { points: { P: ["5 mm", 0] } } } }), "m");
 assert.equal(fields.written("60 m", "mm"), "60 m");
 assert.equal(fields.unitOf({ value: "60 mm ± 0.05 mm", example: null }), "mm");
 assert.equal(fields.unitOf({ value: "0.004", example: "5 mm" }), ""); // a plain number was SI and stays it

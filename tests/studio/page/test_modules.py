@@ -1,4 +1,4 @@
-"""The page's modules: their arithmetic by node where there is one; vendored files are the ones that are stated."""
+"""The page's modules: their arithmetic by node and types by tsc, where there are these; vendored files as stated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 HERE = Path(__file__).resolve().parent
 PACKAGE = HERE.parents[2] / "src" / "trunnion"
 PAGE = PACKAGE / "studio" / "web"
-NODE = shutil.which("node")
+NODE, TSC = shutil.which("node"), shutil.which("tsc")
 
 
 def test_vendored_files_are_the_stated_ones():
@@ -38,11 +38,25 @@ def test_names_only_become_text():
         assert not markup.search(module.read_text(encoding="utf-8")), module.name
 
 
+@pytest.mark.skipif(TSC is None, reason="no TypeScript compiler here (npm install --global typescript@5.9.3)")
+def test_types_of_the_modules(tmp_path):
+    served(tmp_path)
+    for name in ("tsconfig.json", "vendored.d.ts"):
+        shutil.copy(HERE / name, tmp_path)
+    done = subprocess.run([TSC, "--project", str(tmp_path)], capture_output=True, text=True, timeout=120, cwd=tmp_path)
+    assert not done.returncode, done.stdout[-3000:]
+
+
+def served(folder):
+    """The modules lie as they are served: studio/ and web/."""
+    shutil.copytree(PAGE, folder / "studio")
+    shutil.copytree(PACKAGE / "views" / "web", folder / "web")
+
+
 if NODE:  # not a skip: what must hold everywhere is tested in Python; this is the browser's own part
 
     def test_arithmetic(tmp_path):
-        shutil.copytree(PAGE, tmp_path / "studio")
-        shutil.copytree(PACKAGE / "views" / "web", tmp_path / "web")
+        served(tmp_path)
         command = [NODE, str(HERE / "arithmetic.test.mjs"), str(tmp_path)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60)
         if done.returncode:

@@ -5,6 +5,7 @@ import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
+import { sheet } from "./sheet.js";
 import { connection, decode } from "./socket.js";
 
 const STEPS = 360; // positions of a run
@@ -83,19 +84,20 @@ function solveSoon() {
   typing = setTimeout(solve, TYPING);
 }
 
-/** Text and places of the mechanism as it is shown: what a gesture starts from. */
+/** Text, places and locks of the mechanism as it is shown: what a gesture starts from. */
 export function present() {
   const { scene } = state.answer.value ?? {};
   const fresh = state.solved.value && state.answer.value.text === state.text.value && !state.spatial.value;
   const places = fresh ? { ...state.places.value, ...placesAt(scene, posedAt(scene, state.index.value)) } : state.places.value;
-  return { text: state.text.value, places };
+  return { text: state.text.value, places, locked: state.locked.value };
 }
 
-let queue = Promise.resolve();
+/** @type {Promise<boolean>} */
+let queue = Promise.resolve(true);
 
 /**
  * Carry out gestures as one step to undo; one after the other, for each starts from what the one before left.
- * Steps in a row with the same `merge` are undone as one.
+ * Steps in a row with the same `merge` are undone as one. Whether it could be done.
  */
 export function edit(gestures, merge = null) {
   queue = queue.then(() => carryOut(gestures, merge)).catch((problem) => refuse(String(problem.message ?? problem)));
@@ -104,16 +106,15 @@ export function edit(gestures, merge = null) {
 
 async function carryOut(gestures, merge) {
   const before = present();
-  const done = await link.ask("edit", { ...before, gestures });
+  const done = await link.ask("edit", { ...before, gestures, fine: sheet.fine() });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
-  const added = gestures.some((one) => one.do === "add-point") && Object.keys(done.places).find((key) => !(key in before.places));
-  if (added) state.selection.value = { kind: "points", name: added }; // and so its velocity and acceleration are shown
-  if (done.select) state.selection.value = { kind: done.select[0], name: done.select[1] };
+  if (done.made) state.selection.value = { kind: done.made[0], name: done.made[1] };
   state.say(sentence(done.says));
   if (state.live.value) state.live.value = { ...state.live.value, text: null };
   await solve();
+  return true;
 }
 
 function sentence(words, end = ".") {
@@ -122,7 +123,8 @@ function sentence(words, end = ".") {
 
 function refuse(words) {
   state.live.value = null;
-  state.say(words, true);
+  state.say(/[.!?]$/.test(words) ? words : `${words}.`, true);
+  return false;
 }
 
 /** Write one value of the file. */
@@ -132,7 +134,7 @@ export function setValue(path, value, merge = null) {
 
 /** Where the mechanism would be with a point at another place. */
 export function drag(fields) {
-  return link.ask("drag", { text: state.text.value, steps: STEPS, ...fields });
+  return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, fine: sheet.fine(), ...fields });
 }
 
 /** Ask something else of the mechanism that is shown; null where it has changed meanwhile or there is no answer. */
@@ -146,7 +148,7 @@ export async function askOf(kind, fields) {
 /** Take another text as a step to undo. */
 export function takeText(content, name) {
   const before = present();
-  state.commit(name, before, { text: content, places: before.places });
+  state.commit(name, before, { ...before, text: content });
   state.say(`${name}.`);
   return solve();
 }
@@ -160,7 +162,7 @@ export async function assemblies() {
 /** Take typed text; words typed in one go are one step. */
 export function typed(content) {
   const before = present();
-  state.commit("Edit text", before, { text: content, places: before.places }, "typing");
+  state.commit("Edit text", before, { ...before, text: content }, "typing");
   solveSoon();
 }
 

@@ -13,7 +13,7 @@ import { Stage } from "./stage.js";
 import * as state from "./state.js";
 import { Text } from "./text.js";
 import { choose } from "./tools.js";
-import { Button, html } from "./ui.js";
+import { Button, focusOn, html } from "./ui.js";
 
 const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
 
@@ -36,14 +36,13 @@ export function App() {
 
 function Panel() {
   const open = state.tab.value;
-  const found = state.text.value.trim() ? (state.answer.value?.findings ?? []) : [];
-  const count = found.filter(({ severity }) => severity !== "note").length;
+  const count = state.findings.value.filter(({ severity }) => severity !== "note").length;
   const step = (event) => {
     const names = Object.keys(TABS);
     const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!by) return;
     state.tab.value = names[(names.indexOf(open) + by + names.length) % names.length];
-    requestAnimationFrame(() => document.querySelector("[role=tab][aria-selected=true]")?.focus());
+    requestAnimationFrame(() => focusOn("[role=tab][aria-selected=true]"));
   };
   const [title, Body] = TABS[open];
   return html`<aside class="panel">
@@ -58,8 +57,8 @@ function Panel() {
 /** Recovered work, and in a sentence why it does not move. */
 function Messages() {
   const time = state.recovered.value;
-  const wrong = (state.answer.value?.findings ?? []).filter(({ severity }) => severity === "error");
-  const empty = !state.text.value.trim();
+  const wrong = state.findings.value.filter(({ severity }) => severity === "error");
+  const lacks = state.tool.value === "select" ? state.missing.value : [];
   const clock = (one) => new Date(one).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   const waiting = state.waiting.value;
   return html`<div class="messages">
@@ -68,8 +67,9 @@ function Messages() {
       <${Button} label="Discard it" onClick=${discard} /> <${Button} label="Keep it" onClick=${() => (state.recovered.value = null)} /></div>`}
     ${waiting && html`<div class="message-card">A sheet that was not saved is left from ${clock(waiting)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}
-    ${!empty && wrong.length > 0 && html`<button type="button" class="message-card bad" onClick=${() => (state.tab.value = "findings")}>
-      <b>${wrong[0].where}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}</button>`}
+    ${lacks.length > 0 && html`<div class="message-card">${lacks.join(" ")}</div>`}
+    ${wrong.length > 0 && html`<button type="button" class="message-card bad" onClick=${() => (state.tab.value = "findings")}>
+      <b>${wrong[0].place}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}</button>`}
   </div>`; // prettier-ignore
 }
 

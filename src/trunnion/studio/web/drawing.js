@@ -16,7 +16,7 @@ const TARGET = 12; // px, radius of what a pointer may hit
 /** The drawing of a scene in an SVG element; `draw(scene)` builds, `pose(…)` moves, `fit` and `zoom` change the frame. */
 export function drawing(root) {
   const layers = Object.fromEntries(
-    ["photo", "grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "tools", "key"].map((name) => [
+    ["photo", "grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "locks", "tools", "key"].map((name) => [
       name,
       svg("g", { class: `layer ${name}` }),
     ]),
@@ -112,7 +112,7 @@ function allParts(scene, view) {
     guides: scene.joints.filter((one) => fixed(one) && slides(one)).map((one) => ({ joint: one, node: svg("path", { class: "hatch" }) })),
     bodies: moving.map((link, order) => body(link, order)),
     slots: slotsOf(scene, (name) => `k${moving.findIndex((link) => link.name === name) % 6}`),
-    gears: scene.gears.map(({ name, at: key, radius }) => ({ key, radius, node: titled(svg("circle", { class: "pitch-circle" }), name) })),
+    gears: scene.gears.map((one) => gear(one)),
     points: scene.links.flatMap((link) => link.free.map((key) => ({ key, node: svg("g", { class: "point" }, svg("circle", { r: link.ground ? 3 : 4 })) }))),
     joints: scene.joints.map((one) => joint(one)),
     springs: scene.springs.map((one) => spring(one)),
@@ -132,11 +132,6 @@ function drawn(scene) {
 function simpleParts() {
   const empty = Object.fromEntries(["supports", "guides", "bodies", "slots", "gears", "points", "joints", "springs", "loads", "drives", "vectors", "names"].map((name) => [name, []]));
   return { ...empty, plain: [svg("path", { class: "plain-links" }), svg("path", { class: "plain-joints" })] };
-}
-
-function titled(node, name) {
-  node.append(svg("title", {}, name));
-  return node;
 }
 
 function marked(part, kind, name) {
@@ -166,6 +161,11 @@ function spring({ name, ends }) {
   const path = svg("path", { class: "spring" });
   const wide = svg("path", { class: "wide" });
   return { ends, parts: [path, wide], node: svg("g", { "data-kind": "springs", "data-name": name }, svg("title", {}, name), path, wide) };
+}
+
+function gear({ name, at: key, radius }) {
+  const circles = ["pitch-circle", "wide"].map((kind) => svg("circle", { class: kind }));
+  return { key, radius, circles, node: svg("g", { "data-kind": "gears", "data-name": name }, svg("title", {}, name), ...circles) };
 }
 
 function nameOf(key, other, name, grounded, slides) {
@@ -271,9 +271,9 @@ export function pose(view, scene, index) {
   parts.points.forEach(({ key, node }) => moveTo(node, spot(key)));
   parts.joints.forEach(({ joint: one, node }) => moveTo(node, spot(one.at) ?? spot(one.on), one.type === "prismatic" ? guide(scene, one, view.posed) : 0));
   parts.springs.forEach((one) => one.parts.forEach((part) => set(part, { d: coil(spots(one.ends)) })));
-  parts.gears.forEach(({ key, radius, node }) => {
+  parts.gears.forEach(({ key, radius, circles, node }) => {
     moveTo(node, spot(key));
-    set(node, { r: radius * frame.scale });
+    circles.forEach((one) => set(one, { r: radius * frame.scale }));
   });
   parts.loads.forEach((one) => {
     one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed) ?? 0);

@@ -6,14 +6,16 @@ import { dictionary } from "./geometry.js";
 const USUAL = {
   links: [["mass", "2 kg"], ["inertia", "0.01 kg m^2"], ["centre", ["50 mm", "0"]]],
   joints: [["friction.coefficient", "0.1"], ["pin.radius", "5 mm"], ["pin.clearance", "0.02 mm"]],
+  slides: [["friction.coefficient", "0.1"], ["guide.length", "40 mm"], ["guide.clearance", "0.02 mm"]],
   drivers: [["speed", "60 rpm"], ["range", ["0 deg", "90 deg"]], ["start", "0 deg"]],
   loads: [["force", ["0 N", "-100 N"]], ["moment", "1 N m"]],
   springs: [["stiffness", "1 N/mm"], ["free_length", "50 mm"], ["preload", "0 N"]],
-  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"]],
+  gears: [["ratio", "-1/2"], ["phase", "0 deg"]],
+  model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"], ["joint_defaults.guide.length", "40 mm"]],
 }; // prettier-ignore
 
-const FIXED = new Set(["type", "links", "link", "at", "between", "joint"]); // drawn, not typed
-const OWN_PLACE = ["links", "joints", "drivers", "loads", "springs", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
+const FIXED = new Set(["type", "links", "link", "at", "between", "joint", "joints"]); // drawn, not typed
+const OWN_PLACE = ["links", "joints", "drivers", "loads", "springs", "gears", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
 
 /**
  * Rows of a part, [{path, label, value, example, fixed}]; value is a text, a list of texts, or null where the file says
@@ -24,7 +26,7 @@ export function rowsOf(entries, kind, name) {
   const from = kind === "model" ? [] : [kind, name];
   const there = leaves(part, from).map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const missing = (USUAL[kind] ?? [])
+  const missing = (USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [])
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false }))
     .filter(({ path }) => !known(path));
   return [...there, ...missing].map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)) }));
@@ -54,9 +56,18 @@ function labelOf(path) {
   return path[0] === "joint_defaults" ? `${words} of all joints` : words;
 }
 
+/** Typed letters with decimal points for decimal commas; "1,000", which may be a thousand, stays as it is. */
+export function plainNumber(typed) {
+  const own = String(typed).trim();
+  return /[([]/.test(own) || ambiguous(own) ? own : own.replace(/(\d),(?=\d)/g, "$1.").replace(/(^|[^\d.]),(?=\d)/g, "$10.");
+}
+
+/** Whether a comma in typed letters may part thousands. */
+export const ambiguous = (typed) => !/[([]/.test(typed) && /\d,\d{3}(?!\d)/.test(typed);
+
 /** What is written for typed letters: a number stays a number, or takes the unit; nothing takes the entry away. */
 export function written(typed, unit = "") {
-  const plain = typed.trim();
+  const plain = plainNumber(typed);
   if (plain === "") return null;
   const number = Number(plain);
   return Number.isFinite(number) ? (unit && number !== 0 ? `${plain} ${unit}` : number) : plain;
@@ -66,6 +77,17 @@ export function written(typed, unit = "") {
 export function unitOf({ value, example }, order = 0) {
   const there = [value ?? example].flat();
   return [there[order], ...there].map((one) => numberOf(one ?? "")?.rest.split("±")[0].trim()).find(Boolean) ?? "";
+}
+
+/** Whether letters are a number without a unit, not 0. */
+export const bare = (typed) => Number.isFinite(Number(plainNumber(typed))) && Number(plainNumber(typed)) !== 0;
+
+/** The unit of lengths that the file has most often; "mm" where it has none. */
+export function usualUnit(entries) {
+  const found = JSON.stringify([entries?.dimensions, entries?.links]).match(/[\d.]\s*(mm|cm|µm|um|m|in|ft)(?=")/g) ?? [];
+  const units = found.map((one) => one.replace(/^[\d.]\s*/, ""));
+  const count = (unit) => units.filter((one) => one === unit).length;
+  return units.sort((a, b) => count(b) - count(a))[0] ?? "mm";
 }
 
 /** A number with what follows it, {value, rest}, or null where it is an expression. */
@@ -83,5 +105,5 @@ export function findingsOf(findings, path) {
 /** The part that a finding is about, {kind, name}, or null. */
 export function partOf({ where }, entries) {
   const [kind, name] = String(where ?? "").split(".");
-  return kind in USUAL && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
+  return kind in USUAL && kind !== "slides" && dictionary(entries?.[kind])[name] !== undefined ? { kind, name } : null;
 }

@@ -29,9 +29,24 @@ export function snap(spots, at, { near, step }) {
     const far = Math.hypot(one.at[0] - at[0], one.at[1] - at[1]);
     if (far < least) [best, least] = [one, far];
   }
-  if (best) return { ...best, end: best.name };
-  const free = at.map((value) => onGrid(value, step));
-  return { kind: null, at: free, end: free };
+  return best ?? { kind: null, at: at.map((value) => onGrid(value, step)) };
+}
+
+/** The place on a line through two of some spots that is nearest to a place within their reach; the place itself beyond `near`. */
+export function onLine(spots, at, near) {
+  let [best, least] = [at, near];
+  spots.forEach((a, order) =>
+    spots.slice(order + 1).forEach((b) => {
+      const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+      const square = dx * dx + dy * dy;
+      if (square === 0) return;
+      const share = Math.min(Math.max(((at[0] - a[0]) * dx + (at[1] - a[1]) * dy) / square, 0), 1);
+      const foot = [a[0] + share * dx, a[1] + share * dy];
+      const far = Math.hypot(foot[0] - at[0], foot[1] - at[1]);
+      if (far < least) [best, least] = [foot.map((value) => Number(value.toPrecision(12))), far];
+    }),
+  );
+  return best;
 }
 
 export const nearOf = (scale) => NEAR / scale;
@@ -76,11 +91,14 @@ export function sketch(entries, places, numbers = {}) {
   const joints = Object.entries(dictionary(entries?.joints)).filter(([, one]) => Array.isArray(one?.links));
   const ground = groundOf(entries);
   const points = Object.fromEntries(Object.entries(places).map(([key, [x, y]]) => [key, { x: [x], y: [y] }]));
+  const angles = Object.fromEntries(links.map(([name, link]) => [name, angleOf(name, link, places, numbers)]));
+  for (const { type, links: pair } of joints.map(([, one]) => one)) // a block lies along its guide
+    if (type === "prismatic") angles[pair[1]] ??= angles[pair[0]];
   const rows = links.map(([name, link]) => {
     const keys = Object.keys(dictionary(link?.points)).map((point) => `${name}.${point}`);
     const known = keys.filter((key) => key in points);
     const free = known.filter((key) => !joints.some(([joint]) => key === `${name}.${joint}`));
-    return { name, ground: name === ground, points: known, free, angle: [0] };
+    return { name, ground: name === ground, points: known, free, angle: [name === ground ? 0 : (angles[name] ?? 0)] };
   });
   return {
     name: String(entries?.name ?? ""),
@@ -96,7 +114,7 @@ export function sketch(entries, places, numbers = {}) {
     springs: Object.entries(dictionary(entries?.springs))
       .map(([name, one]) => ({ name, ends: one?.between ?? [] }))
       .filter(({ ends }) => ends.length === 2 && ends.every((key) => key in points)),
-    gears: [],
+    gears: gearsOf(entries, numbers, places),
     drivers: Object.keys(dictionary(entries?.drivers)).map((name) => ({
       name,
       type: entries.joints?.[name]?.type ?? "revolute",
@@ -124,6 +142,30 @@ function jointOf(name, { type, links: [first, second] }, entries) {
   return { name, type: type ?? "revolute", links: [first, second], axis, at: `${second}.${name}`, on: `${first}.${name}`, reaction };
 }
 
+/** How far a link is turned from its own frame, rad, by two of its points; null of a block, whose points are one. */
+function angleOf(name, link, places, numbers) {
+  const spots = Object.keys(dictionary(link?.points)).flatMap((point) => {
+    const own = ["x", "y"].map((axis) => numbers[`links.${name}.points.${point}.${axis}`] ?? 0);
+    return places[`${name}.${point}`] ? [{ own, at: places[`${name}.${point}`] }] : [];
+  });
+  const other = spots.find(({ own }) => Math.hypot(own[0] - spots[0].own[0], own[1] - spots[0].own[1]) > 0);
+  if (!other) return null;
+  const turn = (key) => Math.atan2(other[key][1] - spots[0][key][1], other[key][0] - spots[0][key][0]);
+  return turn("at") - turn("own");
+}
+
+/** Pitch circles of gear pairs on one carrier: |r₁|/|r₂| is the ratio, and r₁ + r₂ (or their difference) the distance. */
+function gearsOf(entries, numbers, places) {
+  return Object.entries(dictionary(entries?.gears)).flatMap(([name, gear]) => {
+    const pair = (Array.isArray(gear?.joints) ? gear.joints : []).map((joint) => `${entries.joints?.[joint]?.links?.[1]}.${joint}`);
+    const ratio = numbers[`gears.${name}.ratio`];
+    const [one, two] = pair.map((key) => places[key]);
+    if (!one || !two || !ratio || ratio === 1) return [];
+    const far = Math.hypot(two[0] - one[0], two[1] - one[1]);
+    return [Math.abs(ratio / (ratio - 1)), Math.abs(1 / (ratio - 1))].map((share, order) => ({ name, at: pair[order], radius: share * far }));
+  });
+}
+
 function loadsOf(entries, numbers, points) {
   return Object.entries(dictionary(entries?.loads))
     .map(([name, load]) => ({
@@ -143,11 +185,18 @@ export function extentOf(scene) {
   return Object.keys(scene.points).length ? bounds(scene) : null;
 }
 
+/** Where a picture lies that is enlarged and turned, rad, about a place of the plane that stays. */
+export function enlarged({ x, y, pixel, turn = 0 }, [px, py], factor, by = 0) {
+  const [c, s] = [factor * Math.cos(by), factor * Math.sin(by)];
+  const [dx, dy] = [x - px, y - py];
+  return { pixel: factor * pixel, turn: turn + by, x: px + c * dx - s * dy, y: py + s * dx + c * dy };
+}
+
 const UNITS = { "": null, mm: 1e-3, cm: 1e-2, dm: 0.1, m: 1, km: 1e3, in: 0.0254, ft: 0.3048, um: 1e-6, µm: 1e-6 };
 
-/** A typed length in m ("60", "60 mm", "2.5in"); a bare number is in `unit`. Null if it is none. */
+/** A typed length in m ("60", "60 mm", "2.5in"); a bare number is in `unit`. Null if it is none, or may be a thousand. */
 export function lengthOf(typed, unit) {
-  const found = /^\s*(\d*[.,]?\d+|\d+[.,])\s*([a-zµ]*)\s*$/i.exec(typed);
+  const found = /^\s*(?!\d+,\d{3}(?!\d))(\d*[.,]?\d+|\d+[.,])\s*([a-zµ]*)\s*$/i.exec(typed);
   if (!found || !(found[2] in UNITS)) return null;
   const value = Number(found[1].replace(",", ".")) * (UNITS[found[2]] ?? UNITS[unit]);
   return value > 0 ? value : null;

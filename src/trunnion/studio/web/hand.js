@@ -5,7 +5,7 @@ import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
 import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
-import { click, pointer } from "./tools.js";
+import { click, pointer, toolOf } from "./tools.js";
 
 const STILL = 3; // px that a click may move
 
@@ -17,8 +17,9 @@ export function listenToPointer(root, view) {
     return [event.clientX - box.left, event.clientY - box.top];
   };
   const follow = (event) => {
-    const spot = sheet.snap(view.frame.from(placed(event)), event.altKey);
-    pointer.value = { spot, keyboard: false, wide: view.frame.width / view.frame.scale };
+    const part = toolOf().on ? partUnder(event.target) : null;
+    const spot = sheet.snapOn(view.frame.from(placed(event)), event.altKey, part);
+    pointer.value = { spot, keyboard: false, ...sheet.scale() };
     return spot;
   };
   root.addEventListener("pointerdown", (event) => {
@@ -66,13 +67,17 @@ function pull(view, held, at) {
   if (!held.moved) takeHold(view, held);
   held.moved = true;
   if (held.joint) dragTo(held.joint, view.frame.from(at), gridStep(view.frame.scale) / 10);
-  else if (held.panning || state.tool.value === "select") sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
+  else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
 
 function takeHold(view, held) {
   const { kind, name, key } = held.part ?? {};
   if (held.panning || state.tool.value !== "select" || (kind !== "joints" && kind !== "points")) return;
+  if (state.locked.value.includes(name)) {
+    held.locked = true;
+    return state.say(`${name} is locked where it is; unlock it first (K).`, true);
+  }
   const base = present();
   const { sketched } = shown.peek();
   held.joint = { name, key, index: view.posed, asked: false, wanted: null, sketched, base, together: sketched ? together(kind, name, base.places) : [] };

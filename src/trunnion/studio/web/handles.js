@@ -3,18 +3,21 @@
 import { set, svg } from "../web/dom.js";
 import { stated } from "../web/format.js";
 import { TARGET } from "./drawing.js";
+import * as state from "./state.js";
 
 const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
 
 /** Put targets over the spots; `chosen` {kind, name} is marked. */
 export function poseHandles(view, spots, chosen) {
   const { layers, frame } = view;
+  const locked = new Set(state.locked.value);
+  layers.locks.replaceChildren(...spots.filter(({ name }) => locked.has(name)).map(({ at }) => padlock(frame.to(at))));
   const few = spots.slice(0, MOST);
   const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
   if (view.handled !== names) build(view, few, names);
   few.forEach(({ kind, name, at }, order) => {
     const [x, y] = frame.to(at);
-    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}, at ${stated(at[0], "m")}, ${stated(at[1], "m")}`;
+    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}${locked.has(name) ? ", locked" : ""}, at ${stated(at[0], "m")}, ${stated(at[1], "m")}`;
     const active = chosen?.kind === kind && chosen.name === name;
     set(layers.handles.children[order], {
       cx: x.toFixed(1),
@@ -25,9 +28,17 @@ export function poseHandles(view, spots, chosen) {
   });
 }
 
+/** The mark of a locked joint, below it to the right. */
+function padlock([x, y]) {
+  const shackle = svg("path", { class: "shackle", d: "M-3.2,0v-3a3.2,3.2 0 0 1 6.4,0v3" });
+  const body = svg("rect", { x: -5.5, y: 0, width: 11, height: 8.5, rx: 1.5 });
+  return svg("g", { class: "padlock", transform: `translate(${(x + 15).toFixed(1)},${(y + 9).toFixed(1)})` }, shackle, body);
+}
+
 function build(view, spots, names) {
   const { handles } = view.layers;
-  const held = handles.contains(document.activeElement) ? document.activeElement.dataset : null;
+  const active = document.activeElement;
+  const held = active instanceof SVGElement && handles.contains(active) ? active.dataset : null;
   view.handled = names;
   handles.replaceChildren(
     ...spots.map(({ kind, name, key }) =>

@@ -5,7 +5,8 @@ import { partUnder } from "./hand.js";
 import { crank } from "./motion.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
-import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, typedLength } from "./tools.js";
+import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
+import { focusOn } from "./ui.js";
 
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const WRITES = "input:not([type=range]), textarea, select, dialog, [contenteditable]";
@@ -39,7 +40,7 @@ function withControl(event) {
 function ordinary(event) {
   const { target, key } = event;
   if (event.ctrlKey || event.metaKey || target.closest?.(WRITES)) return false;
-  if (length(event)) return true;
+  if (value(event)) return true;
   const onSheet = sheet.view?.root.contains(target);
   if (onSheet && (key in ARROWS || key === "Enter")) return key === "Enter" ? enter(event) : arrow(event);
   if (key === "Escape") return leave(target);
@@ -58,17 +59,21 @@ function act(does) {
   return true;
 }
 
-/** Letters of a typed length while a link is drawn. */
-function length(event) {
+const EXAMPLES = { link: "no length; type one as 60, 60 mm or 2.5 in", slide: "no angle; type one as 30", load: "no force; type one as 250, 250 N or 2 kN" };
+
+/** Letters of a value that is typed while something is drawn. */
+function value(event) {
   const { key, shiftKey } = event;
-  if (!state.pending.value || state.tool.value !== "link") return false;
-  const typed = typedLength.value;
-  if (key === "Enter" && typed) {
-    if (!placeTyped(shiftKey)) state.say(`“${typed}” is no length; type one as 60, 60 mm or 2.5 in.`, true);
+  const { id, begins } = toolOf();
+  if (!state.pending.value || !begins || (key.length > 1 && key !== "Enter" && key !== "Backspace")) return false;
+  const letters = typed.value;
+  if (key === "Enter") {
+    if (!letters) return false;
+    if (!placeTyped(shiftKey)) state.say(`“${letters}” is ${EXAMPLES[id]}.`, true);
     return true;
   }
-  if (key === "Backspace" && typed) return act(() => (typedLength.value = typed.slice(0, -1)));
-  if (/^[0-9.,]$/.test(key) || (typed && /^[a-zµ ]$/i.test(key))) return act(() => (typedLength.value = typed + key));
+  if (key === "Backspace") return Boolean(letters) && act(() => (typed.value = letters.slice(0, -1)));
+  if (begins.test(key) || (letters && /[0-9.,a-zµ° :/-]/i.test(key))) return act(() => (typed.value = letters + key));
   return false;
 }
 
@@ -78,16 +83,15 @@ function arrow({ target, key, shiftKey, altKey }) {
   const [dx, dy] = ARROWS[key].map((part) => part * step);
   const part = partUnder(target);
   const moved = ([x, y]) => [x + dx, y + dy].map((value) => Number(value.toPrecision(12)));
-  if (part && state.tool.value === "select") {
-    const spot = sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name);
-    if (spot) nudge(part, moved(spot.at));
-    return true;
-  }
-  const from = pointer.value?.spot.at ?? sheet.view.frame.from([sheet.view.frame.width / 2, sheet.view.frame.height / 2]);
+  const held = part && sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name);
+  if (held && state.tool.value === "select") return act(() => nudge(part, moved(held.at)));
+  if (held) sheet.view.root.focus(); // the cross leaves the joint, and Enter is for where it is
+  const from = held?.at ?? pointer.value?.spot.at ?? sheet.view.frame.from([sheet.view.frame.width / 2, sheet.view.frame.height / 2]);
   const cross = altKey ? moved(from) : moved(sheet.snap(from).at);
-  pointer.value = { spot: sheet.snap(cross, altKey), keyboard: true, wide: sheet.view.frame.width / sheet.view.frame.scale };
-  const { at, name } = pointer.value.spot;
-  state.say(name ? `At ${name}.` : `At ${at.map((value) => `${Number((1000 * value).toPrecision(6))} mm`).join(", ")}.`);
+  const near = 0.45 * step; // nearer than a step, or the cross could not leave a joint
+  pointer.value = { spot: sheet.snapOn(cross, altKey, linkUnder(cross), near), keyboard: true, ...sheet.scale() };
+  const { at, name, on } = pointer.value.spot;
+  state.say(name || on ? `At ${name ?? on}.` : `At ${at.map((value) => `${Number((1000 * value).toPrecision(6))} mm`).join(", ")}.`);
   return true;
 }
 
@@ -102,17 +106,31 @@ function enter({ target, shiftKey: shift }) {
   if (part && state.tool.value === "select") {
     state.selection.value = part;
     state.tab.value = "properties";
-    requestAnimationFrame(() => document.querySelector(".properties input")?.focus());
+    requestAnimationFrame(() => focusOn(".properties input"));
     return true;
   }
-  const spot = part ? sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name) : pointer.value && sheet.snap(pointer.value.spot.at, true);
+  const spot = part ? sheet.spots().find(({ kind, name }) => kind === part.kind && name === part.name) : crossed();
   if (!spot) return true;
-  const [x, y] = sheet.view.frame.to(spot.at);
-  const box = sheet.view.root.getBoundingClientRect();
-  const under = document.elementsFromPoint(x + box.left, y + box.top).map(partUnder);
-  click(spot, { shift, part: under.find((one) => one?.kind === "links") ?? under.find(Boolean) ?? null });
+  const under = partsAt(spot.at);
+  const link = under.find(({ kind }) => kind === "links");
+  click(spot, { shift, part: link ?? under[0] ?? null });
   return true;
 }
+
+/** What the cross is at by now. */
+function crossed() {
+  const { at } = pointer.value?.spot ?? {};
+  return at && sheet.snapOn(at, true, linkUnder(at), 0.45 * sheet.step());
+}
+
+/** What lies at a place of the sheet, the uppermost first. */
+function partsAt(at) {
+  const [x, y] = sheet.view.frame.to(at);
+  const box = sheet.view.root.getBoundingClientRect();
+  return document.elementsFromPoint(x + box.left, y + box.top).map(partUnder).filter(Boolean);
+}
+
+const linkUnder = (at) => (toolOf().on ? partsAt(at).find(({ kind }) => kind === "links") : null);
 
 /** Escape: moves by arrows are taken back, else what was begun is left off. */
 function leave(target) {

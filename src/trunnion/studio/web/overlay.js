@@ -184,7 +184,7 @@ function angle({ frame, index }, { x, y, first, angle: turn }) {
   if ([a, b, from, by].includes(null)) return [];
   const spot = frame.to([a, b]);
   const on = (way, far) => [spot[0] + far * Math.cos(way), spot[1] - far * Math.sin(way)];
-  const pair = ([px, py]) => `${px.toFixed(1)},${py.toFixed(1)}`;
+  const pair = (/** @type {number[]} */ [px, py]) => `${px.toFixed(1)},${py.toFixed(1)}`;
   const [start, end] = [on(from, 38), on(from + by, 38)];
   const rays = [from, from + by].map((way) => `M${pair(on(way, 10))}L${pair(on(way, 58))}`).join("");
   const middle = on(from + by / 2, 66);

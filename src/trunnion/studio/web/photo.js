@@ -3,16 +3,17 @@
 import { effect, signal, untracked } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { set, svg } from "../web/dom.js";
-import { lengthOf, lengthText, lengthUnit } from "./geometry.js";
+import { numberOf, plainNumber } from "./fields.js";
+import { enlarged, lengthOf, lengthText, lengthUnit } from "./geometry.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
-import { Button, html } from "./ui.js";
+import { Button, focusOn, html } from "./ui.js";
 
 const LARGEST = 2400; // px that are kept along a side
 const STORE = "photos";
 
-/** @typedef {{image: Blob, width: number, height: number, x: number, y: number, pixel: number, opacity: number}} Photo
- *  of an upper left corner at x, y (m) and pixels of so many m */
+/** @typedef {{image: Blob, width: number, height: number, x: number, y: number, pixel: number, turn?: number, opacity: number}} Photo
+ *  of an upper left corner at x, y (m), pixels of so many m, turned by so much, rad */
 
 /** Address of the shown image, made of its blob. */
 const address = signal("");
@@ -101,12 +102,6 @@ function change(fields) {
   state.photo.value = { ...state.photo.value, ...fields };
 }
 
-/** Enlarge it about a point of the plane that stays. */
-function enlarge(factor, [x, y]) {
-  const { photo } = state;
-  change({ pixel: photo.value.pixel * factor, x: x + (photo.value.x - x) * factor, y: y + (photo.value.y - y) * factor });
-}
-
 /** Show it, and let points of it be clicked; returns what ends this. */
 export function watchPhoto(view) {
   const node = svg("image", { preserveAspectRatio: "none" });
@@ -119,7 +114,8 @@ export function watchPhoto(view) {
       const { scale, to } = view.frame;
       const [x, y] = to([photo.x, photo.y]);
       const side = scale * photo.pixel;
-      set(node, { href: address.value, x, y, width: side * photo.width, height: side * photo.height, opacity: photo.opacity });
+      const turned = `translate(${x},${y}) rotate(${(-180 / Math.PI) * (photo.turn ?? 0)})`;
+      set(node, { href: address.value, transform: turned, width: side * photo.width, height: side * photo.height, opacity: photo.opacity });
     }
     const spots = (picking.value?.points ?? []).map(view.frame.to);
     marks.replaceChildren(...spots.map(([x, y]) => svg("path", { class: "cross", d: `M${x - 9},${y}h18M${x},${y - 9}v18` })));
@@ -182,7 +178,7 @@ function Placing({ photo }) {
   const width = photo.width * photo.pixel;
   const whole = (typed) => {
     const length = lengthOf(typed, unit);
-    if (length) enlarge(length / width, [photo.x, photo.y]);
+    if (length) change(enlarged(photo, [photo.x, photo.y], length / width));
     else state.say(`“${typed}” is no length; type one as 60, 60 mm or 2.5 in.`, true);
   };
   return html`<label class="choice">Opacity <input type="range" min="0.1" max="1" step="0.05" value=${photo.opacity} onInput=${({ target }) => change({ opacity: Number(target.value) })} /></label>
@@ -194,19 +190,25 @@ function Placing({ photo }) {
 
 function Distance({ unit }) {
   const [typed, setTyped] = useState("");
+  const [way, setWay] = useState("");
   const [wrong, setWrong] = useState("");
-  useEffect(() => document.querySelector(".photo-card form input")?.focus(), []);
+  useEffect(() => focusOn(".photo-card form input"), []);
   const submit = (event) => {
     event.preventDefault();
     const [a, b] = picking.value.points;
     const [length, shown] = [lengthOf(typed, unit), Math.hypot(b[0] - a[0], b[1] - a[1])];
     if (!length) return setWrong(`“${typed}” is no length; type one as 60, 60 mm or 2.5 in.`);
+    const angle = way.trim() ? numberOf(plainNumber(way.replace(/°|deg/, ""))) : { value: null, rest: "" };
+    if (!angle || angle.rest) return setWrong(`“${way}” is no angle; type one as 90, or leave it open.`);
     picking.value = null;
     if (!shown) return state.say("The two points are one; click two that lie apart.", true);
-    enlarge(length / shown, a);
-    state.say(`The picture has its scale: the two points are ${lengthText(length, unit, length / 1000)} apart.`);
+    const by = angle.value === null ? 0 : (angle.value * Math.PI) / 180 - Math.atan2(b[1] - a[1], b[0] - a[0]);
+    change(enlarged(state.photo.value, a, length / shown, by));
+    const turned = angle.value === null ? "" : `, the second at ${angle.value}° from the first`;
+    state.say(`The picture has its scale: the two points are ${lengthText(length, unit, length / 1000)} apart${turned}.`);
   };
   return html`<form onSubmit=${submit}><label class="choice">Distance between them <input value=${typed} placeholder=${`60 ${unit}`} onInput=${({ target }) => setTyped(target.value)} /></label>
+    <label class="choice">Angle of the second (optional) <input value=${way} placeholder="90°" onInput=${({ target }) => setWay(target.value)} /></label>
     <p class="wrong" role="alert">${wrong}</p>
     <p class="row-of-buttons"><button type="submit" class="plain strong">Take it</button></p></form>`; // prettier-ignore
 }

@@ -2,15 +2,15 @@
 
 import { useRef, useState } from "preact/hooks";
 import { edit, setValue } from "./actions.js";
-import { findingsOf, numberOf, rowsOf, unitOf, written } from "./fields.js";
+import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, written } from "./fields.js";
 import { dictionary } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
 import { removePart } from "./tools.js";
 import { Button, html } from "./ui.js";
 
-const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Driver", loads: "Load", springs: "Spring" };
-const SECTIONS = ["links", "joints", "drivers", "loads", "springs"];
+const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Driver", loads: "Load", springs: "Spring", gears: "Gear pair" };
+const SECTIONS = ["links", "joints", "drivers", "loads", "springs", "gears"];
 const MOST = 300; // parts in a list
 
 export function Properties() {
@@ -28,12 +28,14 @@ function Chosen({ kind, name }) {
   return html`<section>
       <h2 class="of-part">
         ${NOUNS[kind]}
-        ${kind === "links" || kind === "joints" ? html`<${Name} kind=${kind} name=${name} />` : html` <span>${name}</span>`}
+        <${Name} kind=${kind} name=${name} />
       </h2>
       <${Rows} rows=${rows} findings=${findings} />
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
+        ${(kind === "joints" || kind === "points") && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
+          title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
         <${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
@@ -42,22 +44,23 @@ function Chosen({ kind, name }) {
 }
 
 function Name({ kind, name }) {
-  const take = (event) => {
-    const to = event.target.value.trim();
-    if (to === name || !to) return (event.target.value = name);
-    const { target } = event;
-    edit([{ do: "rename", what: [kind, name], to }]).then(() => {
-      const there = dictionary(state.answer.value?.entries?.[kind]);
-      if (there[name] !== undefined) target.value = name; // it was refused
-      else if (there[to] !== undefined) state.selection.value = { kind, name: to };
-    });
+  const owner = kind === "points" ? `${name.split(".")[0]}.` : "";
+  const shown = name.slice(owner.length);
+  const take = async ({ target }) => {
+    const to = target.value.trim();
+    if (to === shown || !to) return void (target.value = shown);
+    if (await edit([{ do: "rename", what: [kind, name], to }])) state.selection.value = { kind, name: `${owner}${to}` };
+    else target.value = shown;
   };
-  return html`<input class="name-of-part" aria-label="Name" value=${name} onChange=${take} />`;
+  return html`<input class="name-of-part" aria-label="Name" value=${shown} onChange=${take} />`;
 }
 
 function Rows({ rows, findings }) {
   return html`<div class="rows">${rows.map((row) => html`<${Row} key=${row.path.join(".")} row=${row} findings=${findings} />`)}</div>`;
 }
+
+/** Units that fields had when what was in them was sound, by path: a bare number takes them. */
+const units = new Map();
 
 /** A value, or the parts of a list, with what is wrong about it. */
 function Row({ row, findings }) {
@@ -67,22 +70,36 @@ function Row({ row, findings }) {
   const list = Array.isArray(value ?? example);
   if (fixed) return html`<div class="row"><span class="label">${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
   const parts = list ? (value ?? example.map(() => "")) : [value ?? ""];
-  const sound = { ...row, value: wrong.length ? null : value }; // a unit that is refused goes with its number
-  const put = (order) => (event) => take(sound, parts, list, order, event.target.value);
+  if (!wrong.length) parts.forEach((_, order) => unitOf(row, order) && units.set(`${id}-${order}`, unitOf(row, order)));
+  const put = (order) => async ({ target }) => {
+    const why = refusal(row, target.value, units.get(`${id}-${order}`));
+    if (why) state.say(why, true);
+    if (why || !(await take(row, parts, list, order, target.value, units.get(`${id}-${order}`)))) target.value = parts[order];
+  };
   return html`<div class="row">
     <label class="label" for=${`${id}-0`}>${label}</label>
     <span class="values">
       ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} placeholder=${example && `e.g. ${list ? example[order] : example}`}
-        aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0}
+        aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${hintOf(units.get(`${id}-${order}`))}
         aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>
     ${wrong.length > 0 && html`<p class="wrong" id=${`${id}-wrong`}>${wrong.map(({ what, remedy }) => `${what}${remedy ? ` — ${remedy}` : ""}`).join("; ")}</p>`}
   </div>`; // prettier-ignore
 }
 
-function take(row, parts, list, order, typed) {
-  const { path, example } = row;
-  const own = written(typed, unitOf(row, order));
+const hintOf = (unit) => (unit ? `A number alone is in ${unit}` : null);
+
+/** Why typed letters are not taken; nothing where they are. */
+function refusal({ path, value }, typed, unit) {
+  if (ambiguous(typed)) return `“${typed.trim()}” may be a thousand or a decimal: write ${typed.trim().replace(",", "")} or ${typed.trim().replace(",", ".")}.`;
+  const formula = typeof value === "string" && value !== "" && !numberOf(value);
+  if (path[0] === "dimensions" && !unit && formula && bare(typed)) return `“${typed.trim()}” of what? Write its unit, as in ${typed.trim()} mm.`;
+  return null;
+}
+
+function take({ path, example }, parts, list, order, typed, unit) {
+  const length = path[2] === "points" && path[path.length - 1] !== "axis";
+  const own = written(typed, unit ?? (length && !numberOf(parts[order]) ? usualUnit(state.answer.value?.entries) : ""));
   if (!list) return setValue(path, own);
   const next = parts.map((one, place) => (place === order ? own : written(one)));
   if (next.every((one) => one === null)) return setValue(path, null);

@@ -3,7 +3,8 @@
 import { computed } from "@preact/signals";
 import { kindOf } from "../web/report.js";
 import { drawing, fitted, frameOf, reframe } from "./drawing.js";
-import { assembled, extentOf, gridStep, nearOf, sketch, snap, spotsOf } from "./geometry.js";
+import { place } from "../web/data.js";
+import { assembled, extentOf, gridStep, nearOf, onLine, sketch, snap, spotsOf } from "./geometry.js";
 import * as state from "./state.js";
 
 /** The scene that is shown, and what its parts are built from. */
@@ -57,13 +58,35 @@ export const sheet = {
   },
   /** Distance of the grid's lines, m. */
   step: () => gridStep(sheet.view.frame.scale),
+  /** What a hand can tell apart, m: a thousandth of the grid, some hundredths of a pixel. */
+  fine: () => (sheet.view ? sheet.step() / 1000 : 0),
+  /** Width of the window and reach of a click, m. */
+  scale: () => ({ wide: sheet.view.frame.width / sheet.view.frame.scale, near: nearOf(sheet.view.frame.scale) }),
   spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.posed) : []),
-  /** What lies at a place: a joint, a point, or the grid; `loose` leaves the grid out. */
-  snap(at, loose = false) {
+  /** What lies at a place: a joint or a point no farther than `near` m, or the grid; `loose` leaves the grid out. */
+  snap(at, loose = false, near = nearOf(sheet.view.frame.scale)) {
     const step = sheet.step() / (loose || !state.snapping.value ? 100 : 1);
-    return snap(sheet.spots(), at, { near: nearOf(sheet.view.frame.scale), step });
+    return snap(sheet.spots(), at, { near, step });
+  },
+  /** The same with the link `part` under it, {…, on: link}, where the tool takes links and no joint or point is near. */
+  snapOn(at, loose, part, near) {
+    const spot = sheet.snap(at, loose, near);
+    if (spot.kind || part?.kind !== "links") return spot;
+    const { scene, posed, frame } = sheet.view;
+    const points = scene.links.find(({ name }) => name === part.name)?.points ?? [];
+    const spots = points.map((key) => place(scene, key, posed)).filter(Boolean);
+    return { ...spot, on: part.name, at: onLine(spots, spot.at, nearOf(frame.scale)) };
   },
 };
+
+/** The one moving link at a joint or point, beside `own`; null where there are several. */
+export function linkOf({ kind, name, link }, own = null) {
+  if (kind === "points") return link;
+  const joint = kind === "joints" && sheet.view.scene.joints.find((one) => one.name === name);
+  const ground = sheet.view.scene.links.find((one) => one.ground)?.name;
+  const moving = joint ? joint.links.filter((one) => one !== ground && one !== own) : [];
+  return moving.length === 1 ? moving[0] : null;
+}
 
 function middle() {
   const { width, height } = sheet.view.frame;

@@ -4,7 +4,6 @@ import { effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { set, svg } from "../web/dom.js";
 import { build, drawTracks, drawing, pose } from "./drawing.js";
-import { gridStep, lengthText, lengthUnit } from "./geometry.js";
 import { others, poseGhosts } from "./ghosts.js";
 import { laid, listenToPlaces } from "./layers.js";
 import { addOverlay, poseOverlay } from "./overlay.js";
@@ -14,7 +13,7 @@ import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
 import { watchPhoto } from "./photo.js";
 import * as state from "./state.js";
-import { pointer, typedLength } from "./tools.js";
+import { pointer, toolOf, typed } from "./tools.js";
 import { html } from "./ui.js";
 
 export function Stage() {
@@ -45,6 +44,7 @@ function mount(holder) {
     effect(() => show(view)),
     effect(() => {
       state.selection.value;
+      state.locked.value;
       others.value;
       laid.value;
       compared.value;
@@ -118,19 +118,16 @@ function preview(view) {
     const [x, y] = frame.to(now.spot.at);
     parts.push(svg("path", { class: "cross", d: `M${x - 9},${y}h18M${x},${y - 9}v18` }));
     if (now.spot.kind) parts.push(svg("circle", { class: "snap", cx: x, cy: y, r: 11 }));
+    if (now.spot.on && toolOf().on) parts.push(svg("rect", { class: "snap", x: x - 9, y: y - 9, width: 18, height: 18 }));
   }
-  if (from && now) parts.push(...rubber(frame, from.at, now.spot.at, typedLength.value));
+  if (from && now) parts.push(...rubber(frame, from, now.spot));
   layers.tools.replaceChildren(...parts);
 }
 
-function rubber(frame, a, b, typed) {
-  const [[x1, y1], [x2, y2]] = [frame.to(a), frame.to(b)];
-  const unit = lengthUnit(frame.width / frame.scale);
-  const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
-  const angle = ((Math.atan2(dy, dx) * 180) / Math.PI).toFixed(1);
-  const told = `${lengthText(Math.hypot(dx, dy), unit, gridStep(frame.scale) / 10)}, ${angle}°`;
-  const words = typed ? `${typed}${/[a-z]/i.test(typed) ? "" : ` ${unit}`} ⏎` : told;
-  const label = svg("text", { class: typed ? "measure typed" : "measure", x: (x1 + x2) / 2 + 12, y: (y1 + y2) / 2 - 12 }, words);
+function rubber(frame, from, to) {
+  const [[x1, y1], [x2, y2]] = [frame.to(from.at), frame.to(to.at)];
+  const words = toolOf().tells?.(from, to, frame) ?? "";
+  const label = svg("text", { class: typed.value ? "measure typed" : "measure", x: (x1 + x2) / 2 + 12, y: (y1 + y2) / 2 - 12 }, words);
   const line = svg("line", { class: "rubber" });
   set(line, { x1, y1, x2, y2 });
   return [line, label];

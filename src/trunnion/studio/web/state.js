@@ -6,7 +6,7 @@ const STEPS = 100; // that can be undone
 const ROOM = 2e6; // characters of them that are kept over a reload
 
 export const connected = signal(false);
-/** Of the program: {version, examples, laws}. */
+/** Of the program: {version, examples, laws}. @type {import("@preact/signals").Signal<Record<string, any>>} */
 export const about = signal({ version: "", examples: [], laws: [] });
 /** Of the opened folder: {folder, names}. */
 export const folder = signal({ folder: "", names: [] });
@@ -27,8 +27,10 @@ export const index = signal(0);
 /** {kind, name}, kind being links, joints, points, loads, springs or drivers; or null. */
 export const selection = signal(null);
 export const tool = signal("select");
-/** First end of what is being drawn: {at, end, …}, or null. */
+/** First end of what is being drawn: {at, written, …}, or null. */
 export const pending = signal(null);
+/** Joints, and free points "link.P", that stay where they are while others are dragged. */
+export const locked = signal([]);
 /** Answer to the latest `drag` question while a joint is dragged. */
 export const live = signal(null);
 export const past = signal([]);
@@ -53,12 +55,19 @@ export const unsaved = computed(() => text.value !== savedText.value);
 export const spatial = computed(() => answer.value?.scene?.space === "spatial");
 export const solved = computed(() => Boolean(answer.value?.solved && answer.value.scene));
 
+/** What a half-drawn linkage still lacks, in sentences; then its errors are no more than that. */
+export const missing = computed(() => answer.value?.missing ?? []);
+export const findings = computed(() => {
+  const found = text.value.trim() ? (answer.value?.findings ?? []) : [];
+  return missing.value.length ? found.filter(({ severity }) => severity !== "error") : found;
+});
+
 export function say(words, bad = false) {
   notice.value = { words, bad };
 }
 
 /**
- * Take a text and its places as the present ones, `before` {text, places} becoming a step to undo. Steps with the same
+ * Take a text with its places and locks as the present ones, `before` {text, places, locked} becoming a step to undo. Steps with the same
  * `merge` in a row (arrow keys, a slider, typed letters) are one.
  */
 export function commit(name, before, next, merge = null) {
@@ -68,6 +77,7 @@ export function commit(name, before, next, merge = null) {
     future.value = [];
     text.value = next.text;
     places.value = next.places;
+    locked.value = next.locked;
   });
 }
 
@@ -82,9 +92,10 @@ function swap(from, to) {
   if (!step) return null;
   batch(() => {
     from.value = from.value.slice(0, -1);
-    to.value = [...to.value, { name: step.name, text: text.value, places: places.value }];
+    to.value = [...to.value, { name: step.name, text: text.value, places: places.value, locked: locked.value }];
     text.value = step.text;
     places.value = step.places;
+    locked.value = step.locked ?? [];
     recovered.value = null;
   });
   return step.name;
@@ -102,6 +113,7 @@ export function begin({ name, saved, content, steps = null }) {
     savedText.value = saved;
     text.value = content;
     places.value = steps?.places ?? {};
+    locked.value = steps?.locked ?? [];
     past.value = steps?.past ?? [];
     future.value = steps?.future ?? [];
     answer.value = null;
@@ -120,7 +132,7 @@ export function begin({ name, saved, content, steps = null }) {
 export const keyOf = (name) => `trunnion studio ${folder.value.folder} ${name ?? ""}`;
 const LAST = "trunnion studio last sheet";
 
-/** What was left of a sheet when the page was closed: {text, saved, places, past, future, time}, or null. */
+/** What was left of a sheet when the page was closed: {text, saved, places, locked, past, future, time}, or null. */
 export function kept(name) {
   return read(localStorage, keyOf(name));
 }
@@ -150,7 +162,7 @@ export function forget(name) {
 export function keepSteps() {
   effect(() => {
     const [saved, name] = [savedText.value, fileName.value];
-    const work = { text: text.value, saved, places: places.peek(), past: past.value, future: future.value };
+    const work = { text: text.value, saved, places: places.peek(), locked: locked.value, past: past.value, future: future.value };
     while (work.past.length > 5 && size(work) > ROOM) work.past = work.past.slice(Math.ceil(work.past.length / 2));
     try {
       sessionStorage.setItem(LAST, JSON.stringify({ folder: folder.value.folder, name }));

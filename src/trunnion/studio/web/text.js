@@ -24,7 +24,7 @@ export function Text() {
     area.current.setSelectionRange(before, end < 0 ? state.text.value.length : end);
     area.current.scrollTop = Math.max((line - 6) * 19, 0);
   }; // prettier-ignore
-  const wrong = (state.answer.value?.findings ?? []).filter(({ severity }) => severity !== "note");
+  const wrong = state.findings.value.filter(({ severity }) => severity !== "note");
   return html`<div class="text-of-model">
     <div class="editor">
       <pre class="gutter" ref=${gutter} aria-hidden="true"></pre>

@@ -29,6 +29,6 @@ export function nextTheme() {
 /** Keep the page in the chosen colours. */
 export function keepTheme() {
   const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]);
-  const dark = rules.filter((rule) => rule instanceof CSSMediaRule && rule.conditionText.includes("prefers-color-scheme"));
+  const dark = rules.flatMap((rule) => (rule instanceof CSSMediaRule && rule.conditionText.includes("prefers-color-scheme") ? [rule] : []));
   effect(() => dark.forEach((rule) => (rule.media.mediaText = WHEN[theme.value])));
 }

@@ -2,50 +2,60 @@
 
 import { signal } from "@preact/signals";
 import { edit } from "./actions.js";
-import { lengthOf, lengthUnit } from "./geometry.js";
+import { gridStep, lengthOf, lengthText, lengthUnit } from "./geometry.js";
+import { numberOf, plainNumber } from "./fields.js";
+import { linkOf } from "./sheet.js";
 import { pending, say, selection, tool } from "./state.js";
 
-const TURN = Math.PI / 12; // guides turn by 15°
+const TURN = Math.PI / 12; // guides and forces turn by 15°
+const FORCE = "100 N"; // of a load that is drawn without a number
 
-/** Letters typed for a length while a link is drawn. */
-export const typedLength = signal("");
+/** Letters typed while something is drawn: its length, force, stiffness, ratio or angle. */
+export const typed = signal("");
 /** Where the pointer or the keyboard's cross is: {at, spot, keyboard, shift}, or null. */
 export const pointer = signal(null);
 
+/**
+ * Tools; of those with two clicks `tells` says what the second would make, `begins` is how a typed value begins.
+ * @type {{ id: string, label: string, key: string, hint: string[], click?: Function, tells?: Function, begins?: RegExp, on?: boolean }[]}
+ */
 export const TOOLS = [
   { id: "select", label: "Select", key: "V", hint: ["Drag a joint: the mechanism follows. Drag the sheet to shift it, turn the wheel to zoom."] },
-  { id: "link", label: "Link", key: "L", hint: ["Click the first end of a link; Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink },
+  { id: "link", label: "Link", key: "L", hint: ["Click the first end of a link: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
   { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link to pin it to the ground."], click: pin },
-  { id: "slide", label: "Guide", key: "G", hint: ["Click a point that slides in a guide on the ground.", "Click in the direction of the guide."], click: slide },
+  { id: "slide", label: "Slide", key: "G", hint: ["Click what slides: a free end, a pin, or a link itself.", "Click the link it slides along, or the direction of a guide on the ground (or type an angle and press Enter)."], click: slide, tells: tellAngle, begins: /[0-9.,-]/, on: true },
+  { id: "gear", label: "Gears", key: "E", hint: ["Click the pivot of the first gear, or its link.", "Click the pivot of the second gear. For a ratio type the teeth first, as 20:40."], click: gear, tells: tellRatio, begins: /[0-9.,+]/, on: true },
   { id: "driver", label: "Drive", key: "D", hint: ["Click the joint that is driven."], click: drive },
-  { id: "point", label: "Point", key: "C", hint: ["Click a link: its new point draws a coupler curve."], click: addPoint },
-  { id: "load", label: "Load", key: "F", hint: ["Click the point a force acts at; its size is set under Properties."], click: load },
-  { id: "spring", label: "Spring", key: "S", hint: ["Click the first end of a spring.", "Click the second end of the spring."], click: spring },
+  { id: "point", label: "Point", key: "C", hint: ["Click the link that the point belongs to.", "Click where on it, or beside it, the point is."], click: addPoint, on: true },
+  { id: "load", label: "Load", key: "F", hint: ["Click the joint, point or link that the force acts on.", "Click the direction of the force; type its size first, as 250 N."], click: load, tells: tellForce, begins: /[0-9.,]/, on: true },
+  { id: "spring", label: "Spring", key: "S", hint: ["Click the first end of a spring: a point, a link, or the ground.", "Click the second end; type the stiffness first, as 2 N/mm."], click: spring, tells: tellStiffness, begins: /[0-9.,]/, on: true },
+  { id: "lock", label: "Lock", key: "K", hint: ["Click a joint to keep it where it is while others are dragged, or to let it go again."], click: lock },
   { id: "delete", label: "Delete", key: "X", hint: ["Click what is to go."], click: remove },
 ]; // prettier-ignore
 
+export const toolOf = () => TOOLS.find((one) => one.id === tool.value);
+
 export function choose(id) {
   tool.value = id;
-  pending.value = null;
-  typedLength.value = "";
+  finish();
   say(hint());
 }
 
 /** What to do next, in a sentence. */
 export function hint() {
-  const { hint: words } = TOOLS.find((one) => one.id === tool.value);
+  const { hint: words } = toolOf();
   return words[pending.value ? words.length - 1 : 0];
 }
 
 /** A click at a spot; `part` is the {kind, name, link} under it. */
 export function click(spot, { shift = false, part = null } = {}) {
-  TOOLS.find((one) => one.id === tool.value).click?.(spot, { shift, part });
+  toolOf().click?.(spot, { shift, part });
 }
 
-/** The end of a link as a gesture says it. */
-function endOf({ kind, end, at }, shift) {
-  if (kind) return end;
-  return shift ? { ground: at } : at;
+/** An end as a gesture says it: a joint, a point, a place on a link, on the ground, or anywhere. */
+function endOf({ kind, name, on, at }, shift = false) {
+  if (kind) return name;
+  return shift ? { ground: at } : on ? { on, at } : at;
 }
 
 function begin(spot, shift = false) {
@@ -53,31 +63,63 @@ function begin(spot, shift = false) {
   say(hint());
 }
 
+function finish() {
+  pending.value = null;
+  typed.value = "";
+}
+
+/** Direction from the first click to the pointer, rad, by 15°; `aim` is the place of the pointer. */
+function turnTo(aim) {
+  const { at } = pending.value;
+  const angle = Math.round(Math.atan2(aim[1] - at[1], aim[0] - at[0]) / TURN) * TURN;
+  return angle <= -Math.PI ? Math.PI : angle;
+}
+
+/** Place the second end as typed, towards the pointer. False if the text is no such value. */
+export function placeTyped(shift) {
+  const aim = pointer.value?.spot.at ?? pending.value.at;
+  if (tool.value === "link") return placeLength(shift, aim);
+  if (tool.value === "slide") return guideTyped();
+  if (tool.value === "load") return putLoad(aim);
+  say("Now click the other end.");
+  return true;
+}
+
+// ---- links and points
+
 function drawLink(spot, { shift }) {
   const from = pending.value;
   if (!from) return begin(spot, shift);
   if (Math.hypot(spot.at[0] - from.at[0], spot.at[1] - from.at[1]) === 0) return;
   finish();
-  edit([{ do: "link", from: from.written, to: endOf(spot, shift) }]);
+  edit([{ do: "link", from: from.written, to: endOf(spot, shift), length: spot.length }]);
 }
 
-function finish() {
-  pending.value = null;
-  typedLength.value = "";
-}
-
-/** Place the second end as far away as typed, towards the pointer. False if the text is no length. */
-export function placeTyped(shift) {
+function placeLength(shift, aim) {
   const from = pending.value;
-  const aim = pointer.value?.spot.at;
-  const length = lengthOf(typedLength.value, lengthUnit(pointer.value?.wide ?? 1));
-  if (!from || !length) return false;
-  const [dx, dy] = aim ? [aim[0] - from.at[0], aim[1] - from.at[1]] : [1, 0];
+  const unit = lengthUnit(pointer.value?.wide ?? 1);
+  const length = lengthOf(typed.value, unit);
+  if (!length) return false;
+  const [dx, dy] = [aim[0] - from.at[0], aim[1] - from.at[1]];
   const far = Math.hypot(dx, dy);
   const [ux, uy] = far > 0 ? [dx / far, dy / far] : [1, 0];
   const at = [from.at[0] + length * ux, from.at[1] + length * uy].map((value) => Number(value.toPrecision(12)));
-  drawLink({ kind: null, at, end: at }, { shift });
+  drawLink({ kind: null, at, end: at, length: withUnit(typed.value, unit) }, { shift });
   return true;
+}
+
+/** Typed letters as the file writes them: with a decimal point, and a unit. */
+function withUnit(letters, unit) {
+  const { value, rest } = numberOf(letters.replace(",", "."));
+  return `${value} ${rest || unit}`;
+}
+
+function tellLength(a, b, frame) {
+  const unit = lengthUnit(frame.width / frame.scale);
+  const [dx, dy] = [b.at[0] - a.at[0], b.at[1] - a.at[1]];
+  const angle = ((Math.atan2(dy, dx) * 180) / Math.PI).toFixed(1);
+  if (typed.value) return `${typed.value}${/[a-z]/i.test(typed.value) ? "" : ` ${unit}`} ⏎`;
+  return `${lengthText(Math.hypot(dx, dy), unit, gridStep(frame.scale) / 10)}, ${angle}°${b.kind || b.on ? `, joined to ${b.kind ? b.name : b.on}` : ""}`;
 }
 
 function pin({ kind, name }) {
@@ -85,41 +127,122 @@ function pin({ kind, name }) {
   edit([{ do: "pin", point: name }]);
 }
 
+function addPoint(spot) {
+  const { on, at } = spot;
+  const from = pending.value;
+  if (from) {
+    finish();
+    return edit([{ do: "add-point", link: from.on, at }]);
+  }
+  const link = on ?? linkOf(spot);
+  if (!link) return say("Click a link: the point belongs to it.", true);
+  begin({ ...spot, on: link });
+}
+
+// ---- guides, slots, gears
+
 function slide(spot) {
   const from = pending.value;
   if (!from) {
-    if (!spot.kind) return say("Click a joint or a free point of a link: it will slide.", true);
+    if (!spot.kind && !spot.on) return say("Click a joint, the free end of a link, or a link: it will slide.", true);
     return begin(spot);
   }
-  const turned = Math.atan2(spot.at[1] - from.at[1], spot.at[0] - from.at[0]);
-  const angle = Math.round(turned / TURN) * TURN;
+  const own = from.on ?? linkOf(from);
+  const along = spot.on ?? linkOf(spot, own);
+  const apart = Math.hypot(spot.at[0] - from.at[0], spot.at[1] - from.at[1]) > 0;
+  if (!apart && !(along && along !== own)) return say("Click beside it, in the direction of the guide, or on another link.", true);
+  const turned = along && along !== own ? { along, near: pointer.value?.near ?? 0 } : { angle: level(turnTo(spot.at)) };
   finish();
-  edit([{ do: "slide", joint: from.name, angle: Math.abs(angle) === Math.PI ? 0 : angle }]);
+  edit([{ do: "slide", joint: from.written, ...turned }]);
 }
+
+/** A guide has no sense: 180° is 0°. */
+const level = (angle) => (Math.abs(angle) === Math.PI ? 0 : angle);
+
+function guideTyped() {
+  const found = numberOf(plainNumber(typed.value.replace(/°|deg$/, "")));
+  if (!found || found.rest) return false;
+  const { written } = pending.value;
+  finish();
+  edit([{ do: "slide", joint: written, angle: (found.value * Math.PI) / 180 }]);
+  return true;
+}
+
+function tellAngle(a, b) {
+  const along = b.on ?? linkOf(b, a.on ?? linkOf(a));
+  if (typed.value) return `${typed.value}° ⏎`;
+  if (along && along !== (a.on ?? linkOf(a))) return `along ${along}`;
+  return `guide at ${Math.round((level(turnTo(b.at)) * 180) / Math.PI)}°`;
+}
+
+function gear(spot) {
+  const from = pending.value;
+  if (spot.kind !== "joints" && !spot.on) return say("Click a pivot on the ground, or the link that turns about it.", true);
+  if (!from) return begin(spot);
+  const ratio = typed.value;
+  finish();
+  edit([{ do: "gear", joints: [from.written, endOf(spot)], ...(ratio && { ratio: ratio.replace(",", ".") }) }]);
+}
+
+function tellRatio() {
+  return typed.value ? (/[:/]/.test(typed.value) ? `teeth ${typed.value}` : `${typed.value} turns for one`) : "1 : 1";
+}
+
+// ---- what acts
 
 function drive({ kind, name }) {
   if (kind !== "joints") return say("Click a joint: a driver turns or slides one.", true);
   edit([{ do: "driver", joint: name }]);
 }
 
-function addPoint({ at }, { part }) {
-  if (part?.kind !== "links") return say("Click a link: the point belongs to it.", true);
-  edit([{ do: "add-point", link: part.name, at }]);
+function load(spot) {
+  if (pending.value) return void putLoad(spot.at);
+  if (!spot.kind && !spot.on) return say("Click a joint, a point or a link: the force acts there.", true);
+  begin(spot);
 }
 
-function load({ kind, key }) {
-  if (!kind) return say("Click a joint or a point of a link: the force acts there.", true);
-  const dot = key.indexOf(".");
-  edit([{ do: "load", link: key.slice(0, dot), at: key.slice(dot + 1), force: ["0 N", "-100 N"] }]);
+/** A force as it is typed, {value, unit}; null if it is none. */
+function forceOf(letters) {
+  const found = numberOf(plainNumber(letters));
+  return found && found.value > 0 && /^([kM]?N|lbf)?$/.test(found.rest) ? { value: found.value, unit: found.rest || "N" } : null;
+}
+
+function putLoad(aim) {
+  const { at, written } = pending.value;
+  const size = forceOf(typed.value || FORCE);
+  if (!size) return false;
+  const angle = Math.hypot(aim[0] - at[0], aim[1] - at[1]) > 0 ? turnTo(aim) : -Math.PI / 2;
+  const force = [Math.cos(angle), Math.sin(angle)].map((part) => `${Number((size.value * part).toFixed(9)) + 0} ${size.unit}`);
+  finish();
+  edit([{ do: "load", at: written, force }]);
+  return true;
+}
+
+function tellForce(_, b) {
+  const letters = typed.value || FORCE;
+  return `${letters}${/[a-z]/i.test(letters) ? "" : " N"}, ${Math.round((turnTo(b.at) * 180) / Math.PI)}°${typed.value ? " ⏎" : ""}`;
 }
 
 function spring(spot) {
-  if (!spot.kind) return say("A spring runs between two points; set a point on the ground or on a link first.", true);
   const from = pending.value;
   if (!from) return begin(spot);
-  if (from.key === spot.key) return;
+  if (Math.hypot(spot.at[0] - from.at[0], spot.at[1] - from.at[1]) === 0) return;
+  const found = typed.value ? numberOf(plainNumber(typed.value)) : { value: 1, rest: "" };
+  if (!found) return say(`“${typed.value}” is no stiffness; type one as 2 or 2 N/mm.`, true);
   finish();
-  edit([{ do: "spring", between: [from.key, spot.key], stiffness: "1 N/mm" }]);
+  edit([{ do: "spring", between: [from.written, endOf(spot)], stiffness: `${found.value} ${found.rest || "N/mm"}` }]);
+}
+
+function tellStiffness() {
+  const letters = typed.value || "1 N/mm";
+  return `${letters}${/[a-z]/i.test(letters) ? "" : " N/mm"}`;
+}
+
+// ---- locks, and what goes
+
+function lock({ kind, name }) {
+  if (!kind) return say("Click a joint or a point.", true);
+  edit([{ do: "lock", point: name }]);
 }
 
 function remove(spot, { part }) {

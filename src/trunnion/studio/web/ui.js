@@ -6,6 +6,12 @@ import htm from "htm";
 
 export const html = htm.bind(h);
 
+/** Bring what is typed or chosen next into focus, if it is there. */
+export function focusOn(/** @type {string} */ selector) {
+  const found = document.querySelector(selector);
+  if (found instanceof HTMLElement) found.focus();
+}
+
 /** A button that tells its key in the tooltip. */
 export function Button({ label, title, onClick, disabled = false, pressed, kind = "", children }) {
   return html`<button type="button" class=${`plain ${kind}`} title=${title ?? label} aria-label=${label} aria-pressed=${pressed} disabled=${disabled} onClick=${onClick}>
@@ -49,6 +55,8 @@ const ICONS = {
   point: "M3 16C3 7 9 3 16 4M11.5 5.2m-2 0a2 2 0 1 0 4 0a2 2 0 1 0-4 0",
   load: "M10 2v12M10 17l-3.5-5h7zM5 18h10",
   spring: "M2 10h3l1.5-4 3 8 3-8 2.5 8 1-4h2",
+  gear: "M7 7m-2 0a2 2 0 1 0 4 0a2 2 0 1 0-4 0M12 7a5 5 0 1 1-10 0a5 5 0 1 1 10 0M18.5 14a3.6 3.6 0 1 1-7.2 0a3.6 3.6 0 1 1 7.2 0M14.9 14h.1",
+  lock: "M5 9h10v8H5zM7 9V6.5a3 3 0 0 1 6 0V9M10 12v2",
   delete: "M5 5l10 10M15 5L5 15",
   undo: "M8 4L4 8l4 4M4 8h8a4 4 0 0 1 0 8H8",
   redo: "M12 4l4 4-4 4M16 8H8a4 4 0 0 0 0 8h4",

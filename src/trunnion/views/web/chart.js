@@ -248,7 +248,7 @@ function axes(abscissa, frame, [x0, x1], [y0, y1]) {
 function shading(chart, frame) {
   const { values } = chart.scene.abscissa;
   const half = values.length > 1 ? Math.abs(values[1] - values[0]) / 2 : 0.5;
-  const span = ([first, last]) => [
+  const span = (/** @type {number[]} */ [first, last]) => [
     Math.max(frame.x(Math.min(values[first], values[last]) - half), MARGIN.left),
     Math.min(frame.x(Math.max(values[first], values[last]) + half), frame.right),
   ];

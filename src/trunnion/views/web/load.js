@@ -60,7 +60,7 @@ function moment({ name, moment: size, varies }) {
 }
 
 /** Set a label beside the tip of its load; where it would leave the picture, inside it and clear of the tip. */
-function settle(label, [x, y], { width, height }) {
+function settle(label, /** @type {number[]} */ [x, y], { width, height }) {
   label.measured ||= label.node.getComputedTextLength?.() ?? 0;
   const { node, left } = label;
   const [dx, dy] = label.tip;

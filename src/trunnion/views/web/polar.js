@@ -11,7 +11,7 @@ const NEAR = 18; // px: a pointer without a button as near to the curve points a
  * The diagram of a joint {name, reaction, ideal}, seen in the plane of two axes; `kind` colours it, `pick(index, firm)` is
  * called when the reader points at the curve.
  */
-export function polarChart(scene, { name, reaction, ideal }, kind, pick, [across, up] = ["x", "y"]) {
+export function polarChart(scene, { name, reaction, ideal }, kind, pick, /** @type {string[]} */ [across, up] = ["x", "y"]) {
   const flat = (vector) => vector && { x: vector[across], y: vector[up] };
   const joint = { name, reaction: flat(reaction), ideal: flat(ideal) };
   const sizes = magnitude(joint.reaction, scene.count);
@@ -187,12 +187,12 @@ function captions(chart, side) {
   return labelled.map((dot) => caption(chart, dot, middle, side));
 }
 
-function within([x, y], side) {
+function within(/** @type {number[]} */ [x, y], side) {
   return x >= MARGIN.left && x <= MARGIN.left + side && y >= MARGIN.top && y <= MARGIN.top + side;
 }
 
 /** The angle beside its dot: across the curve, away from its middle, inside the frame. */
-function caption(chart, { index, place: [x, y] }, middle, side) {
+function caption(chart, /** @type {{ index: number, place: number[] }} */ { index, place: [x, y] }, middle, side) {
   const { scene, joint } = chart;
   const text = `${Math.round(scene.abscissa.values[index])}°`;
   const half = 3.2 * text.length;

@@ -20,7 +20,7 @@ export function projection({ scene, camera, frame, reach }, below) {
   const middle = reach.length ? frame.middle.map(moved) : frame.middle;
   const x = frame.width / 2 + camera.shift[0];
   const y = (frame.height - below) / 2 + camera.shift[1];
-  return { matrix, scale, to: ([right, up]) => [x + (right - middle[0]) * scale, y - (up - middle[1]) * scale] };
+  return { matrix, scale, to: (/** @type {number[]} */ [right, up]) => [x + (right - middle[0]) * scale, y - (up - middle[1]) * scale] };
 }
 
 /** Middle and extent, [right, up] m, of all that bodies reach, seen by a matrix. */

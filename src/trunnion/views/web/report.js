@@ -232,16 +232,19 @@ function vectorControls(scene, kinds, mechanism) {
 
 /** The polar diagrams; in space of the plane that is chosen. */
 function polarPanel(scene, kinds, pick, place) {
-  const panel = { charts: [], index: 0 };
+  const panel = {
+    charts: [],
+    index: 0,
+    show(index) {
+      panel.index = index;
+      panel.charts.forEach((chart) => chart.show(index));
+    },
+  };
   const fill = (plane) => {
     panel.charts.forEach((chart) => chart.element.remove());
     panel.charts = scene.joints.map((joint) => polarChart(scene, joint, kinds.get(joint.name), pick, plane));
     place.append(...panel.charts.map((chart) => chart.element));
     panel.show(panel.index);
-  };
-  panel.show = (index) => {
-    panel.index = index;
-    panel.charts.forEach((chart) => chart.show(index));
   };
   if (scene.space === "spatial") {
     const planes = html("select", {}, ...["x–y", "x–z", "y–z"].map((name) => html("option", {}, name)));
@@ -258,6 +261,7 @@ export function start(scene, places) {
   const spatial = scene.space === "spatial";
   const mechanism = spatial ? spaceView(scene, kinds) : mechanismView(scene, kinds);
   const figures = readout(scene);
+  /** @type {{ show(index: number): void }[]} */
   const views = [mechanism, figures];
   const crank = player(scene.count, figures.words, (index) => views.forEach((view) => view.show(index)), {
     svg,

@@ -104,7 +104,7 @@ function draw(chart, width) {
 }
 
 /** A circle, of a guide in space a square; around a middle, or to be moved. */
-function shape({ kind }, half, attributes, [x, y] = [0, 0]) {
+function shape({ kind }, half, attributes, /** @type {number[]} */ [x, y] = [0, 0]) {
   const size = { width: 2 * half, height: 2 * half };
   return kind === "guide"
     ? svg("rect", { ...attributes, x: x - half, y: y - half, ...size })

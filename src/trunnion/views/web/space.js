@@ -8,7 +8,7 @@ import { html, onWidth, set, svg } from "./dom.js";
 import { roundBelow, short, stated } from "./format.js";
 import { projection } from "./projection.js";
 import { meshes, paint, seen, shades, stroke } from "./solids.js";
-import { apply, dot, plus, rotation, scaled } from "./vector.js";
+import { apply, plus, rotation, scaled } from "./vector.js";
 
 const MARGIN = 46; // room for names and arrows, px
 const KEY = 34; // height of the strip with triad and scales, px
@@ -479,12 +479,12 @@ function controls(view) {
       });
       return html("label", { class: "chip" }, box, label);
     });
-  const sides = [
+  const sides = /** @type {[string, () => any, string][]} */ ([
     ["start", () => first(view.scene), "The first view"],
     ["x", () => ({ ...first(view.scene), around: 0, above: 0 }), "Look along the x axis"],
     ["y", () => ({ ...first(view.scene), around: -Math.PI / 2, above: 0 }), "Look along the y axis"],
     ["z", () => ({ ...first(view.scene), around: -Math.PI / 2, above: Math.PI / 2 }), "Look down the z axis"],
-  ].map(([label, camera, title]) => {
+  ]).map(([label, camera, title]) => {
     const button = html("button", { type: "button", class: "plain", title, "aria-label": title }, label);
     button.addEventListener("click", () => turn(view, camera()));
     return button;

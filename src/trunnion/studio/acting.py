@@ -1,0 +1,118 @@
+"""What acts on a drawing and what couples it: drivers, loads, springs, gear pairs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from math import atan2, degrees, hypot
+from typing import Any
+
+from trunnion.studio.ends import begin, numbered, point_of, refused
+from trunnion.studio.sketch import Sketch
+
+__all__ = ["driver", "gear", "load", "spring"]
+
+Given = Mapping[str, Any]
+RATIO = re.compile(r"\s*([-+]?)\s*(\d+\.?\d*|\.\d+)\s*(?:([:/])\s*(\d+\.?\d*|\.\d+)\s*)?")
+
+
+def driver(sketch: Sketch, given: Given) -> str:
+    """A joint is driven, from where it is shown."""
+    joint = str(given["joint"])
+    if joint not in sketch.joints:
+        raise refused("is not a joint", joint, "choose a joint")
+    if not given.get("add"):
+        for other in list(sketch.section("drivers")):
+            del sketch.section("drivers")[other]
+    if sketch.joints[joint].get("type") == "prismatic":
+        entry = {"speed": given.get("speed") or "10 mm/s", "range": [0, sketch.length(0.2 * sketch.size)]}
+    else:
+        start = _turned(sketch, joint)
+        entry = {"speed": given.get("speed") or "60 rpm"} | ({"start": f"{start:g} deg"} if start else {})
+    sketch.section("drivers")[joint], sketch.made = entry, ("joints", joint)
+    return f"Drive {joint}"
+
+
+def _turned(sketch: Sketch, joint: str) -> float:
+    """The rotation of a joint as it is shown, degrees from 0 to 360."""
+    first, second = (sketch.frame(one) for one in sketch.joints[joint]["links"])
+    turn = degrees(atan2(second.s, second.c) - atan2(first.s, first.c))
+    return round(turn % 360.0, 4) % 360.0
+
+
+def load(sketch: Sketch, given: Given) -> str:
+    """A force at a joint, a point or a place of a moving link."""
+    link, point = point_of(sketch, given["at"])
+    if link == sketch.ground:
+        raise refused("would act on the ground", "the force", "choose a point of a moving link")
+    name = numbered(sketch, "loads", "load")
+    sketch.section("loads")[name] = {"link": link, "at": point, "force": list(given["force"])}
+    sketch.made = ("loads", name)
+    return f"Add {name}"
+
+
+def spring(sketch: Sketch, given: Given) -> str:
+    """A spring between two ends, without force as it is drawn; an end on nothing is fastened to the ground."""
+    ends = [".".join(point_of(sketch, end)) for end in given["between"]]
+    (x, y), (a, b) = (sketch.places[end] for end in ends)
+    if ends[0].partition(".")[0] == ends[1].partition(".")[0]:
+        raise refused("would have both ends on one link", "the spring", "choose points of two links")
+    name = numbered(sketch, "springs", "spring")
+    entry = {"between": ends, "stiffness": given.get("stiffness") or "1 N/mm"}
+    sketch.made = ("springs", name)
+    sketch.section("springs")[name] = entry | {"free_length": sketch.length(hypot(a - x, b - y))}
+    return f"Add {name}"
+
+
+# ---- gears ----------------------------------------------------------------------------------------------------
+
+
+def gear(sketch: Sketch, given: Given) -> str:
+    """A gear pair between two links, by their pivots or by themselves, meshing as they are drawn.
+
+    ratio: turns of the second for one of the first, against it, such as "1/2"; or their teeth, "20:40"; with a + they
+    turn the same way (an internal gear). They are equal if it is not given.
+    """
+    begin(sketch)
+    one, two = (_pivot(sketch, end) for end in given["joints"])
+    if one == two:
+        raise refused("would mesh with itself", f"joints.{one}", "choose two pivots")
+    first, second = (sketch.joints[joint]["links"] for joint in (one, two))
+    if len({*first} & {*second}) != 1:
+        raise refused(
+            f"and {two} have no link in common that carries both gears", one, "choose two pivots on the ground"
+        )
+    if any({*pair.get("joints", ())} == {one, two} for pair in sketch.of("gears").values()):
+        raise refused(f"and {two} are geared already", one, "change the ratio of that gear pair")
+    written, ratio = _ratio(str(given.get("ratio") or "1"))
+    name = numbered(sketch, "gears", "gear")
+    phase = (_turned(sketch, two) - ratio * _turned(sketch, one)) % 360.0
+    entry: dict[str, Any] = {"joints": [one, two], "ratio": written}
+    sketch.made = ("gears", name)
+    sketch.section("gears")[name] = entry | ({"phase": f"{round(phase, 4):g} deg"} if round(phase % 360.0, 4) else {})
+    return f"Add {name}"
+
+
+def _pivot(sketch: Sketch, end: Any) -> str:
+    """The joint that a gear turns in: a pin, or that of a link on the ground."""
+    if isinstance(end, Mapping):
+        own = str(end.get("on"))
+        pins = [name for name, joint in sketch.joints.items() if {*joint["links"]} == {own, sketch.ground}]
+        if len(pins) != 1:
+            raise refused("has no pivot on the ground", f"links.{own}", "pin one of its ends to the ground first")
+        end = pins[0]
+    if end not in sketch.joints or sketch.joints[end].get("type", "revolute") != "revolute":
+        raise refused("is no pin that turns", str(end), "choose the pivot of a link")
+    return str(end)
+
+
+def _ratio(typed: str) -> tuple[float | int | str, float]:
+    """A ratio as it is written, and its value."""
+    found = RATIO.fullmatch(typed)
+    if not found or float(found[2]) == 0.0 or (found[4] and float(found[4]) == 0.0):
+        raise refused(f"'{typed}' is no ratio of gears", "", "type the teeth as 20:40, or a number")
+    sign = "" if found[1] == "+" else "-"
+    value = float(f"{sign}{found[2]}") / float(found[4] or 1.0)
+    if found[4]:
+        return f"{sign}{found[2]}/{found[4]}", value
+    return (int(value) if value.is_integer() else value), value

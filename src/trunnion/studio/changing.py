@@ -1,0 +1,155 @@
+"""Changing a drawing: moved and locked joints, values, what goes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from trunnion.studio.ends import free, held, refused, vector
+from trunnion.studio.sketch import Sketch
+from trunnion.studio.words import spoken
+
+__all__ = ["delete", "lock", "move", "put_value"]
+
+Given = Mapping[str, Any]
+SECTIONS = {
+    "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair"
+}  # fmt: skip
+NAMES = (("name",), ("notes",), ("references",))  # texts for readers
+NAMED = ("links", "link", "joint", "joints", "between", "at", "type")  # names of other parts, beside coordinates
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+def move(sketch: Sketch, given: Given) -> str:
+    """A joint or point goes to a place."""
+    point, to = str(given["point"]), vector(given["to"])
+    sketch.write(sketch.moved(point, to))
+    hints = sketch.entries.get("assembly") or {}
+    if isinstance(hints.get(point), list) and not given.get("index"):
+        hints[point] = [sketch.length(part) for part in to]
+    for link in dict.fromkeys(_links_at(sketch, point)):
+        sketch.places[f"{link}.{point.rpartition('.')[2]}"] = to
+    for link in _links_at(sketch, point):
+        sketch.show(link, sketch.frame(link))
+    return f"Move {point}"
+
+
+def _links_at(sketch: Sketch, point: str) -> list[str]:
+    return list(sketch.joints[point]["links"]) if point in sketch.joints else [point.partition(".")[0]]
+
+
+def lock(sketch: Sketch, given: Given) -> str:
+    """A joint or point stays where it is while others are dragged; done again, it may be dragged itself."""
+    point = str(given["point"])
+    held(sketch, point)
+    sketch.locked ^= {point}
+    return f"{'Lock' if point in sketch.locked else 'Unlock'} {point}"
+
+
+def put_value(sketch: Sketch, given: Given) -> str:
+    """An entry gets a value; without one it goes."""
+    *way, last = given["path"]
+    group: Any = sketch.entries
+    for key in way:
+        group = group[key] if isinstance(group, list) else group.setdefault(key, {})
+        if not isinstance(group, (dict, list)):
+            raise refused("is a single value", ".".join(map(str, way)), "change it in the text of the model")
+    path, value = ".".join(map(str, given["path"])), given.get("value")
+    stated = spoken(path)
+    if value is not None:
+        group[last] = _typed(value)
+        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else value}"
+    if way == ["dimensions"] and (users := list(_users(sketch.entries, str(last)))):
+        what = f"is in use: by {', '.join(users[:3])}{' and others' if users[3:] else ''}"
+        raise refused(what, path, "type another value, or change what uses it first")
+    if way[:1] == ["gears"] and last == "ratio":
+        raise refused("is what makes a gear pair", path, "type another, or delete the gear pair")
+    if isinstance(group, dict):
+        group.pop(last, None)
+    return f"Remove {stated}"
+
+
+def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:
+    """What speaks of a dimension, in words."""
+    if isinstance(group, dict):
+        for key, one in group.items():
+            yield from _users(one, name, (*way, str(key)))
+    elif isinstance(group, list):
+        for one in group:
+            yield from dict.fromkeys(_users(one, name, way))
+    elif isinstance(group, str) and way[:1] not in NAMES and way[-1] not in NAMED:
+        stated = way != ("dimensions", name) and re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", group)
+        yield from [spoken(".".join(way))] if stated else []
+
+
+def _typed(value: Any) -> Any:
+    """What was typed, as it is written: "0.3" as a number."""
+    if isinstance(value, list):
+        return [_typed(part) for part in value]
+    if isinstance(value, str) and NUMBER.fullmatch(value.strip()):
+        number = float(value)
+        return int(number) if number.is_integer() and abs(number) < 1e15 and "." not in value else number
+    return value
+
+
+def delete(sketch: Sketch, given: Given) -> str:
+    """An entry goes, and what cannot be without it."""
+    section, name = map(str, given["what"])
+    if section == "points":
+        link, point = free(sketch, name)
+        del sketch.section("links")[link]["points"][point]
+        _drop(sketch, "loads", lambda load: load.get("link") == link and load.get("at") == point)
+        _drop(sketch, "springs", lambda spring: name in (spring.get("between") or ()))
+        return f"Delete point {point}"
+    if section not in SECTIONS or name not in sketch.section(section):
+        raise refused("is not there", f"{section}.{name}", "choose what is drawn")
+    if section == "links" and name == sketch.ground:
+        raise refused("is the ground", name, "delete its joints")
+    blocks = [one for one in sketch.of("links") if one != sketch.ground and _block(sketch, one)]
+    del sketch.section(section)[name]
+    gone = [name] if section == "joints" else []
+    if section == "links":
+        gone = [joint for joint, one in sketch.joints.items() if name in one["links"]]
+        _drop(sketch, "joints", lambda joint: name in (joint.get("links") or ()))
+        _drop(sketch, "loads", lambda load: load.get("link") == name)
+        _drop(sketch, "springs", lambda spring: any(end.startswith(f"{name}.") for end in spring.get("between") or ()))
+    for joint in gone:
+        _without_joint(sketch, joint)
+    for block in blocks:
+        types = {one.get("type", "revolute") for one in sketch.joints.values() if block in one["links"]}
+        if len(types) < 2 and block in sketch.of("links"):  # slides no longer, or nothing is pinned to it
+            delete(sketch, {"what": ["links", block]})
+    return f"Delete {SECTIONS[section]} {name}"
+
+
+def _block(sketch: Sketch, link: str) -> bool:
+    """Whether a link is a block of a guide: all its points on one spot, one of them with the axis of the guide."""
+    points = sketch.points(link)
+    axes = [one for one in points.values() if isinstance(one, dict) and "axis" in one]
+    spots = [one.get("at") if isinstance(one, dict) else one for one in points.values()]
+    return len(points) > 1 and bool(axes) and all(spot == [0, 0] for spot in spots)
+
+
+def _without_joint(sketch: Sketch, joint: str) -> None:
+    """What a joint that is gone leaves behind: its driver and hint go, and its point on the ground."""
+    for section in ("drivers", "assembly"):
+        if isinstance(sketch.entries.get(section), dict):
+            sketch.entries[section].pop(joint, None)
+    ground = sketch.section("links").get(sketch.ground, {})
+    used = {end for spring in sketch.of("springs").values() for end in spring.get("between") or ()}
+    if f"{sketch.ground}.{joint}" not in used:
+        ground.get("points", {}).pop(joint, None)
+    for link in sketch.of("links"):  # the guide of a slot
+        stated = sketch.points(link).get(joint)
+        if isinstance(stated, dict) and "axis" in stated:
+            del sketch.section("links")[link]["points"][joint]
+    _drop(sketch, "gears", lambda gear: joint in (gear.get("joints") or ()))
+    _drop(sketch, "loads", lambda load: load.get("joint") == joint)
+    _drop(sketch, "springs", lambda spring: spring.get("joint") == joint)
+
+
+def _drop(sketch: Sketch, section: str, gone: Callable[[Mapping[str, Any]], bool]) -> None:
+    for name, one in sketch.of(section).items():
+        if gone(one):
+            del sketch.section(section)[name]

@@ -1,0 +1,148 @@
+"""Drawing: links, pins, guides and slots, points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import atan2, cos, hypot, sin
+from typing import Any
+
+from trunnion.studio.ends import (
+    SHORTEST,
+    begin,
+    doubled,
+    free,
+    held,
+    joined,
+    letter,
+    line_near,
+    numbered,
+    pin,
+    place_of,
+    put,
+    refused,
+    vector,
+)
+from trunnion.studio.sketch import Frame, Sketch, Vector
+
+__all__ = ["add_point", "link", "pinned", "slide"]
+
+Given = Mapping[str, Any]
+
+
+def link(sketch: Sketch, given: Given) -> str:
+    """A bar from one end to another; ends on joints, points and links are joined with them.
+
+    length: as it was typed, if it was; it says the same as the places.
+    """
+    begin(sketch)
+    ends = [given["from"], given["to"]]
+    (x, y), (a, b) = places = [place_of(sketch, end) for end in ends]
+    length = hypot(a - x, b - y)
+    if length <= SHORTEST:
+        raise refused("the link has no length", "", "click at two places")
+    name = numbered(sketch, "links", "link")
+    frame = Frame(x, y, (a - x) / length, (b - y) / length)
+    sketch.section("links")[name] = {"points": {}}
+    for end, place, local in zip(ends, places, (0, given.get("length") or sketch.length(length)), strict=True):
+        sketch.forget()
+        point = joined(sketch, name, end, place)
+        sketch.section("links")[name]["points"][point] = [local, 0]
+    sketch.forget()
+    sketch.show(name, frame)
+    return f"Draw {name}"
+
+
+def pinned(sketch: Sketch, given: Given) -> str:
+    """A free point becomes a pin on the ground."""
+    own, point = free(sketch, given["point"])
+    begin(sketch)
+    place = sketch.places[f"{own}.{point}"]
+    put(sketch, sketch.ground, point, place)
+    pin(sketch, point, sketch.ground, own, place)
+    return f"Pin {point} to the ground"
+
+
+def add_point(sketch: Sketch, given: Given) -> str:
+    """A point on a link."""
+    begin(sketch)
+    point = letter(sketch)
+    put(sketch, str(given["link"]), point, vector(given["at"]))
+    sketch.made = ("points", f"{given['link']}.{point}")  # and so its velocity and acceleration are shown
+    return f"Add point {point}"
+
+
+# ---- guides and slots -----------------------------------------------------------------------------------------
+
+
+def slide(sketch: Sketch, given: Given) -> str:
+    """A point slides, by a block that is pinned to it; given {on: link, at: place} instead, that link itself.
+
+    It slides along the ground in the direction of `angle`, rad, or in a slot of the link `along`: on the line through
+    two of that link's points, and beside it by as much as it is drawn there, if that is more than `near`, m.
+    """
+    begin(sketch)
+    carrier, slid = str(given.get("along") or sketch.ground), given["joint"]
+    if carrier != sketch.ground and carrier not in sketch.of("links"):
+        raise refused("is not there", f"links.{carrier}", "choose a link that is drawn")
+    place = place_of(sketch, slid)
+    if isinstance(slid, Mapping):
+        own = str(slid["on"])
+        if own in (carrier, sketch.ground):
+            raise refused("cannot slide along itself", f"links.{own}", "choose two links")
+        name, angle = _guided(sketch, carrier, place, given)
+        sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, own]}
+        put(sketch, own, name, place, angle)
+        return f"Guide {own}" if carrier == sketch.ground else f"Slide {own} along {carrier}"
+    own, point = _end_to_slide(sketch, str(slid), carrier)
+    block, (name, angle) = numbered(sketch, "links", "block"), _guided(sketch, carrier, place, given)
+    sketch.section("links")[block] = {"points": {point: [0, 0], name: {"at": [0, 0], "axis": [1, 0]}}}
+    sketch.section("joints")[name] = {"type": "prismatic", "links": [carrier, block]}
+    sketch.forget()
+    pin(sketch, point, own, block, place)
+    sketch.show(block, Frame(*place, cos(angle), sin(angle)))
+    return f"Guide {point}" if carrier == sketch.ground else f"Slide {point} along {carrier}"
+
+
+def _guided(sketch: Sketch, carrier: str, place: Vector, given: Given) -> tuple[str, float]:
+    """The guide of a new sliding joint on the link that carries it: name of the joint, and its angle, rad."""
+    name = letter(sketch)
+    if carrier == sketch.ground:
+        angle = float(given.get("angle", 0.0))
+        put(sketch, carrier, name, place, angle)
+        return name, angle
+    line = line_near(sketch, carrier, place)
+    (x, y), (c, s) = line.start, line.direction
+    beside = line.beside if abs(line.beside) > float(given.get("near", 0.0)) else 0.0
+    put(sketch, carrier, name, (x - s * beside, y + c * beside), atan2(s, c))
+    along = c * (place[0] - x) + s * (place[1] - y)
+    sketch.section("assembly")[name] = sketch.length(along)  # on which side of the point the block is
+    return name, atan2(s, c)
+
+
+def _end_to_slide(sketch: Sketch, name: str, carrier: str) -> tuple[str, str]:
+    """Link and point that a block is pinned to. A pin on the carrier of the guide becomes the pin on the block."""
+    if name not in sketch.joints:
+        own, point = free(sketch, name)
+        if own == carrier:
+            raise refused("cannot slide along itself", f"links.{own}", "choose two links")
+        return own, point
+    joint = sketch.joints[name]
+    if joint.get("type", "revolute") != "revolute":
+        raise refused("slides already", f"joints.{name}", "choose a pin, or the free end of a link")
+    if carrier not in joint["links"]:
+        own, point = held(sketch, name)
+        return own, doubled(sketch, own, point)
+    own = next(one for one in joint["links"] if one != carrier)
+    for section, what in (("loads", "load"), ("springs", "spring")):
+        for one, entry in sketch.of(section).items():
+            if (entry.get("link"), entry.get("at")) == (carrier, name) or f"{carrier}.{name}" in entry.get(
+                "between", ()
+            ):
+                raise refused(f"carries the {what} {one}", f"joints.{name}", f"delete that {what} first")
+    del sketch.section("joints")[name]
+    for section in ("drivers", "assembly"):
+        sketch.section(section).pop(name, None)
+    sketch.section("links")[carrier]["points"].pop(name, None)
+    sketch.places.pop(f"{carrier}.{name}", None)
+    sketch.forget()
+    return own, name

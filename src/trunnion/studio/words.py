@@ -1,0 +1,39 @@
+"""Places in a model, spoken of as on the sheet: "mass of link crank" where the file has `links.crank.mass`."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["spoken"]
+
+NOUNS = {
+    "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
+    "dimensions": "dimension", "measures": "measure", "tables": "table",
+}  # fmt: skip
+PATH = re.compile(r"[^\s.,]+(\.[^\s.,]+)+")
+
+
+def spoken(where: str) -> str:
+    """A path of the file in words; what is no path stays as it is."""
+    if not PATH.fullmatch(where):
+        return where
+    section, *rest = where.split(".")
+    if section == "joint_defaults":
+        return f"{_plain(rest)} of all joints"
+    if section == "assembly":
+        return f"start of {'.'.join(rest)}"
+    if section not in NOUNS:
+        return _plain([section, *rest])
+    name, *inner = rest
+    part = f"{NOUNS[section]} {name}" if section != "dimensions" or inner else name
+    if section == "links" and inner[:1] == ["points"]:
+        _, *inner = inner
+        if not inner:
+            return f"points of {part}"
+        point, *deeper = inner
+        inner, part = [key for key in deeper if key not in ("x", "y", "z", "at")], f"point {point} of {part}"
+    return f"{_plain(inner)} of {part}" if inner else part
+
+
+def _plain(keys: list[str]) -> str:
+    return " ".join(keys).replace("_", " ")

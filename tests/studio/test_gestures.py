@@ -1,0 +1,292 @@
+"""What is drawn by hand: slots, gear pairs, ends on links, locks, names; against closed forms where there is motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studio.asking import ask, edited, solved
+from trunnion.model.file import entries_of
+
+WHITWORTH = (
+    {"do": "link", "from": {"ground": [0, 0.04]}, "to": [0.06, 0.1]},
+    {"do": "link", "from": {"ground": [0, 0]}, "to": [-0.06, -0.1]},
+    {"do": "slide", "joint": "link1.B", "along": "link2", "near": 0.001},
+    {"do": "link", "from": "link2.D", "to": [0.3, -0.15]},
+    {"do": "slide", "joint": "link3.F", "angle": 0.0},
+    {"do": "driver", "joint": "A"},
+)
+
+
+def tracks(found, key):
+    """Places of a point over the cycle, [position, axis]."""
+    track = found["scene"]["points"][key]
+    count = found["scene"]["count"]
+    return np.stack([np.resize(np.array(track[axis], float), count) for axis in "xy"], axis=1)
+
+
+def test_a_slotted_lever_points_at_the_crank_pin():
+    text, places = edited("", {}, *WHITWORTH)
+    found = solved(text)
+    for key, place in places.items():  # it begins as it was drawn
+        np.testing.assert_allclose(found["places"][key], place, atol=2e-6)
+    pin, end = tracks(found, "link1.B"), tracks(found, "link2.D")
+    length = np.hypot(0.06, 0.1)
+    np.testing.assert_allclose(end, -length * pin / np.hypot(*pin.T)[:, None], atol=1e-6)  # C is the origin
+    assert list(entries_of(text)[0]["joints"]) == ["A", "C", "E", "B", "D", "G", "F"]
+
+
+def test_a_slot_beside_the_line_of_its_link():
+    """The slot is 20 mm left of the line C→D: with d from C to B, its direction is that of B less asin(20 mm/d)."""
+    text, _ = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.15, 0]},
+        {"do": "link", "from": {"ground": [0.06, 0.05]}, "to": [0.08, 0.02]},
+        {"do": "slide", "joint": "link2.D", "along": "link1", "near": 0.001},
+        {"do": "driver", "joint": "C"},
+    )  # fmt: skip
+    found = solved(text)
+    pin, end = tracks(found, "link2.D"), tracks(found, "link1.B")
+    angle = np.arctan2(pin[:, 1], pin[:, 0]) - np.arcsin(0.02 / np.hypot(*pin.T))
+    np.testing.assert_allclose(end, 0.15 * np.stack([np.cos(angle), np.sin(angle)], axis=1), atol=2e-6)
+
+
+def test_a_pin_on_a_link_becomes_a_pin_in_its_slot():
+    text, places = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.1, 0.2]},
+        {"do": "link", "from": {"ground": [0, 0.05]}, "to": {"on": "link1", "at": [0.05, 0.1]}},
+    )  # fmt: skip
+    assert entries_of(text)[0]["joints"]["D"]["links"] == ["link1", "link2"]
+    text, _ = edited(
+        text,
+        places,
+        {"do": "slide", "joint": "D", "along": "link1", "near": 0.0},
+        {"do": "driver", "joint": "C"},
+    )
+    entries = entries_of(text)[0]
+    assert entries["joints"]["D"]["links"] == ["link2", "block1"]
+    assert "D" not in entries["links"]["link1"]["points"]
+    pin, end = tracks(solved(text), "link2.D"), tracks(solved(text), "link1.B")
+    np.testing.assert_allclose(pin[:, 0] * end[:, 1] - pin[:, 1] * end[:, 0], 0.0, atol=1e-8)
+
+
+def test_a_link_itself_slides():
+    """Scotch yoke: the yoke moves as the crank pin's height does not matter to it, x = r cos φ."""
+    text, _ = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.03, 0]},
+        {"do": "link", "from": [0.03, -0.06], "to": [0.03, 0.06]},
+        {"do": "slide", "joint": {"on": "link2", "at": [0.03, 0.0]}, "angle": 0.0},
+        {"do": "slide", "joint": "link1.B", "along": "link2", "near": 0.001},
+        {"do": "driver", "joint": "A"},
+    )  # fmt: skip
+    found = solved(text)
+    pin, yoke = tracks(found, "link1.B"), tracks(found, "link2.D")
+    np.testing.assert_allclose(yoke[:, 0], pin[:, 0], atol=1e-8)
+    np.testing.assert_allclose(yoke[:, 1], 0.06, atol=1e-8)
+
+
+@pytest.mark.parametrize(("typed", "written", "ratio"), [(None, -1, -1.0), ("20:40", "-20/40", -0.5), ("+3", 3, 3.0)])
+def test_gears_mesh_as_they_are_drawn(typed, written, ratio):
+    text, places = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.02, 0.01]},
+        {"do": "link", "from": {"ground": [0.1, 0]}, "to": [0.08, 0.03]},
+        {"do": "driver", "joint": "A"},
+        {"do": "gear", "joints": ["A", {"on": "link2"}], **({"ratio": typed} if typed else {})},
+    )  # fmt: skip
+    assert entries_of(text)[0]["gears"]["gear1"]["ratio"] == written
+    found = solved(text)
+    assert found["places"]["link2.D"] == pytest.approx(places["link2.D"], abs=1e-6)
+    one, two = (np.unwrap(np.arctan2(*(tracks(found, key) - centre).T[::-1]))
+                for key, centre in (("link1.B", [0, 0]), ("link2.D", [0.1, 0])))  # fmt: skip
+    np.testing.assert_allclose(two - two[0], ratio * (one - one[0]), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "gesture",
+    [
+        {"do": "gear", "joints": ["A", "A"]}, {"do": "gear", "joints": ["A", "D"]},
+        {"do": "gear", "joints": ["A", "C"], "ratio": "0"}, {"do": "gear", "joints": ["A", "G"]},
+        {"do": "slide", "joint": "link2.D", "along": "link2"}, {"do": "slide", "joint": "E", "angle": 0.0},
+        {"do": "slide", "joint": {"on": "link2", "at": [0, 0]}, "along": "link2"},
+        {"do": "spring", "between": ["A", {"ground": [0.2, 0.2]}]}, {"do": "load", "at": [0, 0], "force": ["1 N", 0]},
+        {"do": "lock", "point": "nothing"}, {"do": "rename", "what": ["joints", "A"], "to": "B"},
+        {"do": "set", "path": ["gears", "gear1", "ratio"], "value": None},
+        {"do": "move", "point": "D", "to": [0, 0]}, {"do": "move", "point": "link1.Z", "to": [0, 0.04]},
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_refused_in_words(gesture):
+    text, places = edited("", {}, *WHITWORTH, {"do": "add-point", "link": "link1", "at": [0.03, 0.08]})
+    text, places = edited(text, places, {"do": "rename", "what": ["points", "link1.H"], "to": "Z"})
+    if gesture["do"] == "spring":
+        gesture = gesture | {"between": [{"ground": [0.1, 0.2]}, {"ground": [0.2, 0.2]}]}
+    found = ask(ask="edit", text=text, places=places, gestures=[gesture])
+    assert len(found["error"]) > 10
+    assert "cannot be answered" not in found["error"]
+    assert "links." not in found["error"]
+
+
+def test_an_end_on_a_link_makes_it_ternary():
+    text, places = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0, 0.05]},
+        {"do": "link", "from": "link1.B", "to": [0.2, 0.05]},
+        {"do": "link", "from": {"on": "link2", "at": [0.1, 0.05]}, "to": {"ground": [0.1, 0]}},
+    )  # fmt: skip
+    entries = entries_of(text)[0]
+    assert list(entries["links"]["link2"]["points"]) == ["B", "C", "D"]
+    assert entries["joints"]["D"]["links"] == ["link2", "link3"]
+    assert places["link2.D"] == pytest.approx([0.1, 0.05])
+
+
+def test_a_spring_begins_on_a_link_and_ends_on_the_ground():
+    text, _ = edited(
+        "", {},
+        {"do": "link", "from": {"ground": [0, 0]}, "to": [0.1, 0]},
+        {"do": "spring", "between": [{"on": "link1", "at": [0.05, 0]}, [0.05, 0.04]], "stiffness": "2 N/mm"},
+        {"do": "load", "at": {"on": "link1", "at": [0.08, 0]}, "force": ["0 N", "-2 kN"]},
+    )  # fmt: skip
+    entries = entries_of(text)[0]
+    assert entries["springs"]["spring1"] == {
+        "between": ["link1.C", "ground.D"], "stiffness": "2 N/mm", "free_length": "40 mm",
+    }  # fmt: skip
+    assert entries["loads"]["load1"] == {"link": "link1", "at": "E", "force": ["0 N", "-2 kN"]}
+
+
+def test_a_typed_length_stays_as_it_was_typed():
+    text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [0.0635, 0], "length": "2.5 in"})
+    assert entries_of(text)[0]["links"]["link1"]["points"]["B"] == ["2.5 in", 0]
+
+
+@pytest.mark.parametrize(("fine", "written"), [(0.0, "84.852814 mm"), (2e-5, "84.85 mm"), (1e-2, "84.9 mm")])
+def test_lengths_are_written_no_finer_than_they_are_drawn(fine, written):
+    given = {"text": "", "places": {}, "fine": fine}
+    drawn = ask(ask="edit", gestures=[{"do": "link", "from": {"ground": [0, 0.04]}, "to": [0.06, 0.1]}], **given)
+    assert entries_of(drawn["text"])[0]["links"]["link1"]["points"]["B"] == [written, 0]
+    asked = {"text": drawn["text"], "places": drawn["places"], "fine": fine}
+    pinned = ask(ask="edit", gestures=[{"do": "pin", "point": "link1.B"}], **asked)
+    if fine < 1e-3:  # the grid again, and not what rounding left of it
+        assert entries_of(pinned["text"])[0]["links"]["ground"]["points"]["B"] == ["60 mm", "100 mm"]
+
+
+def test_a_half_drawn_linkage_is_no_error():
+    text, places, told = "", {}, []
+    for gesture in WHITWORTH:
+        text, places = edited(text, places, gesture)
+        told.append(ask(ask="model", text=text)["missing"])
+    assert told == [
+        ["It can move in 1 way: drive a joint, or draw on from B."],
+        ["It can move in 2 ways: draw on from B or D, pin or guide it."],
+        ["It can move in 1 way: drive a joint."],
+        ["It can move in 2 ways: draw on from F, pin or guide it."],
+        ["It can move in 1 way: drive a joint."],
+        [],
+    ]
+    text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [1, 0]})
+    assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
+    wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
+    assert ask(ask="model", text=wrong)["missing"] == []
+
+
+def test_what_slides_goes_with_its_joint():
+    text, places = edited("", {}, *WHITWORTH)
+    text, _ = edited(text, places, {"do": "delete", "what": ["joints", "E"]})
+    entries = entries_of(text)[0]
+    assert "block1" not in entries["links"]
+    assert list(entries["joints"]) == ["A", "C", "D", "G", "F"]
+    assert list(entries["links"]["link2"]["points"]) == ["C", "D"]
+    assert "B" in entries["links"]["link1"]["points"]
+
+
+# ---- dragging and locks --------------------------------------------------------------------------------------------
+
+
+def after_a_drag(point, to):
+    """Places at the start, and where they are after a drop."""
+    text, places = edited("", {}, *WHITWORTH)
+    gestures = [{"do": "move", "point": point, "to": to}]
+    found = ask(ask="edit", text=text, places=places, gestures=gestures)
+    assert "error" not in found, found
+    return places, solved(found["text"])["places"]
+
+
+@pytest.mark.parametrize("point", ["D", "C"])
+def test_what_is_dragged_on_a_slotted_lever_goes_there_and_the_rest_stays(point):
+    places, now = after_a_drag(point, [-0.05, -0.07])
+    moved = f"link2.{point}"
+    assert now[moved] == pytest.approx([-0.05, -0.07], abs=1e-5)
+    for key in {"link1.B", "link2.C", "link2.D", "link3.F"} - {moved}:
+        assert now[key] == pytest.approx(places[key], abs=1e-5), key
+
+
+def test_a_lever_turns_with_its_pin_unless_its_end_is_locked():
+    text, places = edited("", {}, *WHITWORTH)
+    for locked, stays in (([], False), (["D"], True)):
+        asked = {"text": text, "point": "B", "index": 0, "to": [0.05, 0.11], "locked": locked}
+        found = ask(ask="drag", **asked)
+        end = [found["points"]["link2.D"][axis][found["index"]] for axis in "xy"]
+        assert (np.hypot(*np.subtract(end, places["link2.D"])) < 5e-3) == stays
+
+
+def test_a_locked_joint_is_not_dragged():
+    text, places = edited("", {}, *WHITWORTH)
+    found = ask(ask="edit", text=text, places=places, gestures=[{"do": "lock", "point": "D"}])
+    assert (found["says"], found["locked"], found["text"]) == ("Lock D", ["D"], text)
+    asked = {"text": text, "places": places, "locked": ["D"]}
+    assert "locked" in ask(ask="edit", **asked, gestures=[{"do": "move", "point": "D", "to": [0, 0.2]}])["error"]
+    assert "locked" in ask(ask="drag", text=text, locked=["D"], point="D", to=[0, 0.2])["error"]
+    renamed = ask(ask="edit", **asked, gestures=[{"do": "rename", "what": ["joints", "D"], "to": "K"}])
+    assert renamed["locked"] == ["K"]
+    assert ask(ask="edit", **asked, gestures=[{"do": "lock", "point": "D"}])["locked"] == []
+
+
+@pytest.mark.parametrize(
+    "old", ["36 mm, 0]", "[0, 0]", "[ground, link1]", "{A: [0, 0]}", "revolute", "{speed: 60 rpm}", "-100 N"]
+)
+def test_a_text_that_is_not_sound_is_answered_with_what_is_found(old):
+    text = (
+        "trunnion: 1\nlinks:\n  ground: {points: {A: [0, 0]}}\n  link1: {points: {A: [0, 0], B: [36 mm, 0]}}\n"
+        "joints: {A: {type: revolute, links: [ground, link1]}}\ndrivers: {A: {speed: 60 rpm}}\n"
+        "loads: {load1: {link: link1, at: B, force: [-100 N, 0]}}\n"
+    )
+    assert old in text
+    for odd in ("abc", "3.5", "[[1], {a: 2}]", "{a: [b]}", "null", "1e999"):
+        found = ask(ask="model", text=text.replace(old, f"{odd}]" if old.startswith("36") else odd), steps=4)
+        assert found["findings"] or found["solved"], (odd, found)
+
+
+# ---- values and names ----------------------------------------------------------------------------------------------
+
+
+def test_a_dimension_in_use_is_not_emptied():
+    text = "trunnion: 1\ndimensions: {r: 5 mm, s: 2 mm}\nlinks:\n  ground: {points: {A: [0, r]}}\n"
+    refused = ask(ask="edit", text=text, gestures=[{"do": "set", "path": ["dimensions", "r"], "value": None}])
+    assert refused["error"].startswith("r is in use: by point A of link ground")
+    text, _ = edited(text, {}, {"do": "set", "path": ["dimensions", "s"], "value": None})
+    assert entries_of(text)[0]["dimensions"] == {"r": "5 mm"}
+
+
+def test_everything_that_is_drawn_has_a_name_of_its_own():
+    text, places = edited(
+        "", {}, *WHITWORTH,
+        {"do": "add-point", "link": "link3", "at": [0.2, -0.1]},
+        {"do": "load", "at": "link3.H", "force": ["0 N", "-5 N"]},
+        {"do": "spring", "between": ["link3.H", {"ground": [0.2, 0.2]}]},
+    )  # fmt: skip
+    before = np.array(solved(text)["scene"]["drivers"][0]["effort"], float)
+    for what, new in (
+        (["loads", "load1"], "cut"), (["springs", "spring1"], "return"), (["drivers", "A"], "crank"),
+        (["points", "link3.H"], "tool"), (["links", "link3"], "rod"),
+    ):  # fmt: skip
+        text, places = edited(text, places, {"do": "rename", "what": what, "to": new})
+    entries = entries_of(text)[0]
+    assert (list(entries["loads"]), list(entries["springs"]), list(entries["drivers"])) == (
+        ["cut"],
+        ["return"],
+        ["crank"],
+    )
+    assert entries["loads"]["cut"]["at"] == "tool"
+    assert entries["springs"]["return"]["between"][0] == "rod.tool"
+    np.testing.assert_allclose(np.array(solved(text)["scene"]["drivers"][0]["effort"], float), before, rtol=1e-6)

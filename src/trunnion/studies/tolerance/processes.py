@@ -76,7 +76,6 @@ class Processes(Generic[T]):
         self._begin()
 
     def _begin(self) -> None:
-        self._others = set(multiprocessing.active_children())
         self._processes: set[BaseProcess] = set()
         self._pool = ProcessPoolExecutor(self.workers, multiprocessing.get_context("spawn"), _begin, (self._job,))
         self._born = self._submitted(int)
@@ -84,7 +83,8 @@ class Processes(Generic[T]):
     def _submitted(self, work: Callable[..., A], *arguments: object) -> Future[A]:
         with unheard():  # it may start a process
             future = self._pool.submit(work, *arguments)
-        self._processes |= set(multiprocessing.active_children()) - self._others
+        # Not `multiprocessing.active_children()`, which forgets a worker that has ended already, and how it ended.
+        self._processes |= set((self._pool._processes or {}).values())
         return future
 
     def give(self, blocks: Blocks) -> None:

@@ -215,6 +215,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             user.page.wait_for_timeout(1000)
             user.idle()
             user.page.locator("[role=tab]", has_text="Findings").click()
+            user.idle()
             assert told in user.page.locator("body").inner_text()
 
     @pytest.mark.slow

@@ -75,6 +75,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.wait_for_selector(".overlay .track.free")
         assert user.page.locator(".track.free").count() == tracks + 1
         user.page.click("role=tab[name=Plots]")
+        user.idle()
         assert "Velocity of a place on coupler" in user.page.locator(".chart .title").all_inner_texts()
         traced = laid(user, "l.laid.value.point")
         user.page.click("button:has-text('Make it a point')")

@@ -77,7 +77,7 @@ def tolerance(
         int | None,
         typer.Option("--chunk", help="Samples per chunk of work; about one second's by default.", show_default=False),
     ] = None,
-    engine: Annotated[str, typer.Option("--engine", help="numpy, compiled, jax, or auto: by size.")] = "auto",
+    engine: Annotated[str, typer.Option("--engine", help="numpy, compiled, gpu, jax, or auto: by size.")] = "auto",
     cluster: Cluster = None,
     checkpoint: Annotated[
         Path | None, typer.Option("--checkpoint", help="File to save the samples done so far.", show_default=False)

@@ -5,23 +5,26 @@ s0 to s1 and the positions p0 to p1 of P. What is made of given numbers alone is
 sample alone once a sample, both as plain numbers; what differs by position alone once a call, into a table of the
 caller. The last vector of a row is moved back to end with
 it: so a row holds at least as many positions as a vector.
+
+For a GPU (`threads`) there are no loops: each thread computes one lane, all that it is made of included.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 
 from trunnion.engines.graph import BOTH, POSITION, SAMPLE, Graph
-from trunnion.engines.lanes import BYTE, DOUBLE, LONG, Lanes
+from trunnion.engines.lanes import BYTE, DOUBLE, INT, LONG, Lanes
 
-__all__ = ["Program", "program"]
+__all__ = ["Program", "program", "thread_number"]
 
 KINDS = (0, SAMPLE, POSITION, BOTH)  # what numbers differ by
 COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+PLACE = tuple(f"llvm.nvvm.read.ptx.sreg.{name}.x" for name in ("ctaid", "ntid", "tid"))  # of a thread, in a GPU
 Value = Any  # of llvmlite, which has no types
 
 
@@ -36,29 +39,44 @@ class Program:
     width: int
 
 
-def program(graph: Graph, outputs: Sequence[int], width: int) -> Program:
-    """A program that computes some nodes. Numbers become floats of 64 bits, what is true or false and "byte" bytes."""
-    return _Writer(graph, outputs, width).write()
+def program(graph: Graph, outputs: Sequence[int], width: int, threads: bool = False) -> Program:
+    """A program that computes some nodes. Numbers become floats of 64 bits, what is true or false and "byte" bytes.
+
+    threads: for a GPU, a thread for each lane; the width is then 1, and the table none.
+    """
+    return (_ThreadWriter if threads else _Writer)(graph, outputs, width).write()
 
 
 @dataclass
 class _Writer:
     """One module as it is written."""
 
+    convention: ClassVar[str] = ""
     graph: Graph
     outputs: Sequence[int]
     width: int
     module: Any = field(default_factory=lambda: ir.Module(name="trunnion"))
+    tabled: Sequence[int] = ()
 
     def write(self) -> Program:
         live = self.graph.live(self.outputs)
         names = tuple(self._inputs(live, differs) for differs in KINDS)
         self._open()
+        self._point(names)
+        self._body(live)
+        self.b.ret_void()
+        return Program(str(self.module), names, len(self.tabled), self.width)
+
+    def _point(self, names: Sequence[Sequence[str]]) -> None:
+        """Where the inputs and outputs lie."""
         self.pointers = [
             {name: self._pointer(argument, k) for k, name in enumerate(some)}
             for argument, some in zip(self.arguments[5:9], names, strict=True)
         ]
         self.out = [self._pointer(self.arguments[9], k) for k in range(len(self.outputs))]
+
+    def _body(self, live: Sequence[int]) -> None:
+        """Loops over samples and positions."""
         level = {n: self.graph.differs[n] for n in live}
         if not any(differs & SAMPLE for differs in level.values()):  # one sample: no table is needed for it
             level = {n: BOTH if differs == POSITION else differs for n, differs in level.items()}
@@ -70,8 +88,6 @@ class _Writer:
         if self.tabled:
             self._fill_table(ahead, wide)
         self._samples(once, each, plain, wide)
-        self.b.ret_void()
-        return Program(str(self.module), names, len(self.tabled), self.width)
 
     def _spread(self, plain: dict[int, Value], readers: Iterable[int]) -> dict[int, Value]:
         """Plain numbers in all lanes, those that some nodes read or that are outputs."""
@@ -87,6 +103,7 @@ class _Writer:
         double = DOUBLE.as_pointer()
         kinds = [*[LONG] * 5, *[double.as_pointer()] * 5, double]
         function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), name="kernel")
+        function.calling_convention = self.convention
         self.arguments = function.args
         self.b = ir.IRBuilder(function.append_basic_block("entry"))
         tables: dict[tuple[float, ...], Value] = {}
@@ -277,3 +294,31 @@ class _Writer:
         self.b.cbranch(self.b.and_(more, lanes.differ(states, found)), body, after)
         self.b.position_at_end(after)
         return found
+
+
+class _ThreadWriter(_Writer):
+    """A module for a GPU: a thread computes one lane, with all that differs by its sample or position alone."""
+
+    convention = "ptx_kernel"
+
+    def _body(self, live: Sequence[int]) -> None:
+        first, last, low, high, stride = self.arguments[:5]
+        row = self.b.sub(high, low)
+        lane = thread_number(self.b, self.b.mul(self.b.sub(last, first), row))
+        s, p = self.b.add(first, self.b.sdiv(lane, row)), self.b.add(low, self.b.srem(lane, row))
+        place = self.b.add(self.b.mul(s, stride), p)
+        places = dict(zip(KINDS, (ir.Constant(LONG, 0), s, p, place), strict=True))
+        values = {n: value for kind, at in places.items() for n, value in self._loaded(kind, at).items()}
+        self._emit(live, values, self.scalar)
+        for k, n in enumerate(self.outputs):
+            self._output(self.out[k], place, self._of(n, values, self.scalar))
+
+
+def thread_number(b: Any, count: Value) -> Value:
+    """The number of this thread of a GPU; those from the count on end here."""
+    registers = (b.module.globals.get(name) or ir.Function(b.module, ir.FunctionType(INT, []), name) for name in PLACE)
+    block, size, thread = (b.zext(b.call(register, []), LONG) for register in registers)
+    number = b.add(b.mul(block, size), thread)
+    with b.if_then(b.icmp_signed(">=", number, count)):
+        b.ret_void()
+    return number

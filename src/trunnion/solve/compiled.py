@@ -144,14 +144,21 @@ class CompiledKernel(ABC):
         self.again += len(rows)
         for low in range(0, len(rows), CHUNK):
             row, column = rows[low : low + CHUNK], columns[low : low + CHUNK]
-            part = {path: lanes_of(value, row) for path, value in values.items()}
-            times = time[column] if time.ndim == 1 else time[row, column]
-            back = self.by_numpy(part, times)
-            with np.errstate(all="ignore"):
-                status = status_of(back, row.shape) if self.forces else pose_status(back.walk, row.shape)
-                found.status[row, column] = status
-                for name, figure in self.figures.items():
-                    found.curves[name][row, column] = figure(back)
+            curves, status = self.decided(values, time, row, column)
+            found.status[row, column] = status
+            for name, curve in curves.items():
+                found.curves[name][row, column] = curve
+
+    def decided(
+        self, values: Values, time: Array, row: NDArray[np.intp], column: NDArray[np.intp]
+    ) -> tuple[dict[str, Any], NDArray[np.int8]]:
+        """Figures by name and status of some lanes, one after the other, by NumPy."""
+        part = {path: lanes_of(value, row) for path, value in values.items()}
+        times = time[column] if time.ndim == 1 else time[row, column]
+        back = self.by_numpy(part, times)
+        with np.errstate(all="ignore"):
+            status = status_of(back, row.shape) if self.forces else pose_status(back.walk, row.shape)
+            return {name: figure(back) for name, figure in self.figures.items()}, status
 
 
 def pays(configurations: int, least: int) -> bool:

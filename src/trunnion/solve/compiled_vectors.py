@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from trunnion.engines.graph import Graph
     from trunnion.engines.machine_code import MachineCode
 
-__all__ = ["VectorKernel", "literals"]
+__all__ = ["VectorKernel", "arrays_of", "inputs_of", "literals"]
 
 PROBE = 4096  # lanes by which one judges whether the rest is worth while
 HOPELESS = 0.5  # share of doubtful lanes from which the rest is left to NumPy
@@ -57,7 +57,7 @@ class VectorKernel(CompiledKernel):
 
     def check(self, values: Values, time: Array | None = None) -> None:
         """See `CompiledKernel.check`."""
-        inputs = _inputs(values, np.zeros(1) if time is None else time)
+        inputs = inputs_of(values, np.zeros(1) if time is None else time)
         if self._known(inputs) is None:
             self._graphs[inputs.structure] = self._recorded(inputs)
 
@@ -75,14 +75,14 @@ class VectorKernel(CompiledKernel):
         times = np.ascontiguousarray(np.broadcast_to(time, (samples, positions)).ravel()[row])
         flat = _empty(list(found.curves), (1, len(row)))
         self._filled(lanes, times, flat)
-        for into, came in zip(_arrays(found), _arrays(flat), strict=True):
+        for into, came in zip(arrays_of(found), arrays_of(flat), strict=True):
             into[:] = came[0, : samples * positions].reshape(samples, positions)
 
     def _filled(self, values: Values, time: Array, found: Lanes) -> None:
-        inputs = _inputs(values, time)
+        inputs = inputs_of(values, time)
         from concurrent.futures import ThreadPoolExecutor  # takes long to import
 
-        program, arrays = self.program(inputs), _arrays(found)
+        program, arrays = self.program(inputs), arrays_of(found)
         with ThreadPoolExecutor(self.threads) as pool:
             first, *rest = _parts(found.status.shape, self.threads)
             program.run(inputs.numbers, arrays, *first)
@@ -98,16 +98,19 @@ class VectorKernel(CompiledKernel):
             return self._program(inputs)
 
     def _program(self, inputs: _Inputs) -> MachineCode:
-        from trunnion.engines.machine_code import MachineCode, vector_width
-        from trunnion.engines.program import program
-
         code = self._known(inputs)
         if code is None:
             graph = self._graphs.pop(inputs.structure, None) or self._recorded(inputs)
-            code = self._programs[inputs.structure] = MachineCode(program(*graph, vector_width()))
+            code = self._programs[inputs.structure] = self._made(*graph)
             if key := self._key(inputs):
                 code.keep_as(key)
         return code
+
+    def _made(self, graph: Graph, outputs: list[int]) -> MachineCode:
+        from trunnion.engines.machine_code import MachineCode, vector_width
+        from trunnion.engines.program import program
+
+        return MachineCode(program(graph, outputs, vector_width()))
 
     def _known(self, inputs: _Inputs) -> MachineCode | None:
         """The machine code if it needs no recording: that of this model and these figures was kept."""
@@ -155,7 +158,7 @@ def _empty(names: list[str], shape: tuple[int, ...]) -> Lanes:
     return Lanes({name: np.empty(shape) for name in names}, np.empty(shape, np.int8), np.empty(shape, bool))
 
 
-def _arrays(found: Lanes) -> list[NDArray[Any]]:
+def arrays_of(found: Lanes) -> list[NDArray[Any]]:
     return [*found.curves.values(), found.status, found.doubtful]
 
 
@@ -176,7 +179,7 @@ def literals(values: Values) -> dict[str, Any]:
     }
 
 
-def _inputs(values: Values, time: Array) -> _Inputs:
+def inputs_of(values: Values, time: Array) -> _Inputs:
     """What a program is given."""
     from trunnion.engines.graph import BOTH, POSITION, SAMPLE
 

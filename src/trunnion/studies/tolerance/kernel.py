@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Kernel", "batch_of", "engine_for", "kernel_of", "references"]
 
 
-AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20}  # numbers in an array, by engine
+AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20, "gpu": 1 << 22}  # numbers in an array, by engine
 WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
 
 
@@ -62,6 +62,10 @@ class OtherKernel:
             from trunnion.studies.tolerance import compiled_jax
 
             made = compiled_jax.JaxKernel
+        elif self.engine == "gpu":
+            from trunnion.solve import compiled_device
+
+            made = compiled_device.DeviceKernel
         else:
             from trunnion.solve import compiled_vectors
 

@@ -26,6 +26,7 @@ pytest.importorskip("llvmlite")
 
 from stand_in_device import StandIn, as_text
 from trunnion.engines.program import program
+from trunnion.engines.reductions import NAMES, reductions
 from trunnion.solve.compiled_device import DeviceKernel
 from trunnion.solve.compiled_vectors import VectorKernel, inputs_of
 
@@ -65,6 +66,14 @@ def assembler() -> str | None:
     return shutil.which("ptxas") or next(map(str, packages), None)
 
 
+def assemble(text: str, folder: Path) -> None:
+    """Nothing is said of it by NVIDIA's assembler, where that is installed."""
+    if (ptxas := assembler()) is not None:
+        (folder / "kernel.ptx").write_text(text)
+        told = [ptxas, "-arch=sm_90", str(folder / "kernel.ptx"), "-o", str(folder / "kernel.cubin")]
+        assert subprocess.run(told, capture_output=True, text=True, check=False).stderr == ""
+
+
 def kernels(file: Path, engine: type[VectorKernel]) -> tuple[Any, dict[str, Any], Any]:
     """A kernel of all efforts and of the outputs, numbers that differ by sample, times."""
     run = prepare(trunnion.read(file))
@@ -91,10 +100,7 @@ def test_every_example_that_compiles_is_ptx(file: Path, tmp_path: Path) -> None:
     text = device.ptx(program(graph, nodes, 1, threads=True).text).rstrip(b"\0").decode()
     assert ".visible .entry kernel(" in text
     assert not re.search(r"\.f32|^\s*call|\.extern|\.approx", text, re.MULTILINE)
-    if (ptxas := assembler()) is not None:
-        (tmp_path / "kernel.ptx").write_text(text)
-        told = [ptxas, "-arch=sm_90", str(tmp_path / "kernel.ptx"), "-o", str(tmp_path / "kernel.cubin")]
-        assert subprocess.run(told, capture_output=True, text=True, check=False).stderr == ""
+    assemble(text, tmp_path)
 
 
 @pytest.mark.spread(4, "rccc", "toggle-press")
@@ -171,22 +177,111 @@ def test_without_its_packages_there_is_one_finding(monkeypatch: pytest.MonkeyPat
     assert caught.value.findings[0].remedy == "pip install 'trunnion[gpu]', or use the engine compiled"
 
 
+# ---- studies --------------------------------------------------------------------------------------------------
+
+
+def alike(mechanism: Mechanism, **options: Any) -> Any:
+    """A study by a GPU and by the compiled engine: counts equal, moments close."""
+    told = {"methods": ["monte-carlo"], "samples": 400, "steps": 72, **options}
+    found, expected = (trunnion.tolerance(mechanism, engine=engine, **told) for engine in ("gpu", "compiled"))
+    for name in ("histogram", "failed", "samples", "yield", "yield_all", "band"):
+        np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=name)
+    for name in ("mean", "deviation", "least", "most", "kurtosis"):
+        np.testing.assert_allclose(found[name].values, expected[name].values, rtol=1e-11, err_msg=name)
+    np.testing.assert_allclose(found["skewness"].values, expected["skewness"].values, rtol=1e-11, atol=1e-11)
+    return found
+
+
+def with_measures(tolerances: dict[str, Any] | None = None, **measures: Any) -> Mechanism:
+    """A four-bar of which this is measured."""
+    data = trunnion.read(TOLERANCED).data()
+    data["links"]["coupler"]["points"]["E"] = ["l3 / 2", "20 mm"]
+    return Mechanism(**{**data, "measures": measures, "tolerances": {**data["tolerances"], **(tolerances or {})}})
+
+
+RULES: dict[str, Any] = {
+    "deviation": {"angle": "rocker", "limit": "±0.1 deg"},
+    "angle that gains a turn": {"angle": "crank", "as": "maximum"},
+    "largest in a window past the end": {"angle": "rocker", "as": "largest", "over": ["300 deg", "60 deg"]},
+    "least": {"angle": "rocker", "as": "minimum"},
+    "place": {"angle": "rocker", "as": "place-of-maximum"},
+    "dead centre": {"dead_centre": "D", "as": "place-of-minimum"},
+    "stroke": {"stroke": "D"},
+    "path": {"path_error": "coupler.E"},
+    "straightness": {"straightness": "coupler.E"},
+    "dwell": {"angle": "rocker", "as": "dwell", "within": ["80 deg", "100 deg"]},
+    "mean": {"effort": "A", "as": "mean"},
+    "efficiency": {"efficiency": "cycle"},
+    "reaction": {"reaction": "B", "as": "largest"},
+    "at": {"angle": "rocker", "at": "50 deg"},
+}
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_study_is_that_of_the_compiled_engine(stand: StandIn, rule: str) -> None:
+    """Figures of every kind, those reduced on the device and those that are copied from it."""
+    alike(with_measures(measure=RULES[rule]))
+    assert "cuLaunchKernel" in stand.calls
+
+
+def test_several_measures_at_once_by_even_points(stand: StandIn) -> None:
+    some = {name.replace(" ", "-"): RULES[name] for name in ("deviation", "stroke", "mean", "reaction")}
+    alike(with_measures(**some), methods=["quasi-monte-carlo"], samples=1000)
+
+
+def test_samples_that_fail_are_those_of_the_compiled_engine(stand: StandIn) -> None:
+    """Positions that cannot be assembled, and those beside them, are decided by NumPy and put back on the device."""
+    wide = {
+        name: {"limits": limits, "distribution": "uniform"} for name, limits in (("l1", "±40 mm"), ("l4", "±15 mm"))
+    }
+    mechanism = with_measures(wide, angle={"angle": "rocker", "as": "maximum"}, path=RULES["path"], mean=RULES["mean"])
+    alike(mechanism)
+    assert (
+        trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=400, steps=72, engine="gpu")["failed"].sum() > 9
+    )
+
+
+def test_blocks_in_several_threads(stand: StandIn) -> None:
+    """More than one block has the same counts, whatever thread drew it."""
+    mechanism = trunnion.read(TOLERANCED)
+    found = [
+        trunnion.tolerance(mechanism, ["rocker-angle"], ["monte-carlo"], 120_000, steps=36, jobs=jobs, engine="gpu")
+        for jobs in (1, 2)
+    ]
+    for name in found[0].variables:
+        np.testing.assert_array_equal(found[0][name].values, found[1][name].values, err_msg=name)
+
+
+def test_shares_by_a_device(stand: StandIn) -> None:
+    mechanism, told = trunnion.read(TOLERANCED), {"methods": ["sobol"], "samples": 700, "steps": 36}
+    found, expected = (trunnion.tolerance(mechanism, engine=engine, **told) for engine in ("gpu", "compiled"))
+    for name in ("first_order", "total_order"):
+        np.testing.assert_allclose(found[name].values, expected[name].values, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [("fmul double", "fadd double", "the figures of"), ("i32 1 monotonic", "i32 2 monotonic", "the counts of")],
+)
+def test_a_reduction_that_errs_is_refused(
+    stand: StandIn, monkeypatch: pytest.MonkeyPatch, right: str, wrong: str, told: str
+) -> None:
+    def changed(text: str) -> bytes:
+        assert right in text or '@"bins"' not in text
+        return as_text(text.replace(right, wrong) if '@"bins"' in text else text)
+
+    monkeypatch.setattr(device, "ptx", changed)
+    with pytest.raises(MechanismError, match=f"other numbers than NumPy for {told} 'rocker-angle'"):
+        trunnion.tolerance(trunnion.read(TOLERANCED), ["rocker-angle"], ["monte-carlo"], 100, steps=36, engine="gpu")
+
+
+def test_reductions_are_ptx(tmp_path: Path) -> None:
+    text = device.ptx(reductions()).rstrip(b"\0").decode()
+    assert sorted(re.findall(r"\.entry (\w+)\(", text)) == sorted(NAMES)
+    assemble(text, tmp_path)
+
+
 @gpu
 def test_a_gpu_gives_what_the_processor_gives() -> None:
     """Where there is one."""
-    alike(trunnion.read(TOLERANCED), 1e-9)
-
-
-def alike(mechanism: Mechanism, close: float, **options: Any) -> None:
-    """A study by a GPU and by the compiled engine: counts equal, moments close."""
-    told = {"methods": ["monte-carlo"], "samples": 2000, "steps": 72, **options}
-    found, expected = (trunnion.tolerance(mechanism, engine=engine, **told) for engine in ("gpu", "compiled"))
-    for name in ("histogram", "failed", "samples", "yield", "band"):
-        np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=name)
-    for name in ("mean", "deviation", "skewness", "kurtosis", "least", "most"):
-        np.testing.assert_allclose(found[name].values, expected[name].values, rtol=close, err_msg=name)
-
-
-def test_a_study_is_that_of_the_compiled_engine(stand: StandIn) -> None:
-    alike(trunnion.read(TOLERANCED), 1e-12)
-    assert "cuLaunchKernel" in stand.calls
+    alike(trunnion.read(TOLERANCED), samples=20_000)

@@ -6,11 +6,11 @@ Nothing of CUDA's toolkit is needed: LLVM writes PTX, and the driver is called t
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from functools import cache
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import cache, cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["THREADS", "Buffer", "Device", "DeviceCode", "device", "ptx"]
 
 Array = NDArray[Any]
+A = TypeVar("A", bound=NDArray[Any])
 THREADS = 128  # of a block
 OLDEST = "sm_75", "+ptx63"  # the oldest GPU that PTX is for (Turing, 2018); drivers take it for all newer ones
 REMEDY = "use the engine compiled"
@@ -76,7 +77,7 @@ class Buffer:
         """Copy a contiguous array there."""
         self.device.call("cuMemcpyHtoD", self.address, array.ctypes.data, array.nbytes)
 
-    def get(self, array: Array, offset: int = 0) -> Array:
+    def get(self, array: A, offset: int = 0) -> A:
         """The array, contiguous, filled by what is there from so many bytes on."""
         self.device.call("cuMemcpyDtoH", array.ctypes.data, self.address + offset, array.nbytes)
         return array
@@ -107,10 +108,30 @@ class Device:
         """Let this thread use the device."""
         self.call("cuCtxSetCurrent", self._context)
 
-    def function(self, text: str, name: str = "kernel") -> Any:
-        """A function of a module."""
+    def function(self, text: str) -> Any:
+        """The kernel of a program."""
+        return self._functions(text, ["kernel"])["kernel"]
+
+    def _functions(self, text: str, names: Iterable[str]) -> dict[str, Any]:
         self.enter()
-        return self.call("cuModuleGetFunction", self.call("cuModuleLoadData", ptx(text)), name.encode())
+        module = self.call("cuModuleLoadData", ptx(text))
+        return {name: self.call("cuModuleGetFunction", module, name.encode()) for name in names}
+
+    @cached_property
+    def _reductions(self) -> dict[str, Any]:
+        from trunnion.engines.reductions import NAMES, reductions
+
+        return self._functions(reductions(), NAMES)
+
+    def reduce(self, name: str, threads: int, *args: int) -> None:
+        """Run a kernel of `engines.reductions`."""
+        self.launch(self._reductions[name], threads, (threads, *args))
+
+    def listed(self, name: str, threads: int, room: int, *args: int) -> NDArray[np.int64]:
+        """The list that a kernel of `engines.reductions` writes, in rising order."""
+        with self.holding(np.zeros(1, np.int64), 8 * room) as (count, found):
+            self.reduce(name, threads, *args, count.address, found.address)
+            return np.sort(found.get(np.empty(int(count.get(np.empty(1, np.int64))[0]), np.int64)))
 
     def launch(self, function: Any, threads: int, args: Sequence[int]) -> None:
         """Run a function in so many threads, and those that fill their block; all arguments have 64 bits. Waits."""
@@ -122,6 +143,18 @@ class Device:
         blocks = -(-threads // THREADS)
         self.call("cuLaunchKernel", function, blocks, 1, 1, THREADS, 1, 1, 0, 0, ctypes.addressof(places), 0)
         self.call("cuCtxSynchronize")
+
+    @contextmanager
+    def holding(self, *given: Array | int) -> Iterator[list[Buffer]]:
+        """Memory with what is in contiguous arrays, or of so many bytes."""
+        with ExitStack() as held:
+            buffers = []
+            for one in given:
+                size = one if isinstance(one, int) else one.nbytes
+                buffers.append(held.enter_context(Buffer(self, size)))
+                if not isinstance(one, int):
+                    buffers[-1].put(one)
+            yield buffers
 
 
 class DeviceCode:

@@ -44,7 +44,7 @@ class Loop:
 
 FOLDED: dict[str, Callable[..., Any]] = {
     "neg": np.negative, "abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "exp": np.exp, "tanh": np.tanh,
-    "sign": np.sign, "floor": np.floor, "finite": np.isfinite, "not": np.logical_not, "add": np.add,
+    "sign": np.sign, "floor": np.floor, "rint": np.rint, "finite": np.isfinite, "not": np.logical_not, "add": np.add,
     "sub": np.subtract, "mul": np.multiply, "div": np.divide, "max": np.maximum, "min": np.minimum,
     "atan2": np.arctan2, "lt": np.less, "le": np.less_equal, "gt": np.greater, "ge": np.greater_equal,
     "eq": np.equal, "ne": np.not_equal, "and": np.logical_and, "or": np.logical_or, "xor": np.logical_xor,

@@ -114,6 +114,9 @@ class Lanes:
     def floor(self, a: Value) -> Value:
         return self._intrinsic("floor", a)
 
+    def rint(self, a: Value) -> Value:
+        return self._intrinsic("rint", a)
+
     def copysign(self, a: Value, sign: Value) -> Value:
         return self._intrinsic("copysign", a, sign)
 

@@ -198,7 +198,7 @@ def _same(x: Any, *_: Any, **__: Any) -> Any:
 NAMES: dict[str, Callable[..., Any]] = {
     **{name: _direct(op) for name, op in {
         "sqrt": "sqrt", "sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "sign": "sign", "floor": "floor",
-        "abs": "abs", "absolute": "abs", "fabs": "abs", "negative": "neg", "isfinite": "finite",
+        "rint": "rint", "abs": "abs", "absolute": "abs", "fabs": "abs", "negative": "neg", "isfinite": "finite",
         "logical_not": "not", "invert": "not", "bitwise_not": "not", "add": "add", "subtract": "sub",
         "multiply": "mul", "divide": "div", "true_divide": "div", "maximum": "max", "minimum": "min",
         "arctan2": "atan2", "less": "lt", "less_equal": "le", "greater": "gt", "greater_equal": "ge",

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = ["Extreme", "Grid", "largest", "shape_of"]
+__all__ = ["Extreme", "Grid", "Tops", "highest", "largest", "shape_of"]
 
 POINTS, FEWER = 7, 5
 CUBIC = 4  # positions through which the curve goes that a mean over a range is of
@@ -177,6 +177,21 @@ def shape_of(number: Number) -> tuple[int, ...]:
     return number.shape if isinstance(number, Dual) else np.shape(number)
 
 
+class Tops(NamedTuple):
+    """Positions of rows of numbers that may have the largest value of their row next to them, one a row at least.
+
+    row, top: which; rising by both. about: values at the nodes of the polynomial, (top, node); value: at the position;
+    sides: at those beside it (`_sides`); gone: of every row, whether a value of it is NaN.
+    """
+
+    row: Positions
+    top: Positions
+    about: Array
+    value: Array
+    sides: tuple[Array, Array]
+    gone: NDArray[np.bool_]
+
+
 def largest(curve: Number, grid: Grid) -> Extreme:
     """The largest value of a curve, (lane…, position), over its last axis. Lanes with a NaN have NaN for an answer."""
     shape, stencils = shape_of(curve), grid.stencils
@@ -184,22 +199,31 @@ def largest(curve: Number, grid: Grid) -> Extreme:
     real = np.broadcast_to(primal(curve), shape).reshape(-1, shape[-1])
     rows, tops = _tops(real, periodic=grid.period is not None)
     about, sides = real[rows[:, None], stencils.nodes[tops]], _sides(real, rows, tops)
-    spot, used, value = _refined(about, real[rows, tops], sides, stencils, tops)
-    if len(rows) > len(real):
-        chosen = _highest(rows, value, len(real))
-        tops, spot, used, value = tops[chosen], spot[chosen], used[chosen], value[chosen]
-    gone = np.where(np.isnan(real.sum(axis=1)), np.nan, 0.0).reshape(lanes)
-    moved: Number = spot.reshape(lanes)
-    top, used = tops.reshape(lanes), used.reshape(lanes)
-    found: Number = value.reshape(lanes)
+    gone = np.isnan(real.sum(axis=1))
+    plain = highest(Tops(rows, tops, about, real[rows, tops], sides, gone), grid)
+    top, used, inside = plain.top.reshape(lanes), plain.used.reshape(lanes), plain.inside.reshape(lanes)
+    value, place, moved = (array.reshape(lanes) for array in (plain.value, plain.place, plain.spot))
     if isinstance(curve, Dual):
         known = curve[(*(n[..., None] for n in np.indices(lanes, sparse=True)), stencils.nodes[top])]
-        found, slope, second = _at(_coefficients(known, stencils, top, used), moved)
+        value, slope, second = _at(_coefficients(known, stencils, top, used), moved)
         bend = np.where(used > 0, primal(second), -np.inf)
         moved = moved - Dual(0.0 * moved, slope.dual) * (1.0 / bend)
-    place = moved * stencils.step[top] + grid.at[top] + gone
-    between = (stencils.reach[0, top] < 0) & (stencils.reach[1, top] > 0)
-    return Extreme(found + gone, place, (used > 0) | between, grid, top, moved, used)
+        lost = np.where(gone, np.nan, 0.0).reshape(lanes)
+        value, place = value + lost, moved * stencils.step[top] + grid.at[top] + lost
+    return Extreme(value, place, inside, grid, top, moved, used)
+
+
+def highest(found: Tops, grid: Grid) -> Extreme:
+    """The largest value of every row, of plain numbers, between positions too."""
+    stencils, rows, tops = grid.stencils, found.row, found.top
+    spot, used, value = _refined(found.about, found.value, found.sides, stencils, tops)
+    if len(rows) > len(found.gone):
+        chosen = _highest(rows, value, len(found.gone))
+        tops, spot, used, value = tops[chosen], spot[chosen], used[chosen], value[chosen]
+    lost = np.where(found.gone, np.nan, 0.0)
+    place = spot * stencils.step[tops] + grid.at[tops] + lost
+    between = (stencils.reach[0, tops] < 0) & (stencils.reach[1, tops] > 0)
+    return Extreme(value + lost, place, (used > 0) | between, grid, tops, spot, used)
 
 
 def _tops(real: Array, periodic: bool) -> tuple[Positions, Positions]:

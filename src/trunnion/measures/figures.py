@@ -34,7 +34,10 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Window
 from trunnion.solve.system import System
 
-__all__ = ["RULES", "Curve", "Reference", "figure", "judged", "kept", "known", "moment", "reference", "shown", "span"]
+__all__ = [
+    "RULES", "Curve", "Reference", "course_of", "figure", "judged", "judged_course", "kept", "known", "moment",
+    "number_at", "reference", "shown", "span",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
@@ -209,10 +212,13 @@ def figure(curve: Sequence[Number], nominal: Reference) -> Number:
     Floats, arrays or dual numbers; any leading axes. NaN where a position needed has no answer.
     """
     with np.errstate(all="ignore"):
-        found = _figure(nominal, _parts(curve, nominal))
-        measure = nominal.measure
-        if measure.of_place and nominal.window.period is not None and nominal.window.gain:
-            found = _near(found, nominal.figure, abs(nominal.window.gain))
+        return _turned(_figure(nominal, _parts(curve, nominal)), nominal)
+
+
+def _turned(found: Number, nominal: Reference) -> Number:
+    """A figure, or a place in the period in which the nominal mechanism has it."""
+    if nominal.measure.of_place and nominal.window.period is not None and nominal.window.gain:
+        return _near(found, nominal.figure, abs(nominal.window.gain))
     return found
 
 
@@ -242,7 +248,7 @@ def moment(nominal: Reference) -> float:
     if rule not in ("maximum", "minimum", "largest") or nominal.against or len(nominal.window.index) < 2:
         return float("nan")
     with np.errstate(all="ignore"):
-        course = _course(nominal, _single(nominal, nominal.parts))
+        course = course_of(nominal, _single(nominal, nominal.parts))
         sizes = np.abs(course.number)
         if not np.ptp(course.number) > FLAT * np.max(sizes):
             return float("nan")
@@ -260,7 +266,7 @@ def span(curve: Sequence[Number], nominal: Reference) -> tuple[Number, Number]:
         change = figure(curve, nominal) - nominal.figure
         return change, change
     with np.errstate(all="ignore"):
-        course = _course(nominal, _single(nominal, _parts(curve, nominal)))
+        course = course_of(nominal, _single(nominal, _parts(curve, nominal)))
         most, least = course.both()
         return -least, most
 
@@ -291,15 +297,29 @@ def _within(measure: Measure, figures: Array, least: Array, most: Array) -> NDAr
 def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray[np.bool_], Number]:
     """`figure`, `kept` and `shown` of plain numbers at once, each piece worked out once."""
     measure = nominal.measure
-    if measure.rule != "deviation":
+    if measure.rule in ("line", "ratio", "work"):
         figures = figure(curve, nominal)
         return figures, kept(curve, nominal, figures), shown(curve, nominal)
     with np.errstate(all="ignore"):
-        change = _single(nominal, _parts(curve, nominal))
-        course = _course(nominal, change)
+        number = _single(nominal, _parts(curve, nominal))
+        return *judged_course(course_of(nominal, number), nominal), number
+
+
+def judged_course(course: Curve, nominal: Reference) -> tuple[Number, NDArray[np.bool_]]:
+    """`figure` and `kept` of a course whose figure is made of one number a position."""
+    measure = nominal.measure
+    if measure.rule == "deviation":
         above, below = course.both()
-    figures = np.maximum(above, below)
-    return figures, _within(measure, figures, -below, above), change
+        figures = np.maximum(above, below)
+        return figures, _within(measure, figures, -below, above)
+    figures = _turned(RULES[measure.rule](course), nominal)
+    return figures, _within(measure, figures, figures - nominal.figure, figures - nominal.figure)
+
+
+def number_at(parts: Sequence[Number], meant: Sequence[Number], nominal: Reference) -> Number:
+    """The one number that a figure is made of, at single positions: of a course there and of the nominal one."""
+    there = replace(nominal, parts=tuple(meant))
+    return _single(there, (_near(parts[0], meant[0], TURN),) if nominal.turning else parts)
 
 
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
@@ -317,17 +337,17 @@ def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
 def _figure(nominal: Reference, parts: Sequence[Number]) -> Number:
     rule = nominal.measure.rule
     if rule == "line":
-        course = _course(nominal, parts[0])
+        course = course_of(nominal, parts[0])
         away = course._replace(number=distances(parts, course.grid.weights))
         return RULES["peak-to-peak"](away) if len(parts) == 2 else 2.0 * RULES["maximum"](away)
     if rule == "ratio":
-        return _ratio(parts[0], parts[1], _course(nominal, parts[0]))
+        return _ratio(parts[0], parts[1], course_of(nominal, parts[0]))
     if rule == "work":
-        course = _course(nominal, parts[0])
+        course = course_of(nominal, parts[0])
         mean, duration = (total(part, course.grid.weights) for part in parts)
         return mean * duration * nominal.share
     number = _single(nominal, parts)
-    return RULES[rule](_course(nominal, number))
+    return RULES[rule](course_of(nominal, number))
 
 
 def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
@@ -342,7 +362,7 @@ def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
     return parts[0] - nominal.parts[0] if nominal.against else parts[0]
 
 
-def _course(nominal: Reference, number: Number) -> Curve:
+def course_of(nominal: Reference, number: Number) -> Curve:
     """A course over the window; one that gains whole turns in a period with the end of the period, as a range."""
     window, band = nominal.window, nominal.measure.within or (-np.inf, np.inf)
     if not nominal.opened:

@@ -153,7 +153,7 @@ class CompiledKernel(ABC):
         self, values: Values, time: Array, row: NDArray[np.intp], column: NDArray[np.intp]
     ) -> tuple[dict[str, Any], NDArray[np.int8]]:
         """Figures by name and status of some lanes, one after the other, by NumPy."""
-        part = {path: lanes_of(value, row) for path, value in values.items()}
+        part = {path: lanes_of(value, row, column) for path, value in values.items()}
         times = time[column] if time.ndim == 1 else time[row, column]
         back = self.by_numpy(part, times)
         with np.errstate(all="ignore"):
@@ -166,11 +166,13 @@ def pays(configurations: int, least: int) -> bool:
     return configurations >= least and find_spec("llvmlite") is not None
 
 
-def lanes_of(value: Number, rows: NDArray[np.intp]) -> Number:
-    """The number in some samples, one after the other."""
+def lanes_of(value: Number, rows: NDArray[np.intp], columns: NDArray[np.intp] | None = None) -> Number:
+    """The number in some lanes, one after the other: (sample, 1) or, with columns, (1, position)."""
     if not np.ndim(value):
         return value
     flat = np.ravel(value)
+    if columns is not None and len(flat) > 1 and np.shape(value)[0] == 1 < np.ndim(value):
+        return flat[columns]
     return flat[rows] if len(flat) > 1 else float(flat[0])
 
 

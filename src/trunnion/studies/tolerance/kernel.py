@@ -27,7 +27,7 @@ from trunnion.studies.tolerance.inputs import Inputs
 if TYPE_CHECKING:
     from trunnion.solve.compiled import CompiledKernel
 
-__all__ = ["Kernel", "batch_of", "engine_for", "kernel_of", "references"]
+__all__ = ["Kernel", "batch_of", "engine_for", "kernel_of", "parts_of", "references"]
 
 
 AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20, "gpu": 1 << 22}  # numbers in an array, by engine
@@ -49,11 +49,7 @@ class OtherKernel:
 
     @cached_property
     def _parts(self) -> dict[str, tuple[Measure, int]]:
-        """Measure and number of each part of each course, by a name."""
-        found = self.numpy.solved(self.numpy.run.values, np.zeros(1))
-        counts = [len(measure.curve(found)) for measure in self.numpy.measures]
-        pairs = zip(self.numpy.measures, counts, strict=True)
-        return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
+        return parts_of(self.numpy)
 
     @cached_property
     def _compiled(self) -> CompiledKernel:
@@ -89,6 +85,14 @@ class OtherKernel:
         for name, (measure, _) in self._parts.items():
             found[measure.name] += (where_known(known(measure, status), curves[name]),)
         return found, status
+
+
+def parts_of(kernel: NumpyKernel) -> dict[str, tuple[Measure, int]]:
+    """Measure and number of each part of each course, by a name."""
+    found = kernel.solved(kernel.run.values, np.zeros(1))
+    counts = [len(measure.curve(found)) for measure in kernel.measures]
+    pairs = zip(kernel.measures, counts, strict=True)
+    return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
 
 
 def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> str:

@@ -24,7 +24,11 @@ from trunnion.solve.run import prepare
 
 pytest.importorskip("llvmlite")
 
+import benchmarks.gpu
+
 from stand_in_device import StandIn, as_text
+from trunnion.engines.device import ptx
+from trunnion.engines.graph import BOTH, Graph
 from trunnion.engines.program import program
 from trunnion.engines.reductions import NAMES, reductions
 from trunnion.solve.compiled_device import DeviceKernel
@@ -279,6 +283,24 @@ def test_reductions_are_ptx(tmp_path: Path) -> None:
     text = device.ptx(reductions()).rstrip(b"\0").decode()
     assert sorted(re.findall(r"\.entry (\w+)\(", text)) == sorted(NAMES)
     assemble(text, tmp_path)
+
+
+def test_the_benchmark_runs(
+    stand: StandIn, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(benchmarks.gpu, "JOBS", (("durango-fourbar", True),))
+    monkeypatch.setattr(benchmarks.gpu, "ptx", ptx)
+    benchmarks.gpu.main(["--rounds", "1", "--configurations", "7200"])
+    *_, last = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"\| durango-fourbar, friction \|( [\d.]+ \|){4}( \d+% \|){2}", last)
+
+
+def test_operations_are_counted() -> None:
+    """A product and a sum at once are two."""
+    graph = Graph()
+    x = graph.input("x", BOTH)
+    node = graph.apply("div", graph.apply("sqrt", graph.apply("add", graph.apply("mul", x, x), x)), x)
+    assert benchmarks.gpu.operations(program(graph, [node], 1, threads=True)) == 5
 
 
 @gpu

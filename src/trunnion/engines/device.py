@@ -100,7 +100,7 @@ class Device:
         """What a call of the driver gives; MechanismError if it fails."""
         error, *found = getattr(self.driver, name)(*args)
         if int(error):
-            remedy = f"let a batch be smaller by fewer positions, or {REMEDY}"
+            remedy = f"ask for fewer positions, or {REMEDY}"
             raise MechanismError(Finding(f"the GPU reports {_name(error)} at {name}", "engine", remedy))
         return found[0] if found else None
 

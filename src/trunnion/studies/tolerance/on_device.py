@@ -66,7 +66,7 @@ class DeviceReducer:
         with self.kernel.resident({**values, **self._meant}, np.asarray(time, float), samples, self._there) as found:
             for measure, (middle, bins) in zip(self.numpy.measures, self.bands, strict=True):
                 nominal = self.nominal[measure.name]
-                if _there(nominal):
+                if _stays(nominal):
                     course = _Course(found, f"{measure.name} number", nominal)
                     one, good = judged_course(course.curve, nominal)
                     counted = course.counted(middle, bins, samples)
@@ -90,7 +90,7 @@ class DeviceReducer:
         found = {}
         for measure in self.numpy.measures:
             nominal = self.nominal[measure.name]
-            for k, part in enumerate(nominal.parts if _there(nominal) else ()):
+            for k, part in enumerate(nominal.parts if _stays(nominal) else ()):
                 row = found[f"nominal.{measure.name}.{k}"] = np.zeros((1, self.positions))
                 row[0, nominal.window.index] = part
         return found
@@ -101,7 +101,7 @@ class DeviceReducer:
         figures: dict[str, Callable[[Backward], Number]] = {}
         for name, (measure, k) in self._parts.items():
             nominal = self.nominal[measure.name]
-            if not _there(nominal):
+            if not _stays(nominal):
                 figures[name] = _part(measure, k)
             elif not k:
                 figures[f"{measure.name} number"] = _number(measure, nominal)
@@ -112,7 +112,7 @@ class DeviceReducer:
         return known(next(one for one in self.numpy.measures if name.startswith(f"{one.name} ")), status)
 
 
-def _there(nominal: Reference) -> bool:
+def _stays(nominal: Reference) -> bool:
     """Whether a course stays on the device: it is judged by its extremes, at different positions."""
     index = nominal.window.index
     return nominal.measure.rule in OF_EXTREMES and len(np.unique(index)) == len(index) > 1

@@ -33,6 +33,13 @@ def ptx(text: str) -> bytes:
     """A module of LLVM as PTX, ended by a zero."""
     import llvmlite.binding as llvm
 
+    from trunnion.engines.machine_code import COMPILING
+
+    with COMPILING:
+        return _ptx(llvm, text)
+
+
+def _ptx(llvm: Any, text: str) -> bytes:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple("nvptx64-nvidia-cuda")
@@ -108,11 +115,8 @@ class Device:
         """Let this thread use the device."""
         self.call("cuCtxSetCurrent", self._context)
 
-    def function(self, text: str) -> Any:
-        """The kernel of a program."""
-        return self._functions(text, ["kernel"])["kernel"]
-
-    def _functions(self, text: str, names: Iterable[str]) -> dict[str, Any]:
+    def functions(self, text: str, names: Iterable[str]) -> dict[str, Any]:
+        """The kernels of a module, by name."""
         self.enter()
         module = self.call("cuModuleLoadData", ptx(text))
         return {name: self.call("cuModuleGetFunction", module, name.encode()) for name in names}
@@ -121,7 +125,7 @@ class Device:
     def _reductions(self) -> dict[str, Any]:
         from trunnion.engines.reductions import NAMES, reductions
 
-        return self._functions(reductions(), NAMES)
+        return self.functions(reductions(), NAMES)
 
     def reduce(self, name: str, threads: int, *args: int) -> None:
         """Run a kernel of `engines.reductions`."""
@@ -158,23 +162,11 @@ class Device:
 
 
 class DeviceCode:
-    """A program for the threads of a device, ready to run; as `machine_code.MachineCode`."""
+    """A program for the threads of a device, ready to run."""
 
     def __init__(self, program: Program, of: Device) -> None:
         self.device, self.inputs = of, program.inputs
-        self._function = of.function(program.text)
-
-    def run(
-        self,
-        inputs: Mapping[str, Array],
-        outputs: Sequence[Array],
-        samples: tuple[int, int],
-        positions: tuple[int, int],
-    ) -> None:
-        """Fill the outputs, (sample, position) from 0 on, on the device; then copy them here."""
-        with self.running(inputs, [array.dtype for array in outputs], samples[1], positions[1]) as (buffer, offsets):
-            for array, offset in zip(outputs, offsets, strict=True):
-                buffer.get(array, offset)
+        self._function = of.functions(program.text, ["kernel"])["kernel"]
 
     @contextmanager
     def running(

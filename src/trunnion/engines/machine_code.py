@@ -25,7 +25,7 @@ from trunnion.engines.program import Program
 from trunnion.files import cache_directory
 from trunnion.version import __version__
 
-__all__ = ["MachineCode", "vector_width"]
+__all__ = ["COMPILING", "MachineCode", "vector_width"]
 
 Array = NDArray[np.float64]
 COMPILING = Lock()  # LLVM's own state is not made for several threads

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ __all__ = ["DeviceKernel", "Resident", "differs"]
 PROBES = 64  # lanes of every run that NumPy computes too
 APART = 1e-6  # of their peak: more is no rounding, not even of a locking margin
 ZERO = 1e-9  # m, rad, N: what rounding may leave of a figure that is 0
-TURN = 2 * np.pi
+TURN, GOLDEN = 2 * np.pi, (5**0.5 - 1) / 2
 STATUS, DOUBT = "status of the lane", "doubt of the lane"
 
 Places = NDArray[np.int64]
@@ -89,7 +89,9 @@ class DeviceKernel(VectorKernel):
         """All lanes on the device. Raises MechanismError if some are not what NumPy finds."""
         inputs = inputs_of(values, time)
         samples, positions = found.status.shape
-        self.program(inputs).run(inputs.numbers, arrays_of(found), (0, samples), (0, positions))
+        with self._running(inputs, samples, positions) as (buffer, offsets):
+            for array, offset in zip(arrays_of(found), offsets, strict=True):
+                buffer.get(array, offset)
         lanes = _probes(samples * positions, np.flatnonzero(found.doubtful))
         curves = {name: curve.ravel()[lanes] for name, curve in found.curves.items()}
         self._verify(values, time, positions, lanes, Lanes(curves, found.status.ravel()[lanes], None))
@@ -104,9 +106,7 @@ class DeviceKernel(VectorKernel):
         """
         inputs, names = inputs_of(values, time), [*self.figures, STATUS, DOUBT]
         positions = time.shape[-1]
-        kinds = [np.dtype(float)] * len(self.figures) + [np.dtype(np.int8), np.dtype(bool)]
-        code: Any = self.program(inputs)
-        with code.running(inputs.numbers, kinds, samples, positions) as (buffer, offsets):
+        with self._running(inputs, samples, positions) as (buffer, offsets):
             found = Resident(self.device, buffer, dict(zip(names, offsets, strict=True)), samples, positions)
             doubtful = found.doubtful()
             lanes = _probes(samples * positions, doubtful)
@@ -120,6 +120,15 @@ class DeviceKernel(VectorKernel):
                     found.put(name, some, np.where(there(name, status), curve, np.nan))
                 found.put(STATUS, some, status)
             yield found
+
+    def _running(self, inputs: Any, samples: int, positions: int) -> AbstractContextManager[tuple[Buffer, list[int]]]:
+        """The figures, status and doubt of all lanes, see `DeviceCode.running`."""
+        kinds = [np.dtype(float)] * len(self.figures) + [np.dtype(np.int8), np.dtype(bool)]
+        code: Any = self.program(inputs)
+        running: AbstractContextManager[tuple[Buffer, list[int]]] = code.running(
+            inputs.numbers, kinds, samples, positions
+        )
+        return running
 
     def _verify(self, values: Values, time: Array, positions: int, lanes: Places, found: Lanes) -> None:
         """MechanismError unless some lanes, none in doubt, are what NumPy finds."""
@@ -148,8 +157,8 @@ class DeviceKernel(VectorKernel):
 
 
 def _probes(count: int, doubtful: Places) -> Places:
-    """Lanes spread over all, without those in doubt."""
-    return np.setdiff1d(np.linspace(0, count - 1, min(PROBES, count)).astype(np.int64), doubtful)
+    """Lanes spread over all samples and positions, by the golden section, without those in doubt."""
+    return np.setdiff1d((count * (np.arange(PROBES) * GOLDEN % 1.0)).astype(np.int64), doubtful)
 
 
 def differs(what: str) -> MechanismError:

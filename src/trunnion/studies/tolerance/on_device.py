@@ -35,7 +35,7 @@ OF_EXTREMES = (
     "dead centre, least", "deviation",
 )  # fmt: skip
 CHECKED = 4  # samples of every block whose figures and counts are worked out here too
-ROUNDED = 1e-9  # of a figure: Newton's method takes as many steps as the samples beside it need
+ROUNDED, ZERO = 1e-9, 1e-12  # of a figure, and in SI: Newton's method takes as many steps as the slowest sample needs
 
 
 class Reduced(NamedTuple):
@@ -73,7 +73,7 @@ class DeviceReducer:
                     counted = course.counted(middle, bins, samples)
                     _verify(course, one, middle, bins)
                 else:
-                    names = [name for name, (of, _) in self._parts.items() if of is measure]
+                    names = [name for name, (of, _) in self._figures.items() if of is measure]
                     one, good, curve = judged([found.rows(name, samples) for name in names], nominal)
                     counted = count((curve - middle).T, bins)
                 figures.append(one)
@@ -97,20 +97,26 @@ class DeviceReducer:
         return found
 
     @cached_property
-    def kernel(self) -> DeviceKernel:
-        """Of the one number that each figure is made of, or of all parts of its course."""
-        figures: dict[str, Callable[[Backward], Number]] = {}
+    def _figures(self) -> dict[str, tuple[Measure, Callable[[Backward], Number]]]:
+        """By a name the one number that a figure is made of, or all parts of its course, and of which measure."""
+        found = {}
         for name, (measure, k) in self._parts.items():
             nominal = self.nominal[measure.name]
             if not _stays(nominal):
-                figures[name] = _part(measure, k)
+                found[name] = measure, _part(measure, k)
             elif not k:
-                figures[f"{measure.name} number"] = _number(measure, nominal)
+                found[f"{measure.name} number"] = measure, _number(measure, nominal)
+        return found
+
+    @cached_property
+    def kernel(self) -> DeviceKernel:
+        """Of all that is read off a position."""
+        figures = {name: figure for name, (_, figure) in self._figures.items()}
         return DeviceKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method)
 
     def _there(self, name: str, status: NDArray[np.int8]) -> NDArray[np.bool_]:
         """Where a figure of the kernel has an answer."""
-        return known(next(one for one in self.numpy.measures if name.startswith(f"{one.name} ")), status)
+        return known(self._figures[name][0], status)
 
 
 def _stays(nominal: Reference) -> bool:
@@ -196,7 +202,7 @@ def _verify(course: _Course, figures: Array, middle: Array, bins: Bins) -> None:
     samples, nominal = min(CHECKED, course.found.samples), course.nominal
     rows = course.rows(samples)
     expected = judged_course(course_of(nominal, rows), nominal)[0]
-    if not np.allclose(figures[:samples], expected, rtol=ROUNDED, atol=ROUNDED**2, equal_nan=True):
+    if not np.allclose(figures[:samples], expected, rtol=ROUNDED, atol=ZERO, equal_nan=True):
         raise differs(f"the figures of '{nominal.measure.name}'")
     if not np.array_equal(course.counted(middle, bins, samples), count((rows - middle).T, bins)):
         raise differs(f"the counts of '{nominal.measure.name}'")

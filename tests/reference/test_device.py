@@ -192,7 +192,7 @@ def alike(mechanism: Mechanism, **options: Any) -> Any:
     for name in ("histogram", "failed", "samples", "yield", "yield_all", "band"):
         np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=name)
     for name in ("mean", "deviation", "least", "most", "kurtosis"):
-        np.testing.assert_allclose(found[name].values, expected[name].values, rtol=1e-11, err_msg=name)
+        np.testing.assert_allclose(found[name].values, expected[name].values, rtol=1e-11, atol=1e-15, err_msg=name)
     np.testing.assert_allclose(found["skewness"].values, expected["skewness"].values, rtol=1e-11, atol=1e-11)
     return found
 
@@ -232,6 +232,13 @@ def test_a_study_is_that_of_the_compiled_engine(stand: StandIn, rule: str) -> No
 def test_several_measures_at_once_by_even_points(stand: StandIn) -> None:
     some = {name.replace(" ", "-"): RULES[name] for name in ("deviation", "stroke", "mean", "reaction")}
     alike(with_measures(**some), methods=["quasi-monte-carlo"], samples=1000)
+
+
+def test_a_link_turned_in_space(stand: StandIn) -> None:
+    """Measures of which the name of one begins that of another."""
+    data = trunnion.read(EXAMPLES / "toleranced-rssr.yaml").data()
+    measures = {"turn": {"angle": "rod", "axis": "x"}, "turn again": {"angle": "rod", "axis": "y", "as": "maximum"}}
+    alike(Mechanism(**{**data, "measures": measures}))
 
 
 def test_samples_that_fail_are_those_of_the_compiled_engine(stand: StandIn) -> None:

@@ -92,7 +92,7 @@ def test_fewer_positions_than_a_vector_holds_are_refused() -> None:
         compiled(lambda x: (np.sin(x),), np.zeros(3), width=4)
 
 
-@pytest.mark.parametrize("name", ["sqrt", "abs", "floor", "tanh", "sign", "isfinite", "negative", "square"])
+@pytest.mark.parametrize("name", ["sqrt", "abs", "floor", "rint", "tanh", "sign", "isfinite", "negative", "square"])
 def test_functions_of_special_numbers(name: str) -> None:
     (found,) = compiled(lambda x: (getattr(np, name)(x),), SPECIAL)
     with np.errstate(all="ignore"):

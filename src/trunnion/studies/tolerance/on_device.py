@@ -69,7 +69,7 @@ class DeviceReducer:
                 nominal = self.nominal[measure.name]
                 if _stays(nominal):
                     course = _Course(found, f"{measure.name} number", nominal)
-                    one, good = judged_course(course.curve, nominal)
+                    one, good = judged_course(course.curve(samples), nominal)
                     counted = course.counted(middle, bins, samples)
                     _verify(course, one, middle, bins)
                 else:
@@ -120,9 +120,9 @@ class DeviceReducer:
 
 
 def _stays(nominal: Reference) -> bool:
-    """Whether a course stays on the device: it is judged by its extremes, at different positions."""
+    """Whether a course is one number a position, at different positions, so that it stays on the device."""
     index = nominal.window.index
-    return nominal.measure.rule in OF_EXTREMES and len(np.unique(index)) == len(index) > 1
+    return nominal.measure.rule not in ("line", "ratio", "work") and len(np.unique(index)) == len(index)
 
 
 def _part(measure: Measure, k: int) -> Callable[[Backward], Number]:
@@ -159,8 +159,10 @@ class _Course:
         if nominal.opened:
             self.place, self.gain = np.append(self.place, self.place[0]), np.append(self.gain, nominal.turns)
 
-    @property
-    def curve(self) -> Curve:
+    def curve(self, samples: int) -> Curve:
+        """The course of all samples: here, unless it is extremes alone that are looked for."""
+        if self.nominal.measure.rule not in OF_EXTREMES:
+            return course_of(self.nominal, self.rows(samples))
         return _Curve(*course_of(self.nominal, np.zeros(len(self.nominal.window.index)))._replace(number=self))
 
     def rows(self, samples: int) -> Array:

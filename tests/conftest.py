@@ -55,10 +55,10 @@ def _keep_what_is_asked_for_again() -> None:
     made: Callable[[Any], Any] = maker.get_command
 
     @cache
-    def kept(app: Any, verbs: int) -> Any:
+    def kept(app: Any, *verbs: Any) -> Any:
         return made(app)
 
-    maker.get_command = lambda app: kept(app, len(app.registered_commands))
+    maker.get_command = lambda app: kept(app, *(one.callback for one in app.registered_commands))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

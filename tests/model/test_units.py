@@ -73,19 +73,10 @@ def test_units_read_without_pint_are_as_pint_reads_them(monkeypatch: pytest.Monk
     texts += ["V/(rad/s)", "mV/(N m/s)"]
     short = {text: found for text in texts if (found := units._common(units.plain(text)))}
     assert len(short) > 0.9 * len(texts)
-    assert {
-        "N m",
-        "Nm",
-        "rad/s",
-        "m s^-2",
-        "1/s^2",
-        "1 / mm",
-        "bar",
-        "mV/(N m)",
-        "N m/(rad s)",
-        "V/(rad/s)",
-        "mV/(N m/s)",
-    } <= set(short)
+    assert {"N m", "Nm", "rad/s", "m s^-2", "1/s^2", "1 / mm", "bar", "mV/(N m)", "N m/(rad s)", "1/(N m)"} <= set(
+        short
+    )
+    assert {"V/(rad/s)", "mV/(N m/s)"} <= set(short)
     monkeypatch.setattr(units, "_common", lambda spaced: None)
     for text, (factor, exponents, names) in short.items():
         by_pint = units.root.__wrapped__(text)

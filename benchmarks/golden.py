@@ -114,7 +114,7 @@ def _swept(model: Path) -> str:
 
 def _command(words: list[str], folder: Path, name: str = "") -> None:
     """Run one command line in a folder; keep what it prints and its exit status there."""
-    from trunnion.__main__ import main
+    from trunnion.cli.app import main
 
     before, argv, printed, errors = Path.cwd(), sys.argv, io.StringIO(), io.StringIO()
     status: Any = 0

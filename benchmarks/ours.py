@@ -22,7 +22,7 @@ CHUNK = 8192  # positions at a time
 LINKS = ("crank", "coupler", "rocker")
 FORCE_OUTPUTS = OUTPUTS[:-1]  # without the number of iterations
 
-__all__ = ["compiled_side", "dataset_side", "trunnion_side"]
+__all__ = ["compiled_side", "compiled_threads_side", "dataset_side", "trunnion_side"]
 
 
 def trunnion_side(job: Job) -> Side | None:
@@ -46,8 +46,8 @@ def trunnion_side(job: Job) -> Side | None:
     return Side("Trunnion", job, run, np.transpose, columns, note=version("trunnion"))
 
 
-def compiled_side(job: Job) -> Side | None:
-    """The same numbers by the compiled engine on one thread; None where it is not installed."""
+def compiled_side(job: Job, threads: int = 1) -> Side | None:
+    """The same numbers by the compiled engine; None where it is not installed."""
     if not version("trunnion") or not version("llvmlite"):
         return None
     from trunnion.solve.compiled import Lanes
@@ -63,7 +63,7 @@ def compiled_side(job: Job) -> Side | None:
         return lambda back: list(_rows_of_forces(back))[k]
 
     kernel = VectorKernel(
-        prepared, {name: figure(k) for k, name in enumerate(columns)}, job != "motion", threads=1, described=job
+        prepared, {name: figure(k) for k, name in enumerate(columns)}, job != "motion", threads=threads, described=job
     )
 
     def run(n: int) -> Array:
@@ -74,9 +74,13 @@ def compiled_side(job: Job) -> Side | None:
         kernel.decide(prepared.values, times, lanes)
         return out[:, 0]
 
-    return Side(
-        "Trunnion compiled", job, run, np.transpose, columns, note=f"llvmlite {version('llvmlite')}, one thread"
-    )
+    name = "Trunnion compiled" if threads == 1 else f"Trunnion compiled, {threads} threads"
+    return Side(name, job, run, np.transpose, columns, note=f"llvmlite {version('llvmlite')}")
+
+
+def compiled_threads_side(job: Job) -> Side | None:
+    """The same on two threads."""
+    return compiled_side(job, threads=2)
 
 
 def dataset_side(job: Job) -> Side | None:

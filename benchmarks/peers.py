@@ -102,7 +102,8 @@ def pinocchio_side(job: Job) -> Side | None:
     """Drive torque and force in the cut joint C, without friction, by Pinocchio's RNEA on the opened loop.
 
     Chain A–B and chain D, cut at C; the force there makes the torques of the passive joints B and D vanish (a
-    2×2 solve). Motion is given, from the Numba loop and not timed: Pinocchio does not close loops in one step.
+    2×2 solve, of all positions at once). Motion and loads are given and not timed: Pinocchio does not close loops in
+    one step. What is left in the loop are its three calls and the copies of what they return.
     """
     if not version("pin"):
         return None
@@ -110,33 +111,27 @@ def pinocchio_side(job: Job) -> Side | None:
 
     model, frames = _pinocchio_model()
     data = model.createData()
-    placement = pin.SE3(np.eye(3), np.array([d.E_X, d.E_Y, 0.0]))
-    forces = pin.StdVec_Force()
-    forces.extend([pin.Force.Zero() for _ in range(model.njoints)])
+    first, second = frames
+    rnea, jacobians, jacobian, frame = (
+        pin.rnea, pin.computeJointJacobians, pin.getFrameJacobian, pin.LOCAL_WORLD_ALIGNED,
+    )  # fmt: skip
 
-    def one(q: Array, v: Array, a: Array) -> tuple[float, float, float]:
-        # loads in each link's own frame
-        c, s = math.cos(q[0] + q[1]), math.sin(q[0] + q[1])
-        at_e = pin.Force(np.array([c * d.FE_X + s * d.FE_Y, c * d.FE_Y - s * d.FE_X, 0.0]), np.zeros(3))
-        forces[2] = placement.act(at_e)
-        torque = pin.rnea(model, data, q, v, a, forces)
-        pin.computeJointJacobians(model, data, q)
-        j1, j2 = (pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:2] for frame in frames)
-        jacobian = j2 - j1  # of the gap at C: the rocker's C against the coupler's
-        force = np.linalg.solve(jacobian[:, 1:].T, torque[1:])  # on the rocker by the coupler
-        return force[0], force[1], torque[0] - jacobian[:, 0] @ force
+    def one(q: Array, v: Array, a: Array, loads: Any) -> tuple[Array, Array, Array]:
+        torque = rnea(model, data, q, v, a, loads)
+        jacobians(model, data, q)
+        return torque.copy(), jacobian(model, data, first, frame), jacobian(model, data, second, frame)
 
-    motion: dict[int, tuple[Array, Array, Array]] = {}
+    given: dict[int, tuple[Any, ...]] = {}
 
     def run(n: int) -> Array:
-        if n not in motion:
-            motion[n] = _pinocchio_motion(n)
-        out = np.empty((n, 3))
-        for k, (q, v, a) in enumerate(zip(*motion[n], strict=True)):
-            out[k] = one(q, v, a)
-        return out
+        if n not in given:
+            motion = _pinocchio_motion(n)
+            given[n] = (*(list(rows) for rows in motion), _pinocchio_loads(model.njoints, motion[0]))
+        torques, j1, j2 = (np.array(part) for part in zip(*map(one, *given[n]), strict=True))
+        gap = (j2 - j1)[:, :2]  # Jacobian of the gap at C: the rocker's C against the coupler's
+        force = np.linalg.solve(gap[:, :, 1:].transpose(0, 2, 1), torques[:, 1:, None])[:, :, 0]  # on the rocker
+        return np.column_stack([force, torques[:, 0] - np.sum(gap[:, :, 0] * force, axis=1)])
 
-    forces[3] = pin.Force(np.zeros(3), np.array([0.0, 0.0, d.M3_APPLIED]))
     columns = ("reaction.C.x", "reaction.C.y", "drive_torque")
     note = f"{version('pin')}, motion given"
     return Side("Pinocchio", job, run, np.asarray, columns, 5_000, note=note)
@@ -165,6 +160,20 @@ def _pinocchio_model() -> tuple[Any, tuple[int, int]]:
         return int(model.addFrame(pin.Frame(name, joint, place, pin.FrameType.OP_FRAME)))
 
     return model, (end(coupler, d.BC, "C of the coupler"), end(rocker, d.CD, "C of the rocker"))
+
+
+def _pinocchio_loads(joints: int, q: Array) -> list[Any]:
+    """The loads at each position, in each link's own frame."""
+    import pinocchio as pin
+
+    placement, found = pin.SE3(np.eye(3), np.array([d.E_X, d.E_Y, 0.0])), []
+    for c, s in zip(np.cos(q[:, 0] + q[:, 1]), np.sin(q[:, 0] + q[:, 1]), strict=True):
+        loads = pin.StdVec_Force()
+        loads.extend([pin.Force.Zero() for _ in range(joints)])
+        at_e = pin.Force(np.array([c * d.FE_X + s * d.FE_Y, c * d.FE_Y - s * d.FE_X, 0.0]), np.zeros(3))
+        loads[2], loads[3] = placement.act(at_e), pin.Force(np.zeros(3), np.array([0.0, 0.0, d.M3_APPLIED]))
+        found.append(loads)
+    return found
 
 
 def _pinocchio_motion(n: int) -> tuple[Array, Array, Array]:

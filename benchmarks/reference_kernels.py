@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +43,7 @@ __all__ = [
     "numba_loop",
     "numba_motion",
     "numba_side",
+    "numba_threads_side",
     "stacked_newton_euler",
     "stacked_side",
     "superposed_side",
@@ -54,11 +57,13 @@ MAX_ITERATIONS = 100
 # rounding decides the sign of the slip; below this share of the crank's speed it is taken as `zero_slip_sign`.
 ZERO_SLIP = 1e-12
 
+# As much of `fastmath` as leaves NaN and infinity what they are.
+FAST = {"contract", "reassoc", "arcp", "nsz", "afn"}
 # The compiled functions below are cached on disk and take the numbers of `durango` for constants: after a change
 # there, remove benchmarks/__pycache__.
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _sign(slip: float, threshold: float, at_zero: float) -> float:
     """sgn of a slip speed; `at_zero` within ± threshold."""
     if slip > threshold:
@@ -68,13 +73,13 @@ def _sign(slip: float, threshold: float, at_zero: float) -> float:
     return at_zero
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _length(x: float, y: float) -> float:
     """Length of a vector; a third of the whole loop faster than math.hypot, which guards against overflow."""
     return math.sqrt(x * x + y * y)
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _motion(theta: float, omega: float, branch: float) -> tuple[float, ...]:
     """Directions, speeds and accelerations of the links for a crank angle; omega is constant.
 
@@ -99,7 +104,7 @@ def _motion(theta: float, omega: float, branch: float) -> tuple[float, ...]:
     return c1, s1, c2, s2, c3, s3, w2, w3, e2, e3
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _loads(omega: float, motion: tuple[float, ...]) -> tuple[float, float, float, float, float, float]:
     """Applied and d'Alembert loads of coupler and rocker, moments about C.
 
@@ -120,7 +125,7 @@ def _loads(omega: float, motion: tuple[float, ...]) -> tuple[float, float, float
     return f2x, f2y, m2, f3x, f3y, m3
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _rrr_reactions(
     c2: float, s2: float, c3: float, s3: float, loads: tuple[float, ...], m2: float, m3: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -139,7 +144,7 @@ def _rrr_reactions(
     return fbx, fby, fcx, fcy, -fcx - f3x, -fcy - f3y
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _fill(theta: Array, omega: float, branch: float, radius: float, at_zero: float, out: Array) -> None:
     """Rows of `out` for the crank angles `theta`; radius = f′ r of every pin."""
     threshold = ZERO_SLIP * abs(omega)
@@ -195,7 +200,7 @@ def numba_loop(
     return out
 
 
-@njit(cache=True, fastmath=False)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _fill_motion(theta: Array, omega: float, branch: float, out: Array) -> None:
     """Angles, speeds and accelerations of the links, and position, velocity, acceleration of B and C."""
     for k in range(theta.size):
@@ -386,6 +391,27 @@ def numba_side(job: Job) -> Side | None:
     return Side(
         name, job, lambda n: numba_loop(crank_angles(n), friction_radius=radius), np.asarray, OUTPUTS, note=note
     )
+
+
+def numba_threads_side(job: Job) -> Side | None:
+    """The same with half the positions on each of two threads."""
+    one = numba_side(job)
+    if one is None:
+        return None
+    pool, radius = ThreadPoolExecutor(2), d.FRICTION_RADIUS if job == "friction" else 0.0
+
+    def run(n: int) -> Array:
+        theta, out = crank_angles(n), np.empty((n, len(one.columns)))
+        parts = [slice(0, n // 2), slice(n // 2, n)]
+        if job == "motion":
+            done = [pool.submit(_fill_motion, theta[part], d.OMEGA1, 1.0, out[part]) for part in parts]
+        else:
+            done = [pool.submit(_fill, theta[part], d.OMEGA1, 1.0, radius, 0.0, out[part]) for part in parts]
+        for each in done:
+            each.result()
+        return out
+
+    return replace(one, name="Numba loop, 2 threads", run=run)
 
 
 def stacked_side(job: Job) -> Side:

@@ -62,15 +62,22 @@ def timed(call: Callable[[], Any]) -> float:
     return time.perf_counter() - start
 
 
-def take_turns(sides: Iterable[Side], rounds: int) -> dict[str, float]:
-    """Best µs per configuration of each side; they run in turn so that a busy spell hits all of them."""
+def take_turns(sides: Iterable[Side], rounds: int, busy: dict[str, float] | None = None) -> dict[str, float]:
+    """Best µs per configuration of each side; they run in turn so that a busy spell hits all of them.
+
+    busy: is given the least µs of CPU of each, all threads together.
+    """
     sides = list(sides)
     best = dict.fromkeys((side.name for side in sides), math.inf)
     for round_ in range(rounds + 1):
         for side in sides:
+            begin = time.process_time()
             seconds = timed(partial(side.run, side.configurations))
+            spent, each = time.process_time() - begin, side.configurations * 1e-6
             if round_ > 0:  # the first warms caches and compilers
-                best[side.name] = min(best[side.name], seconds / side.configurations * 1e6)
+                best[side.name] = min(best[side.name], seconds / each)
+                if busy is not None:
+                    busy[side.name] = min(busy.get(side.name, math.inf), spent / each)
     return best
 
 

@@ -8,6 +8,7 @@ import signal
 from collections import defaultdict
 from collections.abc import Callable
 from functools import cache, lru_cache
+from importlib.util import find_spec
 from typing import Any
 
 import pytest
@@ -25,6 +26,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # Modules and cases of all tests live to the end: looking through them for what is left over, again and again, took a
 # quarter of the time of finding the tests and a twentieth of running them.
 gc.set_threshold(50_000, 20, 50)
+
+collect_ignore = [] if find_spec("uvicorn") else ["studio"]  # the extra studio is not installed
 
 # Every run the same cases, no database on disk, no deadline that a loaded machine could miss.
 settings.register_profile(
@@ -55,10 +58,10 @@ def _keep_what_is_asked_for_again() -> None:
     made: Callable[[Any], Any] = maker.get_command
 
     @cache
-    def kept(app: Any, verbs: int) -> Any:
+    def kept(app: Any, *verbs: Any) -> Any:
         return made(app)
 
-    maker.get_command = lambda app: kept(app, len(app.registered_commands))
+    maker.get_command = lambda app: kept(app, *(one.callback for one in app.registered_commands))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import openpyxl
 import pandas as pd
 import pytest
 import xarray as xr
@@ -16,6 +16,11 @@ from trunnion.results.tables.selection import selected
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 6
+
+
+def workbooks() -> Any:
+    pytest.importorskip("xlsxwriter")
+    return pytest.importorskip("openpyxl")
 
 
 def result_of(name: str) -> xr.Dataset:
@@ -86,11 +91,13 @@ def test_a_file_has_the_columns_asked_for(tmp_path: Path) -> None:
     trunnion.save(data, tmp_path / "motion.csv", columns=["motion"])
     table = pd.read_csv(tmp_path / "motion.csv")
     assert list(table) == names(data, "motion")
+    pytest.importorskip("pyarrow")
     data.trunnion.save(tmp_path / "some.parquet", columns=["A.effort"])
     assert list(pd.read_parquet(tmp_path / "some.parquet")) == ["time", "A.effort"]
 
 
 def test_a_workbook_has_heads_units_and_numbers(tmp_path: Path) -> None:
+    openpyxl = workbooks()
     data = result_of("durango-fourbar")
     trunnion.save(data, tmp_path / "cycle.xlsx")
     book = openpyxl.load_workbook(tmp_path / "cycle.xlsx")
@@ -107,6 +114,7 @@ def test_a_workbook_has_heads_units_and_numbers(tmp_path: Path) -> None:
 
 
 def test_a_workbook_has_a_sheet_for_each_table_and_no_formula(tmp_path: Path) -> None:
+    openpyxl = workbooks()
     data = trunnion.tolerance(
         trunnion.read(EXAMPLES / "toleranced-fourbar.yaml"), methods=("linear",), steps=STEPS, jobs=1
     )
@@ -119,6 +127,7 @@ def test_a_workbook_has_a_sheet_for_each_table_and_no_formula(tmp_path: Path) ->
 
 
 def test_the_same_result_gives_the_same_workbook(tmp_path: Path) -> None:
+    workbooks()
     data = result_of("durango-fourbar")
     for name in ("one", "two"):
         trunnion.save(data, tmp_path / f"{name}.xlsx")
@@ -126,6 +135,7 @@ def test_the_same_result_gives_the_same_workbook(tmp_path: Path) -> None:
 
 
 def test_positions_without_an_answer_are_empty_cells(tmp_path: Path) -> None:
+    openpyxl = workbooks()
     longer = trunnion.read(EXAMPLES / "durango-fourbar.yaml").with_values({"AB": "2.6 m"})
     data = trunnion.analyse(longer, 36)
     trunnion.save(data, tmp_path / "cycle.xlsx", columns=["A.effort", "status"])

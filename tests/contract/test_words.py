@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-import yaml
+from ruamel.yaml import YAML
 
 from trunnion import Mechanism, MechanismError, analyse, check, sweep
 from trunnion.errors import agreeing, counted
@@ -47,7 +47,7 @@ drivers: {A: {speed: 1 rad/s}}
 
 
 def model(text, **more):
-    return Mechanism.model_validate(yaml.safe_load(text) | more)
+    return Mechanism.model_validate(YAML(typ="safe").load(text) | more)
 
 
 def said(mechanism, steps=24):

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-import yaml
+from ruamel.yaml import YAML
 
 import trunnion
 from mechanisms import MODELS, build, five_bar, four_bar, watt_six_bar
@@ -63,7 +63,7 @@ def test_positions_without_an_assembly_are_told_whether_the_start_is_among_them(
 ) -> None:
     """They are not said to be out of reach from a start that does not close itself."""
     driver = {"range": [f"{low} mm", f"{high} mm"], "speed": f"{100 if high > low else -100} mm/s"}
-    model = trunnion.Mechanism.model_validate(yaml.safe_load(CLAMP) | {"drivers": {"Z": driver}})
+    model = trunnion.Mechanism.model_validate(YAML(typ="safe").load(CLAMP) | {"drivers": {"Z": driver}})
     (told,) = [row for row in findings(trunnion.analyse(model, 60)) if row["code"] == "assembly.open"]
     assert told["figures"]["start"] is start
     assert ("from the start" in told["what"]) != start

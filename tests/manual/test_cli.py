@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from unittest import mock
 
 import pandas as pd
 import pytest
@@ -429,6 +430,43 @@ def test_the_program_as_a_process(tmp_path: Path) -> None:
     bad = subprocess.run([str(program), "analyse", "missing.yaml"], capture_output=True, cwd=tmp_path, check=False)
     assert bad.returncode == 2
     assert b"Traceback" not in bad.stderr
+
+
+@pytest.mark.parametrize(("words", "status"), [(["check", str(FOUR_BAR)], 0), (["analyse", "missing.yaml"], 2)])
+def test_the_process_ends_at_once_but_with_all_that_is_due(words: list[str], status: int) -> None:
+    """What was printed is written, what was to be done at the end is done; modules are not taken down one by one."""
+    begin = """
+import atexit, sys
+from trunnion.__main__ import main
+import trunnion.cli.app as app
+app.VERBS[0].callback.undone = type("Undone", (), {"__del__": lambda _: print("taken down")})()
+run = app.main
+def started():
+    atexit.register(print, "at the end")
+    run()
+app.main = started
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", begin, *words], capture_output=True, text=True, check=False)
+    assert done.returncode == status
+    assert done.stdout.splitlines()[-1] == "at the end"
+    assert bool(done.stderr) == bool(status)
+
+
+def test_every_verb_is_found_with_the_options_of_one_read() -> None:
+    """Typer reads the options of the verb that is asked for; a wrong word is held against all."""
+    from trunnion.cli import app
+
+    with mock.patch.object(sys, "argv", ["trunnion", "chek"]), pytest.raises(SystemExit) as stop:
+        app.main()
+    assert stop.value.code == 2
+    for verb in app.VERBS:
+        assert verb.callback is not None
+        words = ["trunnion", verb.callback.__name__, "--help"]
+        with mock.patch.object(sys, "argv", words), pytest.raises(SystemExit) as stop:
+            app.main()
+        assert not stop.value.code
+    assert app.app.registered_commands is app.VERBS
 
 
 def test_help_needs_no_heavy_imports() -> None:

@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
-from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from measured_data.recording import Columns, mapping, off, recorded, text_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.tables import read_table
+
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
+ChannelObject, RootObject, TdmsWriter = (
+    getattr(pytest.importorskip("nptdms"), name) for name in ("ChannelObject", "RootObject", "TdmsWriter")
+)
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
-from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from measured_data.recording import mapping, read, recorded
 from trunnion.errors import MechanismError
@@ -20,6 +17,12 @@ from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.text_tables import HEAD
+
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
+ChannelObject, RootObject, TdmsWriter = (
+    getattr(pytest.importorskip("nptdms"), name) for name in ("ChannelObject", "RootObject", "TdmsWriter")
+)
 
 
 def _tdms(

@@ -31,6 +31,8 @@ def rig(tmp_path: Path) -> Path:
 
 
 def test_tables_and_files(program: Run, rig: Path, tmp_path: Path) -> None:
+    for package in ("h5netcdf", "pyarrow"):
+        pytest.importorskip(package)
     code, out, err = program(
         "data", "rig.json", "--units-row", *(f"--out=c{end}" for end in (".csv", ".nc", ".parquet", ".json"))
     )

@@ -70,11 +70,13 @@ def test_units_read_without_pint_are_as_pint_reads_them(monkeypatch: pytest.Monk
     pairs = [f"{a}{between}{b}" for a, b in product(known, known) for between in (" ", "/", "^2 * ")]
     texts = [*known, *pairs, "Nm", "kNm", "N m/rad s", "m s^-2", "kg m^2/s^2", "m/s/s", "N m s/rad"]
     texts += ["1/s^2", "1 / mm", "1/N m", "mV/(N m)", "mV/(N * m)", "N m/(rad s)", "1/(N m)", "mV/(V N)"]
+    texts += ["V/(rad/s)", "mV/(N m/s)"]
     short = {text: found for text in texts if (found := units._common(units.plain(text)))}
     assert len(short) > 0.9 * len(texts)
     assert {"N m", "Nm", "rad/s", "m s^-2", "1/s^2", "1 / mm", "bar", "mV/(N m)", "N m/(rad s)", "1/(N m)"} <= set(
         short
     )
+    assert {"V/(rad/s)", "mV/(N m/s)"} <= set(short)
     monkeypatch.setattr(units, "_common", lambda spaced: None)
     for text, (factor, exponents, names) in short.items():
         by_pint = units.root.__wrapped__(text)

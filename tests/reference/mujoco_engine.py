@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco as mj
 import numpy as np
+import pytest
 
 from mechanisms import Array, Data
+
+mj = pytest.importorskip("mujoco")
 
 __all__ = ["Engine"]
 

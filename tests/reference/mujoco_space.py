@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import mujoco as mj
 import numpy as np
+import pytest
 
 from reference.maximal_space import GAPS, SQUARE, Array, Data, Drive, Frame, Motion, cross, element
 from reference.space_oracle import Oracle
+
+mj = pytest.importorskip("mujoco")
 
 __all__ = ["Engine", "Forces"]
 

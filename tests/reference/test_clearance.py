@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mpmath as mp
 import numpy as np
 import pytest
 from scipy import optimize
@@ -27,6 +26,7 @@ from trunnion.joints.clearance import (
     worst_case,
 )
 
+mp = pytest.importorskip("mpmath")
 mp.mp.dps = 50
 CASES = 20_000
 

@@ -6,8 +6,6 @@ motor and load give along B. SciPy integrates the crank angle with the α of tha
 
 from __future__ import annotations
 
-import platform
-import sys
 from typing import Any
 
 import numpy as np
@@ -15,14 +13,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mechanisms import Array
+from reference.mujoco_engine import Engine, mj
 from trunnion import simulate
 from trunnion.model.mechanism import Mechanism
-
-if sys.platform == "darwin" and platform.machine() == "x86_64":
-    pytest.skip("MuJoCo is not built for Macs with Intel processors", allow_module_level=True)
-import mujoco as mj
-
-from reference.mujoco_engine import Engine
 
 STALL, NO_LOAD, ROTOR, LOAD = 8.0, 157.0, 1e-3, 40.0  # N m, rad/s, kg m², N
 AXIS = {"at": [0, 0], "axis": [1, 0]}

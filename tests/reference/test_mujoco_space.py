@@ -6,9 +6,6 @@ The engine is given the model's data and, to tell the assembly, the links' frame
 
 from __future__ import annotations
 
-import platform
-import sys
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,9 +14,6 @@ import trunnion
 from brief import brief
 from mechanisms_space import MODELS, cardan, rssr
 from reference.maximal_space import Data, Drive, Frame, unrolled
-
-if sys.platform == "darwin" and platform.machine() == "x86_64":
-    pytest.skip("MuJoCo is not built for Macs with Intel processors", allow_module_level=True)
 from reference.mujoco_space import Engine, quaternion
 
 STEPS = 8

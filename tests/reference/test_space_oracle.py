@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-import sys
-
 import numpy as np
 import pytest
 
@@ -93,7 +90,6 @@ def test_power_balances(name: str, friction: bool) -> None:
 
 
 @pytest.mark.spread(5)
-@pytest.mark.skipif(sys.platform == "darwin" and platform.machine() == "x86_64", reason="MuJoCo is not built there")
 @pytest.mark.parametrize("name", [n for n in ALL if n not in ("RSSH", "HUSR", "RECR", "RSFRC", "platform on six legs")])
 def test_mujoco_has_the_same_forces(name: str) -> None:
     """Two programs and two sets of coordinates: motion and forces to 1e-11."""

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 import xarray as xr
-import yaml
 from typer.testing import CliRunner
 
 import trunnion
@@ -117,7 +116,7 @@ def test_rss_whose_yield_is_short_is_an_error() -> None:
 
 def run(tmp_path: Path, mechanism: Mechanism, *arguments: str) -> tuple[int, str, str]:
     path = tmp_path / "model.yaml"
-    path.write_text(yaml.safe_dump(mechanism.data(), sort_keys=False), encoding="utf-8")
+    path.write_text(json.dumps(mechanism.data()), encoding="utf-8")
     told = CliRunner().invoke(app, [arguments[0], str(path), *arguments[1:]])
     return told.exit_code, told.stdout, told.stderr
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from ruamel.yaml import YAML
 
 import trunnion
 from trunnion.errors import MechanismError, Severity
@@ -196,7 +196,7 @@ def test_a_load_at_rest_reads_nothing(tmp_path: Path) -> None:
 
 def test_truth_tells_what_was_drawn(seen: Observation, tmp_path: Path) -> None:
     seen.write(tmp_path)
-    truth = yaml.safe_load((tmp_path / "truth.yaml").read_text("utf-8"))
+    truth = YAML(typ="safe").load((tmp_path / "truth.yaml").read_text("utf-8"))
     assert truth["seed"] == 4
     assert truth["sensors"]["T1"]["gain_error"] == seen.drawn["T1"].gain
     assert truth["conditions"][0]["efficiency"] == seen.cases[0].efficiency

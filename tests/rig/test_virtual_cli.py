@@ -194,6 +194,7 @@ def test_a_rig_that_fails_leaves_nothing(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, form: str, error: BaseException
 ) -> None:
     """Neither files of the one that failed nor, where there was an earlier one, other ones than its own."""
+    pytest.importorskip({"csv": "pandas", "parquet": "pyarrow", "tdms": "nptdms"}[form])
     (tmp_path / "rig.yaml").write_text(GOOD.replace("rate: 1 kHz", "rate: 500 Hz"), encoding="utf-8")
     rig, model = Rig.read(tmp_path / "rig.yaml"), trunnion.read(FOUR_BAR)
     seen = trunnion.rig.observe(model, rig, 1)

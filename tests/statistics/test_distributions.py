@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -99,6 +98,7 @@ def test_mirrored_to_the_last_bits(name: str, options: dict[str, Any], known: An
 @pytest.mark.parametrize("shift", [-2e-4, 1.5e-4, 3.0])
 def test_cut_off_far_from_the_mean(shift: float) -> None:
     """A mean far beyond a limit: against mpmath; so far that only logarithms are left (3 m): exponential."""
+    mpmath = pytest.importorskip("mpmath")
     kind, options = DISTRIBUTIONS["truncated"], {"cp": 1.0, "shift": shift}
     mean, sigma = normal_parameters(LOW, HIGH, options)
     u = np.array([1e-12, 1e-3, 0.2, 0.5, 0.9])

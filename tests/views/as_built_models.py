@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
 
 import trunnion
 from trunnion import Mechanism
@@ -36,7 +36,7 @@ assembly: {C: [0.09, 0.06]}
 def four_bar_model(**errors: str) -> Mechanism:
     """The four-bar with its pin B at ξ = 30°, and with errors of dimensions."""
     stated = "".join(f"\n  {name}: {value}" for name, value in errors.items())
-    return Mechanism.model_validate(yaml.safe_load(FOUR_BAR + (f"errors:{stated}\n" if stated else "")))
+    return Mechanism.model_validate(YAML(typ="safe").load(FOUR_BAR + (f"errors:{stated}\n" if stated else "")))
 
 
 def four_bar(steps: int = 72, **errors: str) -> Any:

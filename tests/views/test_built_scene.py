@@ -52,10 +52,10 @@ def test_points_less_their_errors_are_those_of_the_ideal_mechanism():
 
 
 def _without_errors():
-    import yaml
     from as_built_models import FOUR_BAR
+    from ruamel.yaml import YAML
 
-    return trunnion.Mechanism.model_validate(yaml.safe_load(FOUR_BAR.replace(", seat: {xi: 30 deg}", "")))
+    return trunnion.Mechanism.model_validate(YAML(typ="safe").load(FOUR_BAR.replace(", seat: {xi: 30 deg}", "")))
 
 
 @pytest.mark.slow

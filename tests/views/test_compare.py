@@ -269,6 +269,8 @@ def test_every_class_of_the_page_has_a_style_and_print_its_rules():
 
 
 def test_tables_of_files(tmp_path):
+    for package in ("h5netcdf", "pyarrow"):
+        pytest.importorskip(package)
     result = case("family")
     trunnion.save(result, tmp_path / "x.csv")
     trunnion.save(result, tmp_path / "x.figures.csv", units_row=True)

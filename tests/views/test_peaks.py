@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-import yaml
+from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
 from trunnion import Mechanism, analyse
@@ -34,7 +34,7 @@ assembly: {{P: [0, 35 mm], Q: [125 mm, 0]}}
 
 
 def model(text):
-    return Mechanism.model_validate(yaml.safe_load(text))
+    return Mechanism.model_validate(YAML(typ="safe").load(text))
 
 
 def press(between="330 deg, 340 deg"):

@@ -329,6 +329,9 @@ def _version(show: bool) -> None:
         raise typer.Exit
 
 
+VERBS = app.registered_commands
+
+
 @app.callback()
 def _options(
     version: Annotated[
@@ -349,8 +352,15 @@ def main() -> None:
     words = sys.argv[1:]
     end = words.index("--") if "--" in words else len(words)
     debug = "--debug" in words[:end]  # before or behind the verb
-    sys.argv[1:] = [word for place, word in enumerate(words) if word != "--debug" or place > end]
-    sys.exit(status_of(app, debug))
+    words = [word for place, word in enumerate(words) if word != "--debug" or place > end]
+    sys.argv[1:] = words
+    named = [one for one in VERBS if one.callback and one.callback.__name__ in words[:1]]
+    app.registered_commands = named or VERBS  # Typer reads the options of all: those of one verb are a twentieth
+    try:
+        status = status_of(app, debug)
+    finally:
+        app.registered_commands = VERBS
+    sys.exit(status)
 
 
 # ---- shared by the verbs --------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ def studio(
         from trunnion.studio.server import Studio
     except ImportError:
         what = "the studio is not installed"
-        raise MechanismError(Finding(what, remedy="install it: pip install trunnion[studio]")) from None
+        raise MechanismError(Finding(what, remedy="install it: pip install 'trunnion[studio]'")) from None
     path = (file or Path()).resolve()
     if file is not None and not path.exists():
         raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))

@@ -165,6 +165,7 @@ _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "mN": ("millinewton", Fraction(1, 1000), _NEWTON),
     "kN": ("kilonewton", Fraction(1000), _NEWTON),
     "MPa": ("megapascal", Fraction(10**6), _PASCAL),
+    "GPa": ("gigapascal", Fraction(10**9), _PASCAL),
     "bar": ("bar", Fraction(10**5), _PASCAL),
     # of the settings of a test rig
     "V": ("volt", Fraction(1), _VOLT),
@@ -180,8 +181,8 @@ _PRODUCT_OF_COMMON = re.compile(rf"(?:1 ?/ ?)?{_FACTOR.pattern}(?: ?[ */] ?{_FAC
 def _common(spaced: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]] | None:
     """`root` of a product of the units in `_COMMON`, each once, without pint; None of any other."""
     spaced = spaced[1:-1] if re.fullmatch(r"\([^()]*\)", spaced) else spaced
-    if found := re.fullmatch(r"([^()]*/) ?\(([^()/^]*)\)", spaced):  # mV/(N m) is mV/N/m
-        spaced = found[1] + re.sub(r" ?[ *] ?", "/", found[2].strip())
+    if found := re.fullmatch(r"([^()]*/) ?\(([^()^]*)\)", spaced):  # mV/(N m) is mV/N/m, V/(rad/s) is V/rad*s
+        spaced = found[1] + re.sub(r" ?([ */]) ?", lambda sign: "*" if sign[1] == "/" else "/", found[2].strip())
     if not _PRODUCT_OF_COMMON.fullmatch(spaced):
         return None
     total, exponents, names = Fraction(1), dict[str, Fraction](), list[str]()

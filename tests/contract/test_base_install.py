@@ -1,0 +1,109 @@
+"""Without any extra every verb works; what only an extra brings is asked for by its name."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from trunnion.cli.app import VERBS
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+FOUR_BAR, TOLERANCED = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "toleranced-fourbar.yaml"
+LAB = [TOLERANCED, "lab/mapping.yaml"]
+# every verb, with as many positions or samples as `auto` would compile for
+WORK = [
+    ["check", FOUR_BAR],
+    ["analyse", FOUR_BAR, "--steps", 150_000],
+    ["analyse", FOUR_BAR, "--steps", 12, "--out", "a.csv", "--out", "a.json", "--out", "a.nc"],
+    ["design", FOUR_BAR],
+    ["locking", FOUR_BAR, "--steps", 12],
+    ["simulate", EXAMPLES / "flywheel-press.yaml", "--time", "0.1 s"],
+    ["assemble", EXAMPLES / "misaligned-hinges.yaml", "--steps", 12],
+    ["sweep", FOUR_BAR, "--over", "AB=1.9m:2.0m:20", "--over", "gravity.y=0:-10:21"],
+    ["tolerance", TOLERANCED, "--samples", 5000, "--steps", 36],
+    ["allocate", TOLERANCED],
+    ["play", EXAMPLES / "fourbar-with-play.yaml"],
+    ["rig", TOLERANCED, "rig.yaml", "--out", "lab"],
+    ["data", "lab/mapping.yaml"],
+    ["compare", *LAB],
+    ["identify", *LAB, "--parameter", "joint_defaults.friction.coefficient"],
+    ["plot", FOUR_BAR, "--kind", "torque", "--out", "torque.svg"],
+    ["report", FOUR_BAR, "--steps", 36, "--out", "report.html"],
+    ["examples"],
+    ["schema"],
+]
+REFUSED = {
+    "compiled": ["sweep", FOUR_BAR, "--over", "AB=1.9m,2.0m", "--engine", "compiled"],
+    "parquet": ["analyse", FOUR_BAR, "--out", "a.parquet"],
+    "zarr": ["analyse", FOUR_BAR, "--out", "a.zarr"],
+    "xlsx": ["analyse", FOUR_BAR, "--out", "a.xlsx"],
+    "studio": ["studio", FOUR_BAR],
+    "jax": ["tolerance", TOLERANCED, "--engine", "jax"],
+    "tdms": ["data", "lab/mapping.yaml", "lab/run.tdms"],
+    "cluster": ["tolerance", TOLERANCED, "--cluster", "local"],
+}
+# the packages of the extras are not there, nor found by who only looks for them
+BASE = """
+import contextlib, io, json, sys
+from importlib.machinery import PathFinder
+hidden, work = json.loads(sys.stdin.read())
+class Base(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        return None if name.partition(".")[0] in hidden else super().find_spec(name, path, target)
+if __name__ == "__main__":
+    sys.meta_path[sys.meta_path.index(PathFinder)] = Base
+    from trunnion.cli.app import main
+    ends = []
+    for words in work:
+        sys.argv, told = ["trunnion", *words], io.StringIO()
+        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
+            try:
+                main()
+            except SystemExit as end:
+                ends.append((int(end.code or 0), told.getvalue()))
+    print(json.dumps(ends))
+"""
+
+
+def extras() -> dict[str, list[str]]:
+    """Packages by the extra that brings them, of those that a user installs."""
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    return {name: [one.partition(">")[0] for one in stated[name]] for name in stated if name not in ("dev", "bench")}
+
+
+@pytest.fixture(scope="module")
+def ends(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
+    """Exit status and words of every command, all in one process without the packages of extras."""
+    folder = tmp_path_factory.mktemp("base")
+    rig = (EXAMPLES / "rig" / "fourbar-rig.yaml").read_text("utf-8")
+    (folder / "rig.yaml").write_text(rig.replace("turns: 30", "turns: 8"), encoding="utf-8")
+    hidden = [*(name for names in extras().values() for name in names), "dask"]
+    work = [[str(word) for word in words] for words in (*WORK, *REFUSED.values())]
+    done = subprocess.run(
+        [sys.executable, "-c", BASE], input=json.dumps([hidden, work]), capture_output=True, text=True, cwd=folder,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return [(code, told) for code, told in json.loads(done.stdout.splitlines()[-1])]
+
+
+def test_every_verb_works(ends: list[tuple[int, str]]) -> None:
+    """Findings about the mechanism (1) are none about the installation."""
+    assert {words[0] for words in WORK} | {"studio"} == {one.callback.__name__ for one in VERBS if one.callback}
+    for words, (code, told) in zip(WORK, ends, strict=False):
+        assert code in (0, 1), (words, told)
+        assert "pip install" not in told, (words, told)
+
+
+def test_what_an_extra_brings_is_asked_for_by_its_name(ends: list[tuple[int, str]]) -> None:
+    assert REFUSED.keys() == extras().keys() - {"netcdf"}  # SciPy writes NetCDF too
+    for extra, (code, told) in zip(REFUSED, ends[len(WORK) :], strict=True):
+        assert code == 2, (extra, told)
+        assert f"pip install 'trunnion[{extra}]'" in told, (extra, told)

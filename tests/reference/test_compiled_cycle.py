@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -272,3 +274,20 @@ def test_mechanisms_with_errors_and_without_go_by_programs_of_their_own() -> Non
     assert np.nanmax(one["transmission_error_max"].values) > 1e-5
     for name in ("transmission_error_max", "drive_effort_max", "efficiency", "efficiency_ideal"):
         np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+@pytest.mark.parametrize("example", ["durango-fourbar", "fourbar-by-grades"])
+def test_the_memory_of_a_result_goes_with_it(example: str, engine: str) -> None:
+    """At once, not when Python looks for objects that hold each other: a result may take all the memory there is."""
+    mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
+    trunnion.analyse(mechanism, 24, engine=engine)
+    gc.collect()
+    gc.disable()
+    try:
+        result = trunnion.analyse(mechanism, 24, engine=engine)
+        held = [weakref.ref(result[name].variable.values) for name in ("point_position", "reaction_force", "status")]
+        del result
+        assert [array() for array in held] == [None] * len(held)
+    finally:
+        gc.enable()

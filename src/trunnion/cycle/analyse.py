@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.cycle import summary
+from trunnion.cycle.kept import ALL, Kept
 from trunnion.deprecation import renamed
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
@@ -29,6 +30,8 @@ def analyse(
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     engine: str = "auto",
+    variables: Sequence[str] | None = None,
+    dtype: str = "float64",
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -37,11 +40,15 @@ def analyse(
     friction_method: how friction and reactions are settled; Newton's method if not given.
     progress: called with the number of positions done. engine: numpy, compiled (an extra: machine code, which pays
     from some 10⁵ positions on), or auto: compiled where it is installed, pays and can do the mechanism.
+    variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
+    are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
+    float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
-    Raises MechanismError if the structure does not determine the motion, `steps` is out of range, or the engine is not
-    installed or cannot do the mechanism.
+    Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
+    unknown, or the engine is not installed or cannot do the mechanism.
     """
-    return analysed(mechanism, steps, friction_method, progress, engine).dataset
+    kept = Kept.read(variables, dtype)
+    return analysed(mechanism, steps, friction_method, progress, engine, kept).dataset
 
 
 @np.errstate(all="ignore")
@@ -51,13 +58,15 @@ def analysed(
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     engine: str = "auto",
+    kept: Kept = ALL,
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    return summary.result_of(run, positions(run, steps, method, progress, engine=engine))
+    found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
+    return summary.result_of(run, found, kept)
 
 
 @np.errstate(all="ignore")

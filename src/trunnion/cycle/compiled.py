@@ -67,9 +67,7 @@ class CycleKernel:
     ) -> None:
         self._write = write
         # not the arrays: the kernel and its figures hold each other, so whatever they hold is freed late
-        self._flags = {
-            name: _Flags(array.flags.writeable, bool(array.strides[-1])) for name, array in arrays.items()
-        }
+        self._flags = {name: _Flags(array.flags.writeable, bool(array.strides[-1])) for name, array in arrays.items()}
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
             numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))

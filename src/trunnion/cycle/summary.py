@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
+from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
@@ -22,7 +23,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
-from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
+from trunnion.results.attributes import KEPT, cited, encoded, figure_rows, finding_rows, origin
 from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import quantity
@@ -37,11 +38,12 @@ if TYPE_CHECKING:
     from trunnion.cycle.positions import Positions
     from trunnion.solve.run import Run
 
-from trunnion.cycle.model_measures import positions_told, watched
+from trunnion.cycle.model_measures import Watched, positions_told, watched
 from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "dataset_of",
     "effort_units",
     "inputs",
     "model_notes",
@@ -73,8 +75,11 @@ PEZZUTI = (
 )
 
 
-def result_of(run: Run, found_positions: Positions) -> Result:
-    """The result with its attributes: formula, findings, summary, input data, drawing data, provenance."""
+def result_of(run: Run, found_positions: Positions, kept: Kept = ALL) -> Result:
+    """The result with its attributes: formula, findings, summary, input data, drawing data, provenance.
+
+    kept: the variables that its Dataset has.
+    """
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
@@ -92,15 +97,20 @@ def result_of(run: Run, found_positions: Positions) -> Result:
             **_ranges(run, found_positions, near),
             **drawn,
             "periodic": int(run.cycle.periodic),
+            **({} if kept.variables is None else {KEPT: kept.variables}),
         }
     )
 
-    def build() -> xr.Dataset:
-        along = driven(time, *run.system.dial(run.values, time))
-        means, ideal = found_positions.means, found_positions.ideal
-        return measured.joined(results.dataset(arrays, found_positions.labels, along, means, attributes, ideal))
+    return Result(attributes, lambda: dataset_of(run, found_positions, measured, attributes, kept))
 
-    return Result(attributes, build)
+
+def dataset_of(
+    run: Run, found: Positions, measured: Watched, attributes: Mapping[str, Any], kept: Kept = ALL
+) -> xr.Dataset:
+    """The Dataset of some positions."""
+    along = driven(found.time, *run.system.dial(run.values, found.time))
+    own = found.arrays, found.labels, along, found.means, attributes, found.ideal
+    return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
@@ -300,9 +310,9 @@ def _friction_figures(
 ) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
     valid = found.arrays["status"] != Status.CONTACT_LOST
-    yield near_locking.least_margin(
-        "locking_margin", "locking margin", np.where(valid, found.arrays["locking_margin"], np.nan), dial, TIMES
-    )
+    if found.method.margin_up_to:
+        margin = np.where(valid, found.arrays["locking_margin"], np.nan)
+        yield near_locking.least_margin("locking_margin", "locking margin", margin, dial, TIMES)
     yield from near.figures(run, dial) if near else ()
     yield Figure("friction_power_mean", "friction power", found.means.friction_power.net, "W", "mean")
     if len(sound):

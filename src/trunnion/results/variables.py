@@ -205,6 +205,13 @@ def allocate(
     return arrays
 
 
+def _as(array: NDArray[Any], dtype: str) -> NDArray[Any]:
+    """The array with floats of some kind; what takes no memory takes none."""
+    if array.dtype != np.float64 or dtype == "float64":
+        return array
+    return array.astype(dtype) if array.flags.writeable else np.broadcast_to(np.zeros((), dtype), array.shape)
+
+
 def dataset(
     arrays: Mapping[str, NDArray[np.float64]],
     labels: Labels,
@@ -212,10 +219,15 @@ def dataset(
     means: CycleMeans,
     attributes: Mapping[str, Any],
     ideal: CycleMeans | None = None,
+    kept: Collection[str] | None = None,
+    dtype: str = "float64",
 ) -> xr.Dataset:
-    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`."""
+    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; kept: variables of
+    every position that it has, all if not given; dtype: of their floats.
+    """
     known = {name: one.over("position") for name, one in variables(_space(labels)).items()}
-    found = described(arrays, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
+    own = {name: _as(array, dtype) for name, array in arrays.items() if kept is None or name in kept}
+    found = described(own, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
     if ideal is not None:
         found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
     return dataset_of("cycle", found, labels, attributes, along)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle import summary
+from trunnion.cycle import blocks, summary
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.deprecation import renamed
 from trunnion.model.mechanism import Mechanism
@@ -16,6 +17,7 @@ from trunnion.solve.friction_method import FrictionMethod
 if TYPE_CHECKING:
     import xarray as xr
 from trunnion.cycle.positions import check_steps, positions
+from trunnion.results.export import save
 from trunnion.results.result import Result
 from trunnion.solve.run import Run, prepare
 
@@ -32,6 +34,8 @@ def analyse(
     engine: str = "auto",
     variables: Sequence[str] | None = None,
     dtype: str = "float64",
+    out: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
+    **saved: Any,
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -43,12 +47,16 @@ def analyse(
     variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
     are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
     float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
+    out: files to write, as by `save`, whose other arguments are `saved`. Beyond `blocks.BLOCK` positions .csv,
+    .parquet, .zarr and .nc are solved and written a block at a time, so that memory does not grow with their number;
+    the Dataset then has as many positions as a block, and a finding says what is of these alone.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
     unknown, or the engine is not installed or cannot do the mechanism.
     """
     kept = Kept.read(variables, dtype)
-    return analysed(mechanism, steps, friction_method, progress, engine, kept).dataset
+    paths = [out] if isinstance(out, (str, os.PathLike)) else out
+    return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved).dataset
 
 
 @np.errstate(all="ignore")
@@ -59,14 +67,21 @@ def analysed(
     progress: Callable[[int], None] | None = None,
     engine: str = "auto",
     kept: Kept = ALL,
+    out: blocks.Paths = (),
+    saved: Mapping[str, Any] | None = None,
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
+    if blocks.blocked(run, steps, out):
+        return blocks.written(run, steps, out, method, progress, engine, kept, saved)
     found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
-    return summary.result_of(run, found, kept)
+    result = summary.result_of(run, found, kept)
+    for path in out:
+        save(result.dataset, path, **(saved or {}))
+    return result
 
 
 @np.errstate(all="ignore")

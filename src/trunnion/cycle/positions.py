@@ -73,18 +73,20 @@ def positions(
     averaged: bool = True,
     engine: str = "auto",
     wanted: Collection[str] | None = None,
+    among: int = 0,
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
     margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
     are, which ask for many positions more; they are NaN if not. engine: see `compiled.cycle_kernels`. wanted: the
-    variables that will be read beside those that the books of the cycle are made of, all if not given.
+    variables that will be read beside those that the books of the cycle are made of, all if not given; among: how many
+    positions there will be in all, if more.
     """
     check_steps(steps)
     _refuse_seats(run)
     method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
-    found = stretch(run, run.cycle.times(steps), method, engine, wanted, progress=progress)
+    found = stretch(run, run.cycle.times(steps), method, engine, wanted, progress=progress, among=among)
     if not averaged:
         return found
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now

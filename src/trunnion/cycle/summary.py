@@ -43,8 +43,10 @@ from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "books",
     "dataset_of",
     "effort_units",
+    "figures",
     "inputs",
     "model_notes",
     "references",
@@ -75,11 +77,14 @@ PEZZUTI = (
 )
 
 
-def result_of(run: Run, found_positions: Positions, kept: Kept = ALL) -> Result:
-    """The result with its attributes: formula, findings, summary, input data, drawing data, provenance.
+def result_of(run: Run, found: Positions, kept: Kept = ALL) -> Result:
+    """The result of a cycle. kept: the variables that its Dataset has."""
+    attributes, measured = books(run, found, kept)
+    return Result(attributes, lambda: dataset_of(run, found, measured, attributes, kept))
 
-    kept: the variables that its Dataset has.
-    """
+
+def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[str, Any], Watched]:
+    """What the result says: formula, findings, summary, input data, drawing data, provenance; and the measures."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
@@ -93,7 +98,7 @@ def result_of(run: Run, found_positions: Positions, kept: Kept = ALL) -> Result:
             "driver_units": effort_units(run.system),
             "spring_units": spring_units(run.system),
             "findings": finding_rows([*found, *measured.findings]),
-            "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
+            "summary": figure_rows([*figures(run, found_positions, near), *measured.summary()]),
             **_ranges(run, found_positions, near),
             **drawn,
             "periodic": int(run.cycle.periodic),
@@ -101,7 +106,7 @@ def result_of(run: Run, found_positions: Positions, kept: Kept = ALL) -> Result:
         }
     )
 
-    return Result(attributes, lambda: dataset_of(run, found_positions, measured, attributes, kept))
+    return attributes, measured
 
 
 def dataset_of(
@@ -267,7 +272,7 @@ def references(mechanism: Mechanism) -> list[str]:
     return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
-def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> Iterator[Figure]:
+def figures(run: Run, found: Positions, near: near_locking.Locking | None = None) -> Iterator[Figure]:
     """The figures one looks at first."""
     arrays, status, means = found.arrays, found.arrays["status"], found.means
     dial, counted = run.system.dial(run.values, found.time), status < Status.NOT_CONVERGED

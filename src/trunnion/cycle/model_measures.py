@@ -108,8 +108,10 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
     figures = np.array([of_cycle.get(one.name, np.nan) for one in measures], float)
     valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
     notes: dict[str, str] = {}
+    if np.all(valid):
+        return Watched(run, measures, values, figures, findings, valid, notes)
     dial = run.system.dial(run.values, time)
-    for i, measure in enumerate(measures if not np.all(valid) else ()):
+    for i, measure in enumerate(measures):
         if measure.rule == "deviation":
             continue
         there = _resting_on(run, measure, values[i], time)

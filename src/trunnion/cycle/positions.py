@@ -28,7 +28,7 @@ from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.switches import Mechanisms
-from trunnion.solve.system import Values
+from trunnion.solve.system import Dial, Values
 
 __all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"]
 
@@ -55,6 +55,7 @@ class Positions:
     arrays: Arrays
     labels: dict[str, list[str]]
     time: NDArray[np.float64]
+    dial: Dial
     method: FrictionMethod
     causes: diagnosis.Causes
     means: Means
@@ -136,7 +137,8 @@ def stretch(
     fill_of(run.system).unwrap(arrays, run.system, run.values, time, tails)
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     meant = still(ideal) if run.erring else None
-    return Positions(arrays, labels, time, method, causes, still(arrays), meant, losses, walked, ideal)
+    dial = run.system.dial(run.values, time)
+    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal)
 
 
 def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:

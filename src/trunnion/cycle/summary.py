@@ -62,6 +62,7 @@ JUMP, STEADY = (
     0.2,
     2e-3,
 )  # of the largest effort: what drops by more is a jump, what changes by less is steady beside it
+RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 TIMES = "times the friction"  # what a locking margin is
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
@@ -113,7 +114,7 @@ def dataset_of(
     run: Run, found: Positions, measured: Watched, attributes: Mapping[str, Any], kept: Kept = ALL
 ) -> xr.Dataset:
     """The Dataset of some positions."""
-    along = driven(found.time, *run.system.dial(run.values, found.time))
+    along = driven(found.time, *found.dial)
     own = found.arrays, found.labels, along, found.means, attributes, found.ideal
     return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
 
@@ -126,10 +127,10 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *run.chosen.findings,
         *run.once("far hints", lambda: list(_far_hints(run))),
         *(run.determinacy.findings() if run.determinacy else []),
-        *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
+        *_over_the_cycle(run, at, near),
         *_missed_peaks(run.system, at),
         *_beside_jumps(run, at),
-        *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
+        *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
 
 
@@ -194,20 +195,14 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     return notes
 
 
-def _over_the_cycle(
-    run: Run,
-    arrays: Arrays,
-    causes: diagnosis.Causes,
-    time: NDArray[np.float64],
-    near: near_locking.Locking | None,
-) -> list[Finding]:
-    units = effort_units(run.system)
+def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) -> list[Finding]:
+    arrays, units = at.arrays, effort_units(run.system)
     efforts = {
         name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near,
+        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, near,
         felt(run.system, run.values),
     )  # fmt: skip
     found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []
@@ -216,7 +211,7 @@ def _over_the_cycle(
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else "driver and the gears"
         found.append(finding_for("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom}))
-    return [*found, *_loads_over_the_cycle(run, arrays, time)]
+    return [*found, *_loads_over_the_cycle(run, at)]
 
 
 def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
@@ -232,7 +227,7 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
 
 def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
     """Efforts that are largest beside a jump, of a load or of friction: how much more it may be at the jump itself."""
-    time, status, dial = at.time, at.arrays["status"], run.system.dial(run.values, at.time)
+    time, status, dial = at.time, at.arrays["status"], at.dial
     if len(time) < FEWEST or not len(run.edges):
         return
     for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
@@ -248,20 +243,21 @@ def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
                 yield finding_for("effort.beside_jump", f"drivers.{name}", at=dial.at(k), more=more, unit=unit)
 
 
-def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:
+def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
     """What only the motion shows of a load or spring: a resistance that drives, a torsional spring that unwinds."""
-    dial = run.system.dial(run.values, time)
-    stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
-    for path, entry in run.system.mechanism.parameter_set.entries.items():
-        if entry.varies and entry.location[-1] in ("resisting_torque", "resisting_force"):
-            negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), time.shape) < 0)
-            if len(negative):
-                yield finding_for("load.drives", path, at=dial.intervals(negative))
+    entries = run.system.mechanism.parameter_set.entries.items()
+    resisting = [path for path, one in entries if one.varies and one.location[-1] in RESISTING]
+    if resisting:
+        stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, at.time))
+    for path in resisting:
+        negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), at.time.shape) < 0)
+        if len(negative):
+            yield finding_for("load.drives", path, at=at.dial.intervals(negative))
     for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
         if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
-            jumps = np.flatnonzero(np.abs(np.diff(arrays["spring_elongation"][i])) > np.pi)
+            jumps = np.flatnonzero(np.abs(np.diff(at.arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
-                yield finding_for("spring.jump", f"springs.{name}", at=dial.at(int(jumps[0])))
+                yield finding_for("spring.jump", f"springs.{name}", at=at.dial.at(int(jumps[0])))
 
 
 def references(mechanism: Mechanism) -> list[str]:
@@ -275,7 +271,7 @@ def references(mechanism: Mechanism) -> list[str]:
 def figures(run: Run, found: Positions, near: near_locking.Locking | None = None) -> Iterator[Figure]:
     """The figures one looks at first."""
     arrays, status, means = found.arrays, found.arrays["status"], found.means
-    dial, counted = run.system.dial(run.values, found.time), status < Status.NOT_CONVERGED
+    dial, counted = found.dial, status < Status.NOT_CONVERGED
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
     sound = sound_positions(status)
     with np.errstate(all="ignore"):

@@ -14,8 +14,10 @@ import pytest
 import trunnion
 from mechanisms import DURANGO
 from trunnion import Mechanism, MechanismError, Status
+from trunnion.cycle.compiled import compiles
 from trunnion.cycle.positions import Positions, positions
 from trunnion.solve.compiled_vectors import VectorKernel
+from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import prepare
 
 pytest.importorskip("llvmlite")
@@ -291,3 +293,15 @@ def test_the_memory_of_a_result_goes_with_it(example: str, engine: str) -> None:
         assert [array() for array in held] == [None] * len(held)
     finally:
         gc.enable()
+
+
+def test_margins_that_have_to_be_followed_are_compiled_from_fewer_positions_on() -> None:
+    """NumPy takes as long for one of them as for dozens of positions whose loads say at once that none locks."""
+    plain, followed = (
+        prepare(trunnion.read(EXAMPLES / f"{name}.yaml")) for name in ("durango-fourbar", "drawing-press")
+    )
+    asked = trunnion.FrictionMethod(margin_up_to=MARGIN)
+    assert [compiles("auto", run, 10_000, asked) for run in (plain, followed)] == [False, True]
+    assert not compiles("auto", followed, 10_000, trunnion.FrictionMethod(margin_up_to=0.0))
+    assert not compiles("auto", followed, 1000, asked)
+    assert compiles("auto", plain, 300_000, asked)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ Write = Callable[[Any, Backward, Number, slice], None]  # a walk at these times 
 
 ENGINES = ("auto", "numpy", "compiled")
 WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
+FOLLOWED = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
+PROBED = 64  # positions at which it is seen whether margins are followed
 UNDEFINED = ("efficiency_instant", "locking_margin")  # variables that may have no finite value in a solved position
 
 
@@ -118,11 +121,33 @@ class CycleKernel:
         return lambda back: self._cells(back)[cell]
 
 
-def compiles(engine: str, run: Run, positions: int) -> bool:
-    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or seats need NumPy."""
+def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
+    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or seats need NumPy.
+
+    method: of friction, where a locking margin is asked for at each position.
+    """
     if engine not in ENGINES:
         raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
     if engine == "compiled" and run.seats:
         what = "pins in seats follow the load: that is not compiled"
         raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
-    return engine == "compiled" or (engine == "auto" and not run.seats and pays(positions, WORTH_COMPILING))
+    if engine != "auto" or run.seats:
+        return engine == "compiled"
+    weight = 1.0 if method is None or positions * FOLLOWED < WORTH_COMPILING else _weight(run, method)
+    return pays(int(positions * weight), WORTH_COMPILING)
+
+
+def _weight(run: Run, method: FrictionMethod) -> float:
+    """How many plain positions take NumPy as long as one with its locking margin."""
+    if not method.margin_up_to:
+        return 1.0
+
+    def share() -> float:
+        """Of the positions those without a bound on their friction that would say at once that none locks."""
+        with np.errstate(all="ignore"):
+            back = run.solve(run.cycle.times(PROBED), method=replace(method, margin_up_to=0.0))
+            problems = [settled.problem for settled in back.settled if settled.problem is not None]
+            shares = [np.mean(np.asarray(one.bound()) * method.margin_up_to >= 1.0) for one in problems]
+        return float(max(shares, default=0.0))
+
+    return 1.0 + FOLLOWED * run.once(("margins followed", method), share)

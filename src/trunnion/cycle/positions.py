@@ -118,7 +118,7 @@ def stretch(
     arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts, wanted)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    done = compiles(engine, run, max(steps, among)) and _fill_compiled(
+    done = compiles(engine, run, max(steps, among), method) and _fill_compiled(
         arrays, ideal, run, time, method, causes, engine == "auto"
     )
     back = None

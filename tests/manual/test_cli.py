@@ -396,6 +396,9 @@ def test_names_with_spaces_and_greek_letters_are_fine(run: Run, tmp_path: Path) 
         (["--out", "r.ods"], ".csv"),
         (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
         (["--out", "no/such/folder/r.csv"], "folder"),
+        (["--variables", "reaction_forces"], "reaction_force"),
+        (["--variables", "drive_effort", "--report", "r.html"], "all variables"),
+        (["--dtype", "float16"], "float32"),
     ],
 )
 def test_bad_options_are_refused_with_a_message(run: Run, tmp_path: Path, options: list[str], word: str) -> None:
@@ -403,6 +406,19 @@ def test_bad_options_are_refused_with_a_message(run: Run, tmp_path: Path, option
     assert done.code == 2
     assert word in done.err
     assert not files(tmp_path)
+
+
+def test_some_variables_in_blocks(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in Python: the same file, and the note of what is of a block's number of positions."""
+    monkeypatch.setattr("trunnion.cycle.blocks.BLOCK", 64)
+    asked = ("--steps", 200, "--variables", "drive_effort", "--dtype", "float32", "--out", tmp_path / "some.csv")
+    done = run("analyse", FOUR_BAR, *asked)
+    assert "all 200 positions" in done.err
+    assert "positions solved, of 200" in done.out
+    mechanism = trunnion.read(FOUR_BAR)
+    trunnion.analyse(mechanism, 200, variables=["drive_effort"], dtype="float32", out=tmp_path / "same.csv")
+    assert (tmp_path / "some.csv").read_text() == (tmp_path / "same.csv").read_text()
+    assert (tmp_path / "some.csv").read_text().startswith("time,A.effort,status\n")
 
 
 @pytest.mark.parametrize("text", ["A", "A=", "=x.csv", "B=x.csv"])
@@ -449,6 +465,7 @@ def test_an_analysis_on_the_terminal_needs_few_libraries() -> None:
     models = [str(EXAMPLES / f"{name}.yaml") for name in names]
     code = f"""
 import sys
+import trunnion
 from trunnion.cli.app import main
 for model in {models}:
     sys.argv = ["trunnion", "analyse", model, "--steps", "12"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle import blocks, summary
+from trunnion.cycle import summary
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.deprecation import renamed
 from trunnion.model.mechanism import Mechanism
@@ -17,7 +17,6 @@ from trunnion.solve.friction_method import FrictionMethod
 if TYPE_CHECKING:
     import xarray as xr
 from trunnion.cycle.positions import check_steps, positions
-from trunnion.results.export import save
 from trunnion.results.result import Result
 from trunnion.solve.run import Run, prepare
 
@@ -68,7 +67,7 @@ def analysed(
     progress: Callable[[int], None] | None = None,
     engine: str = "auto",
     kept: Kept = ALL,
-    out: blocks.Paths = (),
+    out: Sequence[str | os.PathLike[str]] = (),
     saved: Mapping[str, Any] | None = None,
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
@@ -76,11 +75,19 @@ def analysed(
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    if blocks.blocked(run, steps, out):
-        return blocks.written(run, steps, out, method, progress, engine, kept, saved)
+    if out:
+        from trunnion.cycle import blocks  # and all that writes files
+        from trunnion.results.export import check_format
+
+        for path in out:
+            check_format(path)
+        if blocks.blocked(run, steps, out):
+            return blocks.written(run, steps, out, method, progress, engine, kept, saved)
     found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
     result = summary.result_of(run, found, kept)
     for path in out:
+        from trunnion.results.export import save
+
         save(result.dataset, path, **(saved or {}))
     return result
 

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+import trunnion
 from manual.conftest import Run
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -14,7 +14,6 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-import trunnion
 from manual.conftest import Run
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -407,19 +406,6 @@ def test_bad_options_are_refused_with_a_message(run: Run, tmp_path: Path, option
     assert done.code == 2
     assert word in done.err
     assert not files(tmp_path)
-
-
-def test_some_variables_in_blocks(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in Python: the same file, and the note of what is of a block's number of positions."""
-    monkeypatch.setattr("trunnion.cycle.blocks.BLOCK", 64)
-    asked = ("--steps", 200, "--variables", "drive_effort", "--dtype", "float32", "--out", tmp_path / "some.csv")
-    done = run("analyse", FOUR_BAR, *asked)
-    assert "all 200 positions" in done.err
-    assert "positions solved, of 200" in done.out
-    mechanism = trunnion.read(FOUR_BAR)
-    trunnion.analyse(mechanism, 200, variables=["drive_effort"], dtype="float32", out=tmp_path / "same.csv")
-    assert (tmp_path / "some.csv").read_text() == (tmp_path / "same.csv").read_text()
-    assert (tmp_path / "some.csv").read_text().startswith("time,A.effort,status\n")
 
 
 @pytest.mark.parametrize("text", ["A", "A=", "=x.csv", "B=x.csv"])

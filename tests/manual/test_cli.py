@@ -397,6 +397,9 @@ def test_names_with_spaces_and_greek_letters_are_fine(run: Run, tmp_path: Path) 
         (["--out", "r.ods"], ".csv"),
         (["--out", "r.csv", "--columns", "A.efort"], "A.effort"),
         (["--out", "no/such/folder/r.csv"], "folder"),
+        (["--variables", "reaction_forces"], "reaction_force"),
+        (["--variables", "drive_effort", "--report", "r.html"], "all variables"),
+        (["--dtype", "float16"], "float32"),
     ],
 )
 def test_bad_options_are_refused_with_a_message(run: Run, tmp_path: Path, options: list[str], word: str) -> None:
@@ -487,6 +490,7 @@ def test_an_analysis_on_the_terminal_needs_few_libraries() -> None:
     models = [str(EXAMPLES / f"{name}.yaml") for name in names]
     code = f"""
 import sys
+import trunnion
 from trunnion.cli.app import main
 for model in {models}:
     sys.argv = ["trunnion", "analyse", model, "--steps", "12"]

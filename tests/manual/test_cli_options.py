@@ -106,3 +106,16 @@ def test_points_of_a_grid_are_all_combinations() -> None:
 def test_the_help_names_every_plot_of_a_cycle() -> None:
     """Written out there, for the module of the plots loads matplotlib."""
     assert PLOT_KINDS.replace(" or ", ", ").split(", ") == list(PLOTS)
+
+
+def test_some_variables_in_blocks(program: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in Python: the same file, and the note of what is of a block's number of positions."""
+    monkeypatch.setattr("trunnion.cycle.blocks.BLOCK", 64)
+    asked = ("--steps", 200, "--variables", "drive_effort", "--dtype", "float32", "--out", tmp_path / "some.csv")
+    done = program("analyse", FOUR_BAR, *asked)
+    assert "all 200 positions" in done.err
+    assert "positions solved, of 200" in done.out
+    mechanism = trunnion.read(FOUR_BAR)
+    trunnion.analyse(mechanism, 200, variables=["drive_effort"], dtype="float32", out=tmp_path / "same.csv")
+    assert (tmp_path / "some.csv").read_text() == (tmp_path / "same.csv").read_text()
+    assert (tmp_path / "some.csv").read_text().startswith("time,A.effort,status\n")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,10 @@ import pytest
 import trunnion
 from mechanisms import DURANGO
 from trunnion import Mechanism, MechanismError, Status
+from trunnion.cycle.compiled import compiles
 from trunnion.cycle.positions import Positions, positions
 from trunnion.solve.compiled_vectors import VectorKernel
+from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import prepare
 
 pytest.importorskip("llvmlite")
@@ -272,3 +276,32 @@ def test_mechanisms_with_errors_and_without_go_by_programs_of_their_own() -> Non
     assert np.nanmax(one["transmission_error_max"].values) > 1e-5
     for name in ("transmission_error_max", "drive_effort_max", "efficiency", "efficiency_ideal"):
         np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+@pytest.mark.parametrize("example", ["durango-fourbar", "fourbar-by-grades"])
+def test_the_memory_of_a_result_goes_with_it(example: str, engine: str) -> None:
+    """At once, not when Python looks for objects that hold each other: a result may take all the memory there is."""
+    mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
+    trunnion.analyse(mechanism, 24, engine=engine)
+    gc.collect()
+    gc.disable()
+    try:
+        result = trunnion.analyse(mechanism, 24, engine=engine)
+        held = [weakref.ref(result[name].variable.values) for name in ("point_position", "reaction_force", "status")]
+        del result
+        assert [array() for array in held] == [None] * len(held)
+    finally:
+        gc.enable()
+
+
+def test_margins_that_have_to_be_followed_are_compiled_from_fewer_positions_on() -> None:
+    """NumPy takes as long for one of them as for dozens of positions whose loads say at once that none locks."""
+    plain, followed = (
+        prepare(trunnion.read(EXAMPLES / f"{name}.yaml")) for name in ("durango-fourbar", "drawing-press")
+    )
+    asked = trunnion.FrictionMethod(margin_up_to=MARGIN)
+    assert [compiles("auto", run, 10_000, asked) for run in (plain, followed)] == [False, True]
+    assert not compiles("auto", followed, 10_000, trunnion.FrictionMethod(margin_up_to=0.0))
+    assert not compiles("auto", followed, 1000, asked)
+    assert compiles("auto", plain, 300_000, asked)

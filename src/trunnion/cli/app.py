@@ -10,7 +10,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -28,6 +28,7 @@ from trunnion.cli.options import (
     Columns,
     Criterion,
     Data,
+    Dtype,
     Engine,
     File,
     FrictionLaw,
@@ -43,6 +44,7 @@ from trunnion.cli.options import (
     Uncut,
     Units,
     UnitsRow,
+    Variables,
 )
 from trunnion.cli.play import play
 from trunnion.cli.result import Shown, check_files, check_page, write_text
@@ -153,14 +155,22 @@ def analyse(
     columns: Columns = None,
     uncut: Uncut = False,
     engine: Engine = "auto",
+    variables: Variables = None,
+    dtype: Dtype = "float64",
 ) -> None:
     """Analyse a cycle: motion, reactions, friction, effort, power."""
+    from trunnion.cycle.kept import Kept
+
     check_files(out or [], report, drawn=False, instead=f"trunnion plot {file}")
+    kept = Kept.read(variables, dtype)
+    if report and kept.variables is not None:
+        raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
     mechanism = stated(file, set_, table, friction, seat)
+    saved = {"units_row": units_row, "columns": columns, "units": units}
     with lines_of(file):
-        result = _analysed(mechanism, steps, _method(method, criterion, iterations), engine)
+        result = _analysed(mechanism, steps, _method(method, criterion, iterations), engine, kept, out or [], saved)
     page = partial(_page, mechanism, result, uncut)
-    Shown(result, file, ["assembly"], out or [], report, units_row, page=page, columns=columns, units=units).finish()
+    Shown(result, file, ["assembly"], report=report, page=page, written=list(out or [])).finish()
 
 
 @verb
@@ -372,12 +382,14 @@ def _method(name: str, criterion: float | None, iterations: int) -> FrictionMeth
     return method_named(name, criterion, iterations)
 
 
-def _analysed(mechanism: Mechanism, steps: int, method: FrictionMethod | None, engine: str = "auto") -> Result:
-    """Analyse, with a progress bar when it takes long enough to need one."""
+def _analysed(
+    mechanism: Mechanism, steps: int, method: FrictionMethod | None, engine: str = "auto", *kept: Any
+) -> Result:
+    """Analyse, with a progress bar when it takes long enough to need one. kept: what is, and where, see `analysed`."""
     from trunnion.cycle.analyse import analysed
 
     with bar("positions", steps, least=200_000) as progress:
-        return analysed(mechanism, steps, method, progress, engine)
+        return analysed(mechanism, steps, method, progress, engine, *kept)
 
 
 def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:

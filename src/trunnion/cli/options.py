@@ -18,6 +18,7 @@ __all__ = [
     "Criterion",
     "Data",
     "DataFiles",
+    "Dtype",
     "Engine",
     "File",
     "Force",
@@ -41,6 +42,7 @@ __all__ = [
     "TableUnits",
     "Units",
     "UnitsRow",
+    "Variables",
     "Write",
     "named_file",
     "over",
@@ -149,6 +151,13 @@ Columns = Annotated[
         show_default=False,
     ),
 ]
+Variables = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variables", help="Keep these variables only: reaction_force, drive_effort … Repeatable.", show_default=False
+    ),
+]
+Dtype = Annotated[str, typer.Option("--dtype", help="Numbers of the files: float64, or float32.")]
 UnitsRow = Annotated[bool, typer.Option("--units-row", help="Second CSV header row with the units.")]
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trunnion.cycle import summary
+from trunnion.cycle.kept import ALL, Kept
 from trunnion.deprecation import renamed
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
@@ -29,6 +31,10 @@ def analyse(
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     engine: str = "auto",
+    variables: Sequence[str] | None = None,
+    dtype: str = "float64",
+    out: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
+    **saved: Any,
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -36,12 +42,21 @@ def analyse(
     units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
     friction_method: how friction and reactions are settled; Newton's method if not given.
     progress: called with the number of positions done. engine: numpy, compiled (an extra: machine code, which pays
-    from some 10⁵ positions on), or auto: compiled where it is installed, pays and can do the mechanism.
+    from some 10⁵ positions on, where locking margins are followed from some 10³ on), or auto: compiled where it is
+    installed, pays and can do the mechanism.
+    variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
+    are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
+    float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
+    out: files to write, as by `save`, whose other arguments are `saved`. Beyond `blocks.BLOCK` positions .csv,
+    .parquet, .zarr and .nc are solved and written a block at a time, so that memory does not grow with their number;
+    the Dataset then has as many positions as a block, and a finding says what is of these alone.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
-    Raises MechanismError if the structure does not determine the motion, `steps` is out of range, or the engine is not
-    installed or cannot do the mechanism.
+    Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
+    unknown, or the engine is not installed or cannot do the mechanism.
     """
-    return analysed(mechanism, steps, friction_method, progress, engine).dataset
+    kept = Kept.read(variables, dtype)
+    paths = [out] if isinstance(out, (str, os.PathLike)) else out
+    return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved).dataset
 
 
 @np.errstate(all="ignore")
@@ -51,13 +66,30 @@ def analysed(
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
     engine: str = "auto",
+    kept: Kept = ALL,
+    out: Sequence[str | os.PathLike[str]] = (),
+    saved: Mapping[str, Any] | None = None,
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()
-    return summary.result_of(run, positions(run, steps, method, progress, engine=engine))
+    if out:
+        from trunnion.cycle import blocks  # and all that writes files
+        from trunnion.results.export import check_format
+
+        for path in out:
+            check_format(path)
+        if blocks.blocked(run, steps, out):
+            return blocks.written(run, steps, out, method, progress, engine, kept, saved)
+    found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
+    result = summary.result_of(run, found, kept)
+    for path in out:
+        from trunnion.results.export import save
+
+        save(result.dataset, path, **(saved or {}))
+    return result
 
 
 @np.errstate(all="ignore")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,24 @@ Write = Callable[[Any, Backward, Number, slice], None]  # a walk at these times 
 
 ENGINES = ("auto", "numpy", "compiled")
 WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
+FOLLOWED = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
+PROBED = 64  # positions at which it is seen whether margins are followed
 UNDEFINED = ("efficiency_instant", "locking_margin")  # variables that may have no finite value in a solved position
 
 
-class _Row:
+class _Flags(NamedTuple):
+    """Of one variable: whether it is there, and whether anybody reads it."""
+
+    writeable: bool
+    read: bool
+
+
+class _Row(NamedTuple):
     """One variable of `Cells`."""
 
-    def __init__(self, name: str, array: NDArray[Any], numbers: dict[Cell, Number]) -> None:
-        self.name, self.flags, self.numbers = name, array.flags, numbers
+    name: str
+    flags: _Flags
+    numbers: dict[Cell, Number]
 
     def __setitem__(self, place: Any, number: Number) -> None:
         *cell, _ = place if isinstance(place, tuple) else (place,)
@@ -42,22 +53,24 @@ class _Row:
 class _Cells(dict[str, _Row]):
     """Stands for the arrays of a result while one walk is written into them, and keeps the number of every cell."""
 
-    def __init__(self, arrays: Arrays) -> None:
+    def __init__(self, flags: Mapping[str, _Flags]) -> None:
         self.numbers: dict[Cell, Number] = {}
-        super().__init__((name, _Row(name, array, self.numbers)) for name, array in arrays.items())
+        super().__init__((name, _Row(name, own, self.numbers)) for name, own in flags.items())
 
 
 class CycleKernel:
     """Every variable of a cycle at many positions.
 
     run: the prepared mechanism, with these values; time: one that will be asked for, s; arrays: those of a result, for
-    their shapes; write: writes a walk into them. Raises MechanismError as `CompiledKernel` does.
+    what is read of them; write: writes a walk into them. Raises MechanismError as `CompiledKernel` does.
     """
 
     def __init__(
         self, run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, write: Write, method: FrictionMethod
     ) -> None:
-        self._write, self._arrays = write, arrays
+        self._write = write
+        # not the arrays: the kernel and its figures hold each other, so whatever they hold is freed late
+        self._flags = {name: _Flags(array.flags.writeable, bool(array.strides[-1])) for name, array in arrays.items()}
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
             numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
@@ -94,12 +107,12 @@ class CycleKernel:
 
     def _wanted(self, cell: Cell, number: Number) -> bool:
         """Whether a cell is read, and not 0 whatever the values are, as the arrays are before."""
-        return bool(self._arrays[cell[0]].strides[-1]) and not (isinstance(number, (int, float)) and number == 0)
+        return self._flags[cell[0]].read and not (isinstance(number, (int, float)) and number == 0)
 
     def _cells(self, back: Backward) -> Mapping[Cell, Number]:
         """The number of every cell, of one walk; those of the last one are remembered, for figures ask one by one."""
         if self._last[0] is not back:
-            into = _Cells(self._arrays)
+            into = _Cells(self._flags)
             self._write(into, back, back.walk.time, slice(None))
             self._last = back, into.numbers
         return self._last[1]
@@ -108,11 +121,33 @@ class CycleKernel:
         return lambda back: self._cells(back)[cell]
 
 
-def compiles(engine: str, run: Run, positions: int) -> bool:
-    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or seats need NumPy."""
+def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
+    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or seats need NumPy.
+
+    method: of friction, where a locking margin is asked for at each position.
+    """
     if engine not in ENGINES:
         raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
     if engine == "compiled" and run.seats:
         what = "pins in seats follow the load: that is not compiled"
         raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
-    return engine == "compiled" or (engine == "auto" and not run.seats and pays(positions, WORTH_COMPILING))
+    if engine != "auto" or run.seats:
+        return engine == "compiled"
+    weight = 1.0 if method is None or positions * FOLLOWED < WORTH_COMPILING else _weight(run, method)
+    return pays(int(positions * weight), WORTH_COMPILING)
+
+
+def _weight(run: Run, method: FrictionMethod) -> float:
+    """How many plain positions take NumPy as long as one with its locking margin."""
+    if not method.margin_up_to:
+        return 1.0
+
+    def share() -> float:
+        """Of the positions those without a bound on their friction that would say at once that none locks."""
+        with np.errstate(all="ignore"):
+            back = run.solve(run.cycle.times(PROBED), method=replace(method, margin_up_to=0.0))
+            problems = [settled.problem for settled in back.settled if settled.problem is not None]
+            shares = [np.mean(np.asarray(one.bound()) * method.margin_up_to >= 1.0) for one in problems]
+        return float(max(shares, default=0.0))
+
+    return 1.0 + FOLLOWED * run.once(("margins followed", method), share)

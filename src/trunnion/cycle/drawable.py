@@ -38,5 +38,5 @@ def drawable(mechanism: Mechanism) -> xr.Dataset:
         "scene": scene_of(run),
         "periodic": int(run.cycle.periodic),
     }
-    along = driven(found.time, *run.system.dial(run.values, found.time))
+    along = driven(found.time, *found.dial)
     return results.dataset(arrays, found.labels, along, found.means, attributes, found.ideal)

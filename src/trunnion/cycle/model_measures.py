@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.unwrap import unwrap_row
+from trunnion.algebra.unwrap import START, Tail, unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of, figures_of
 from trunnion.measures.measures import Measure, named
@@ -25,7 +25,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Watched", "positions_told", "watched"]
+__all__ = ["VARIABLES", "Watched", "positions_told", "values_at", "watched"]
 
 Array = NDArray[np.float64]
 # the model's measures, each in its own unit, in the attributes `measure_units` and `measure_figure_units`
@@ -102,14 +102,16 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
         except MechanismError as error:
             told = f"the measure '{name}' is left out: {error.findings[0].what}"
             findings.append(Finding(told, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
-    values, figures = np.full((len(measures), steps), np.nan), np.full(len(measures), np.nan)
-    if measures:
-        with np.errstate(all="ignore"):
-            _fill(run, measures, time, method, (values, figures))
+    values, stated = values_at(run, measures, time, method), [one for one in measures if one.rule != "deviation"]
+    with np.errstate(all="ignore"):
+        of_cycle = figures_of(run, stated, steps, method) if stated else {}
+    figures = np.array([of_cycle.get(one.name, np.nan) for one in measures], float)
     valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
     notes: dict[str, str] = {}
+    if np.all(valid):
+        return Watched(run, measures, values, figures, findings, valid, notes)
     dial = run.system.dial(run.values, time)
-    for i, measure in enumerate(measures if not np.all(valid) else ()):
+    for i, measure in enumerate(measures):
         if measure.rule == "deviation":
             continue
         there = _resting_on(run, measure, values[i], time)
@@ -157,19 +159,30 @@ def _had(run: Run, name: str, steps: int) -> Measure:
     return measure
 
 
-def _fill(
-    run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod, into: tuple[Array, Array]
-) -> None:
-    system, (values, figures) = run.system, into
-    courses = courses_of(run, measures, time, method)[0]
-    stated = [one for one in measures if one.rule != "deviation"]
-    found = figures_of(run, stated, len(time), method) if stated else {}
-    walk = forward(system, run.values, run.chosen.assembly, time)
+def values_at(
+    run: Run,
+    measures: Sequence[Measure],
+    time: Array,
+    method: FrictionMethod,
+    tails: dict[str, Tail] | None = None,
+) -> Array:
+    """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers.
+
+    tails: of those that are angles before these times, and then of these.
+    """
+    system, tails = run.system, {} if tails is None else tails
+    values = np.full((len(measures), len(time)), np.nan)
+    if not measures:
+        return values
+    with np.errstate(all="ignore"):
+        courses = courses_of(run, measures, time, method)[0]
+        walk = forward(system, run.values, run.chosen.assembly, time)
     for i, measure in enumerate(measures):
-        figures[i] = found.get(measure.name, np.nan)
         if len(courses[measure.name]) > 1:
             continue
         values[i] = courses[measure.name][0]
         if measure.turning(system):
             rate = np.broadcast_to(np.asarray(measure.coordinate(system).rate(walk), float), time.shape)
-            unwrap_row(values[i], rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)
+            step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+            tails[measure.name] = unwrap_row(values[i], rate, step, tails.get(measure.name, START))
+    return values

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.quadrature import Effort
+from trunnion.algebra.unwrap import Tail
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
+from trunnion.cycle.kept import needed
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.near_locking import LOOKED
 from trunnion.cycle.unanswered import blank
+from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers, write
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
@@ -23,15 +25,12 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import Lanes, around, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
+from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.switches import Mechanisms
+from trunnion.solve.system import Dial, Values
 
-if TYPE_CHECKING:
-    pass
-from trunnion.cycle.variables import fill_of
-from trunnion.solve.run import Run
-
-__all__ = ["IDEAL", "Arrays", "Positions", "positions"]
+__all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"]
 
 
 MOST_STEPS = 100_000_000
@@ -49,18 +48,21 @@ class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
     means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
-    one walk that they all came of, where it was one and pins lie in no seats.
+    one walk that they all came of, where it was one and pins lie in no seats; ideal_arrays: what the means of the ideal
+    mechanism are made of.
     """
 
     arrays: Arrays
     labels: dict[str, list[str]]
     time: NDArray[np.float64]
+    dial: Dial
     method: FrictionMethod
     causes: diagnosis.Causes
     means: Means
     ideal: Means | None
     losses: list[contact_loss.Loss]
     walked: Backward | None = None
+    ideal_arrays: Arrays = field(default_factory=dict)
 
 
 def positions(
@@ -71,23 +73,54 @@ def positions(
     margin: bool = True,
     averaged: bool = True,
     engine: str = "auto",
+    wanted: Collection[str] | None = None,
+    among: int = 0,
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
     margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
-    are, which ask for many positions more; they are NaN if not. engine: see `compiled.cycle_kernels`.
+    are, which ask for many positions more; they are NaN if not. engine: see `compiled.cycle_kernels`. wanted: the
+    variables that will be read beside those that the books of the cycle are made of, all if not given; among: how many
+    positions there will be in all, if more.
     """
     check_steps(steps)
     _refuse_seats(run)
     method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
-    time = run.cycle.times(steps)
+    found = stretch(run, run.cycle.times(steps), method, engine, wanted, progress=progress, among=among)
+    if not averaged:
+        return found
+    quick = replace(method, margin_up_to=0.0)  # the margin is known by now
+    return replace(
+        found,
+        means=_means(run, found.arrays, quick),
+        ideal=_means(run, found.ideal_arrays, quick, ideal=True) if run.erring else None,
+    )
+
+
+def stretch(
+    run: Run,
+    time: NDArray[np.float64],
+    method: FrictionMethod,
+    engine: str = "auto",
+    wanted: Collection[str] | None = None,
+    tails: dict[str, Tail] | None = None,
+    progress: Callable[[int], None] | None = None,
+    among: int = 0,
+) -> Positions:
+    """The same at some times of the cycle, s, in a row and equally spaced; the means are NaN.
+
+    tails: of the angles before these times, and then of these; among: how many times there are in all, if more.
+    """
+    steps, wanted = len(time), None if wanted is None else needed(wanted, run.system, run.erring)
     labels = fill_of(run.system).labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
     parts = [part for part, there in (("seats", run.seats), ("errors", run.erring)) if there]
-    arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts)
+    arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts, wanted)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    done = compiles(engine, run, steps) and _fill_compiled(arrays, ideal, run, time, method, causes, engine == "auto")
+    done = compiles(engine, run, max(steps, among), method) and _fill_compiled(
+        arrays, ideal, run, time, method, causes, engine == "auto"
+    )
     back = None
     for low in range(0, 0 if done else steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
@@ -101,12 +134,11 @@ def positions(
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
-    fill_of(run.system).unwrap(arrays, run.system, run.values, time)
-
-    means = _means(run, arrays, quick) if averaged else still(arrays)
-    meant = (_means(run, ideal, quick, ideal=True) if averaged else still(ideal)) if run.erring else None
+    fill_of(run.system).unwrap(arrays, run.system, run.values, time, tails)
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
-    return Positions(arrays, labels, time, method, causes, means, meant, losses, walked)
+    meant = still(ideal) if run.erring else None
+    dial = run.system.dial(run.values, time)
+    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal)
 
 
 def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
@@ -209,7 +241,7 @@ def _fill_compiled(
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
     try:
-        own = CycleKernel(run, run.values, time, arrays, write, method)
+        own = _kernel(run, run.values, time, arrays, method)
     except MechanismError:
         if or_not:
             return False
@@ -219,12 +251,19 @@ def _fill_compiled(
         quick, system = replace(method, margin_up_to=0.0), run.system
         labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
         meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
-        other = CycleKernel(run, run.ideal_values, time, meant, write, quick)
+        other = _kernel(run, run.ideal_values, time, meant, quick)
         _fill_rest(meant, other.fill(meant, run.ideal_values, time)[1], run.ideal, time, quick)
         ideal |= {name: meant[name] for name in ideal}
         fill_errors(arrays, meant, link_numbers(system), slice(None))
         blank(arrays, arrays["status"].astype(np.int8), slice(None))
     return True
+
+
+def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:
+    """The compiled kernel of some variables, made once."""
+    read = tuple(name for name, array in arrays.items() if array.strides[-1])
+    key = "compiled", values is run.values, method, read
+    return run.once(key, lambda: CycleKernel(run, values, time, arrays, write, method))
 
 
 def _fill_rest(

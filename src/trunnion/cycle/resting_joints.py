@@ -26,6 +26,7 @@ Arrays = dict[str, NDArray[np.float64]]
 Positions = NDArray[np.intp]
 
 LANES = 8192  # solved at once
+FEW = 32  # positions: those of a joint that rests where it turns round, not throughout a dwell
 GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # shares of the resistance of each contact that are tried first
 STEP = 0.5  # of the grid
 FLAT = 1e-9  # of the interval: a rise beside a grid point that is less is not followed
@@ -59,9 +60,17 @@ def bracket(
             one = _Resting(run, joint, time[part], offsets, method)
             # with pins held in both, so that what their travel adds to the effort is none of the interval
             own = one.efforts(np.zeros((one.count, len(part)))) if offsets else arrays["drive_effort"][:, part]
-            least, most = one.extremes(own)
+            least, most = _once(one, own, part)
             lower[:, part] += least
             upper[:, part] += most
+
+
+def _once(one: _Resting, own: Array, positions: Positions) -> tuple[Array, Array]:
+    """The extremes, found once for a few positions that are asked for again."""
+    if len(positions) > FEW or one.offsets:
+        return one.extremes(own)
+    key = "resting", one.joint, one.time.tobytes(), own.tobytes(), one.method
+    return one.run.once(key, lambda: one.extremes(own))
 
 
 @dataclass(frozen=True)

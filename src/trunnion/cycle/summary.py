@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss, diagnosis, near_locking
 from trunnion.cycle.deviations import error_figures
+from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
 from trunnion.cycle.scene import DRAWN
@@ -22,7 +23,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
-from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
+from trunnion.results.attributes import KEPT, cited, encoded, figure_rows, finding_rows, origin
 from trunnion.results.dataset import driven
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import quantity
@@ -37,12 +38,15 @@ if TYPE_CHECKING:
     from trunnion.cycle.positions import Positions
     from trunnion.solve.run import Run
 
-from trunnion.cycle.model_measures import positions_told, watched
+from trunnion.cycle.model_measures import Watched, positions_told, watched
 from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "books",
+    "dataset_of",
     "effort_units",
+    "figures",
     "inputs",
     "model_notes",
     "references",
@@ -58,6 +62,7 @@ JUMP, STEADY = (
     0.2,
     2e-3,
 )  # of the largest effort: what drops by more is a jump, what changes by less is steady beside it
+RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 TIMES = "times the friction"  # what a locking margin is
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
@@ -73,8 +78,14 @@ PEZZUTI = (
 )
 
 
-def result_of(run: Run, found_positions: Positions) -> Result:
-    """The result with its attributes: formula, findings, summary, input data, drawing data, provenance."""
+def result_of(run: Run, found: Positions, kept: Kept = ALL) -> Result:
+    """The result of a cycle. kept: the variables that its Dataset has."""
+    attributes, measured = books(run, found, kept)
+    return Result(attributes, lambda: dataset_of(run, found, measured, attributes, kept))
+
+
+def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[str, Any], Watched]:
+    """What the result says: formula, findings, summary, input data, drawing data, provenance; and the measures."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
@@ -88,19 +99,24 @@ def result_of(run: Run, found_positions: Positions) -> Result:
             "driver_units": effort_units(run.system),
             "spring_units": spring_units(run.system),
             "findings": finding_rows([*found, *measured.findings]),
-            "summary": figure_rows([*_summary(run, found_positions, near), *measured.summary()]),
+            "summary": figure_rows([*figures(run, found_positions, near), *measured.summary()]),
             **_ranges(run, found_positions, near),
             **drawn,
             "periodic": int(run.cycle.periodic),
+            **({} if kept.variables is None else {KEPT: kept.variables}),
         }
     )
 
-    def build() -> xr.Dataset:
-        along = driven(time, *run.system.dial(run.values, time))
-        means, ideal = found_positions.means, found_positions.ideal
-        return measured.joined(results.dataset(arrays, found_positions.labels, along, means, attributes, ideal))
+    return attributes, measured
 
-    return Result(attributes, build)
+
+def dataset_of(
+    run: Run, found: Positions, measured: Watched, attributes: Mapping[str, Any], kept: Kept = ALL
+) -> xr.Dataset:
+    """The Dataset of some positions."""
+    along = driven(found.time, *found.dial)
+    own = found.arrays, found.labels, along, found.means, attributes, found.ideal
+    return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
@@ -111,10 +127,10 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *run.chosen.findings,
         *run.once("far hints", lambda: list(_far_hints(run))),
         *(run.determinacy.findings() if run.determinacy else []),
-        *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
+        *_over_the_cycle(run, at, near),
         *_missed_peaks(run.system, at),
         *_beside_jumps(run, at),
-        *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
+        *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
 
 
@@ -179,20 +195,14 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     return notes
 
 
-def _over_the_cycle(
-    run: Run,
-    arrays: Arrays,
-    causes: diagnosis.Causes,
-    time: NDArray[np.float64],
-    near: near_locking.Locking | None,
-) -> list[Finding]:
-    units = effort_units(run.system)
+def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) -> list[Finding]:
+    arrays, units = at.arrays, effort_units(run.system)
     efforts = {
         name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        causes, run.system.dial(run.values, time), arrays["status"], arrays["condition"], efforts, near,
+        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, near,
         felt(run.system, run.values),
     )  # fmt: skip
     found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []
@@ -201,7 +211,7 @@ def _over_the_cycle(
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else "driver and the gears"
         found.append(finding_for("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom}))
-    return [*found, *_loads_over_the_cycle(run, arrays, time)]
+    return [*found, *_loads_over_the_cycle(run, at)]
 
 
 def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
@@ -217,7 +227,7 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
 
 def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
     """Efforts that are largest beside a jump, of a load or of friction: how much more it may be at the jump itself."""
-    time, status, dial = at.time, at.arrays["status"], run.system.dial(run.values, at.time)
+    time, status, dial = at.time, at.arrays["status"], at.dial
     if len(time) < FEWEST or not len(run.edges):
         return
     for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
@@ -233,20 +243,21 @@ def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
                 yield finding_for("effort.beside_jump", f"drivers.{name}", at=dial.at(k), more=more, unit=unit)
 
 
-def _loads_over_the_cycle(run: Run, arrays: Arrays, time: NDArray[np.float64]) -> Iterator[Finding]:
+def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
     """What only the motion shows of a load or spring: a resistance that drives, a torsional spring that unwinds."""
-    dial = run.system.dial(run.values, time)
-    stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
-    for path, entry in run.system.mechanism.parameter_set.entries.items():
-        if entry.varies and entry.location[-1] in ("resisting_torque", "resisting_force"):
-            negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), time.shape) < 0)
-            if len(negative):
-                yield finding_for("load.drives", path, at=dial.intervals(negative))
+    entries = run.system.mechanism.parameter_set.entries.items()
+    resisting = [path for path, one in entries if one.varies and one.location[-1] in RESISTING]
+    if resisting:
+        stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, at.time))
+    for path in resisting:
+        negative = np.flatnonzero(np.broadcast_to(np.asarray(stated.get(path)), at.time.shape) < 0)
+        if len(negative):
+            yield finding_for("load.drives", path, at=at.dial.intervals(negative))
     for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
         if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
-            jumps = np.flatnonzero(np.abs(np.diff(arrays["spring_elongation"][i])) > np.pi)
+            jumps = np.flatnonzero(np.abs(np.diff(at.arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
-                yield finding_for("spring.jump", f"springs.{name}", at=dial.at(int(jumps[0])))
+                yield finding_for("spring.jump", f"springs.{name}", at=at.dial.at(int(jumps[0])))
 
 
 def references(mechanism: Mechanism) -> list[str]:
@@ -257,10 +268,10 @@ def references(mechanism: Mechanism) -> list[str]:
     return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
-def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> Iterator[Figure]:
+def figures(run: Run, found: Positions, near: near_locking.Locking | None = None) -> Iterator[Figure]:
     """The figures one looks at first."""
     arrays, status, means = found.arrays, found.arrays["status"], found.means
-    dial, counted = run.system.dial(run.values, found.time), status < Status.NOT_CONVERGED
+    dial, counted = found.dial, status < Status.NOT_CONVERGED
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
     sound = sound_positions(status)
     with np.errstate(all="ignore"):
@@ -300,9 +311,9 @@ def _friction_figures(
 ) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
     valid = found.arrays["status"] != Status.CONTACT_LOST
-    yield near_locking.least_margin(
-        "locking_margin", "locking margin", np.where(valid, found.arrays["locking_margin"], np.nan), dial, TIMES
-    )
+    if found.method.margin_up_to:
+        margin = np.where(valid, found.arrays["locking_margin"], np.nan)
+        yield near_locking.least_margin("locking_margin", "locking margin", margin, dial, TIMES)
     yield from near.figures(run, dial) if near else ()
     yield Figure("friction_power_mean", "friction power", found.means.friction_power.net, "W", "mean")
     if len(sound):

@@ -57,7 +57,9 @@ def fill_lanes(
     if causes:
         causes.note(back, some["status"].astype(np.int8), lanes[-1])
     for name, array in there.items():
-        array[place] = some[name]
+        # rows that stay as they are may be zeros that take no memory until they are written
+        for row in np.argwhere(np.any(some[name] != array[place], axis=-1)):
+            array[(*row, *lanes)] = some[name][tuple(row)]
 
 
 def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Protocol
 
-from trunnion.errors import Finding, Severity, Status
+from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.results.figure import Figure
 from trunnion.version import __version__
 
@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 from trunnion.model.stated_units import stated_units
 
 __all__ = [
-    "Described", "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of", "origin",
-    "summary_of",
+    "KEPT", "Described", "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of",
+    "origin", "summary_of", "whole",
 ]  # fmt: skip
+
+KEPT = "variables"  # the attribute of a result that has not kept every variable
 
 
 class Described(Protocol):
@@ -51,6 +53,13 @@ def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings for JSON."""
     keys = ("severity", "where", "what", "remedy", "code")
     return [{key: str(getattr(one, key)) for key in keys} | {"figures": dict(one.figures)} for one in findings]
+
+
+def whole(result: Described, what: str) -> None:
+    """MechanismError for something that is made of all variables of a result, of one that has not kept them."""
+    if KEPT in result.attrs:
+        told = f"this result has kept {len(json.loads(result.attrs[KEPT]))} of its variables: {what} is made of all"
+        raise MechanismError(Finding(told, KEPT, "analyse without naming variables"))
 
 
 def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:

@@ -205,17 +205,31 @@ def allocate(
     return arrays
 
 
+def _as(array: NDArray[Any], dtype: str) -> NDArray[Any]:
+    """The array with floats of some kind; what takes no memory takes none."""
+    if array.dtype != np.float64:
+        return array
+    return array.astype(dtype) if array.flags.writeable else np.broadcast_to(np.zeros((), dtype), array.shape)
+
+
 def dataset(
-    arrays: Mapping[str, NDArray[np.float64]],
+    arrays: dict[str, NDArray[np.float64]],
     labels: Labels,
     along: Mapping[str, xr.Variable],
     means: CycleMeans,
     attributes: Mapping[str, Any],
     ideal: CycleMeans | None = None,
+    kept: Collection[str] | None = None,
+    dtype: str = "float64",
 ) -> xr.Dataset:
-    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`."""
+    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; kept: variables of
+    every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
+    taken out of their dict one by one, so that both need not be in memory.
+    """
     known = {name: one.over("position") for name, one in variables(_space(labels)).items()}
-    found = described(arrays, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
+    names = [name for name in arrays if kept is None or name in kept]
+    own = {name: arrays[name] if dtype == "float64" else _as(arrays.pop(name), dtype) for name in names}
+    found = described(own, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
     if ideal is not None:
         found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
     return dataset_of("cycle", found, labels, attributes, along)

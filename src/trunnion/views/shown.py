@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import whole
 from trunnion.results.tables import kind_of
 
 if TYPE_CHECKING:
@@ -57,11 +58,13 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) 
 
 def report_of(result: xr.Dataset, **options: Any) -> str:
     """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
+    whole(result, "a report")
     return str(_view(kind_of(result), REPORTS, "report").report(result, **options))
 
 
 def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
+    whole(result, "a figure")
     view = _view(kind_of(result), FIGURES, "figure")
     if kind is None:
         main = getattr(view, "sheet", view.figure)
@@ -74,6 +77,7 @@ def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Fi
 
 def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:
     """The moving mechanism of a cycle."""
+    whole(result, "an animation")
     view = _view(kind_of(result), {"cycle": "cycle.animation"}, "animation")
     return view.animation(result, ideal, height)  # type: ignore[no-any-return]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.tables import comparison, cycle, identification, motion, studies, tolerances
-from trunnion.results.tables.column import Column, whole
+from trunnion.results.tables.column import Column, kept, whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +66,7 @@ def kind_of(result: xr.Dataset) -> str:
 def columns(result: xr.Dataset, table: str = "") -> list[Column]:
     """(name, unit, values of a window of rows) of every flat column of a table, the first if none is named."""
     tables = KINDS[kind_of(result)]
-    return tables[table or next(iter(tables))](result)
+    return kept(tables[table or next(iter(tables))](result))
 
 
 def table_of(path: str | os.PathLike[str], result: xr.Dataset) -> str:

@@ -13,7 +13,7 @@ from trunnion.errors import Status
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Column", "column", "status_column", "time_column", "vector", "whole"]
+__all__ = ["Column", "column", "kept", "status_column", "time_column", "vector", "whole"]
 
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
 
@@ -21,6 +21,11 @@ Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
 def whole(flat: Iterable[tuple[str, str, NDArray[Any]]]) -> list[Column]:
     """Columns whose values are all at hand."""
     return [(name, unit, values.__getitem__) for name, unit, values in flat]
+
+
+def kept(found: Iterable[Column]) -> list[Column]:
+    """The columns of variables that the result has."""
+    return [one for one in found if one[0]]
 
 
 def time_column(result: xr.Dataset) -> Column:
@@ -40,6 +45,9 @@ def vector(result: xr.Dataset, variable: str, name: str, i: int) -> list[Column]
 
 
 def column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]) -> Column:
+    """An entry of a variable; without a name of a variable that the result has not kept."""
+    if variable not in result:
+        return "", "", lambda window: np.zeros(0)
     array = result[variable]
     values = array.values[index]
     return name, str(array.attrs["units"]), lambda window: values[window]

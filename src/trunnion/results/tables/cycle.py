@@ -53,8 +53,9 @@ def positions(result: xr.Dataset) -> list[Column]:
         found += vector(result, "point_position", f"{point}.", i)
         if "point_error" in result:
             found += vector(result, "point_error", f"{point}.error_", i)
-    drive = result["drive_power"].values
-    found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
+    if "drive_power" in result:
+        drive = result["drive_power"].values
+        found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))
     found.append(column(result, "useful_power", "power_useful", ()))
     if "seat_rounds" in result:
         found.append(column(result, "seat_rounds", "seat_rounds", ()))

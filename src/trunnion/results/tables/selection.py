@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
 from trunnion.results.tables import KINDS, columns, cycle, kind_of
-from trunnion.results.tables.column import Column
+from trunnion.results.tables.column import Column, kept
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,8 @@ def selected(result: xr.Dataset, wanted: Sequence[str] | None = None, table: str
     known = _all(result, table)
     found = [column for column in known[:1] if column[0] == "time"]
     for name in wanted:
-        own = GROUPS[name](result, table) if name in GROUPS else [one for one in known if fnmatchcase(one[0], name)]
+        own = [one for one in known if fnmatchcase(one[0], name)]
+        own = kept(GROUPS[name](result, table)) if name in GROUPS else own
         if not own:
             remedy = nearest(name, [*GROUPS, *(column[0] for column in known)])
             raise MechanismError(Finding(f"there is no column '{name}'", "columns", remedy))
@@ -62,7 +63,7 @@ def _of_cycle(result: xr.Dataset) -> bool:
 
 
 def _once(found: Iterable[Column]) -> list[Column]:
-    kept: dict[str, Column] = {}
-    for column in found:
-        kept.setdefault(column[0], column)
-    return list(kept.values())
+    first: dict[str, Column] = {}
+    for column in kept(found):
+        first.setdefault(column[0], column)
+    return list(first.values())

@@ -23,8 +23,8 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
+from trunnion.studies.allocation.cones import Optimum
 from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
-from trunnion.studies.allocation.interior import Optimum
 from trunnion.studies.allocation.problem import (
     ALLOWED,
     PROVEN,
@@ -270,7 +270,6 @@ class _Search:
             min(bound, best.cost),
             gap,
             proven,
-            residual=best.point.residual if best.point else 0.0,
             choices=choices,
             price=nothing,
             findings=() if proven else (doubt,),

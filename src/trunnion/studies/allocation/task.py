@@ -56,19 +56,6 @@ class Sides:
         back = along if self.factor is None else along @ self.factor
         return np.asarray(self.linear[which] + self.spread[which] * back, float)
 
-    def curvature(self, t: Array, weights: Array, which: Rows) -> Array:
-        """Σ weights_k ∂²g_k/∂t², (contribution, contribution)."""
-        total = np.zeros((len(t), len(t)))
-        for weight, k in zip(weights, which, strict=True):
-            parts = self.parts(t, np.array([k]))[0]
-            norm = float(np.linalg.norm(parts))
-            if norm == 0:
-                continue
-            matrix = np.diag(self.spread[k]) if self.factor is None else self.factor * self.spread[k]
-            across = (matrix - np.outer(parts, parts @ matrix) / norm**2) / norm
-            total += weight * matrix.T @ across
-        return total
-
 
 def sides(problem: AllocationProblem) -> Sides:
     """The sides of a problem's rows that can bind; of a symmetric row only the nearer one."""
@@ -148,13 +135,6 @@ class Task:
         total = np.zeros(len(u))
         for g, cost in self.costs:
             total[g] += self.unit[g] * cost.slope(float(self.unit[g] * u[g]))
-        return total
-
-    def curvature(self, u: Array) -> Array:
-        """∂²cost/∂u², (unknown,)."""
-        total = np.zeros(len(u))
-        for g, cost in self.costs:
-            total[g] += self.unit[g] ** 2 * cost.curvature(float(self.unit[g] * u[g]))
         return total
 
     def scale(self, u: Array) -> float:

@@ -19,7 +19,7 @@ from trunnion import MechanismError
 from trunnion.errors import Finding, Severity
 from trunnion.studies.tolerance import processes
 from trunnion.studies.tolerance.checkpoint import Checkpoint
-from trunnion.studies.tolerance.ranges import Portions, count, gaps, union
+from trunnion.studies.tolerance.ranges import Portions, count, gaps
 from trunnion.studies.tolerance.runner import run
 
 
@@ -212,7 +212,6 @@ def test_gaps_and_portions() -> None:
     assert gaps([], 5) == [(0, 5)]
     assert gaps([(0, 5)], 5) == []
     assert gaps([(1, 2), (4, 5)], 7) == [(0, 1), (2, 4), (5, 7)]
-    assert union([(4, 5), (0, 2), (2, 3)]) == ((0, 3), (4, 5))
     portions = Portions([(1, 2), (4, 5)], 16, 4, 1.0)
     taken = []
     while portions.left:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.statistics.costs import Cost
+from trunnion.statistics.streams import factor
 from trunnion.studies.allocation.problem import AllocationProblem
 
 __all__ = ["Sides", "Task", "sides", "task_of"]
@@ -74,8 +75,9 @@ def sides(problem: AllocationProblem) -> Sides:
     keep = np.asarray(np.isfinite(room))
     keep &= ~(one_sided & (room > room[::-1]))
     keep[1] &= ~(one_sided & (room[0] == room[1]))
-    factor = _root(effects.correlation) if spread.any() else None
-    least = 1.0 if factor is None else float(np.sqrt(max(np.linalg.eigvalsh(factor.T @ factor)[0], 0.0)))
+    matrix, root, least = effects.correlation, None, 1.0
+    if matrix is not None and spread.any() and not np.array_equal(matrix, np.eye(len(matrix))):
+        root, least = factor(matrix).T, float(np.sqrt(max(np.linalg.eigvalsh(matrix)[0], 0.0)))
     half = worst + least * np.abs(spread)
     linear = np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])
     both = np.concatenate([spread[keep[0]], spread[keep[1]]])
@@ -89,20 +91,12 @@ def sides(problem: AllocationProblem) -> Sides:
     return Sides(
         linear,
         both,
-        factor,
+        root,
         np.concatenate([np.flatnonzero(keep[0]), np.flatnonzero(keep[1])]),
         rooms,
         np.min(np.where(np.isnan(bounds), np.inf, bounds), axis=0, initial=np.inf),
-        factor is None and bool(np.all(rising)),
+        root is None and bool(np.all(rising)),
     )
-
-
-def _root(correlation: Array | None) -> Array | None:
-    """K with Kᵀ K the correlation; None for independent contributions."""
-    if correlation is None or np.array_equal(correlation, np.eye(len(correlation))):
-        return None
-    values, vectors = np.linalg.eigh(correlation)
-    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T, float)
 
 
 @dataclass(frozen=True)

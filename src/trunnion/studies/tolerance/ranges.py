@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from trunnion.studies.tolerance.protocol import Blocks
 
-__all__ = ["Portions", "count", "gaps", "union"]
+__all__ = ["Portions", "count", "gaps"]
 
 
 def count(ranges: Iterable[Blocks]) -> int:
@@ -19,17 +19,6 @@ def gaps(done: Iterable[Blocks], blocks: int) -> list[Blocks]:
     """What is missing of 0 … blocks - 1, in order; done: sorted, disjoint."""
     ends = [0, *(end for pair in done for end in pair), blocks]
     return [(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True) if first < last]
-
-
-def union(ranges: Iterable[Blocks]) -> tuple[Blocks, ...]:
-    """Disjoint ranges sorted, neighbours joined."""
-    joined: list[Blocks] = []
-    for first, last in sorted(ranges):
-        if joined and first == joined[-1][1]:
-            joined[-1] = (joined[-1][0], last)
-        else:
-            joined.append((first, last))
-    return tuple(joined)
 
 
 EACH = 0.05  # s for every worker: ten times what one portion costs the main process (`python -m benchmarks.spread`)

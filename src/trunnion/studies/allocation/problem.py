@@ -293,6 +293,13 @@ class Answer:
         return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
 
 
+def common_options(members: Sequence[Contribution]) -> dict[str, list[Option]]:
+    """Options by name that all members of a group have within the bounds of all, one for each member."""
+    least, most = max(one.least for one in members), min(one.most for one in members)
+    fit = [{each.name: each for each in one.options if least <= each.tolerance <= most} for one in members]
+    return {name: [own[name] for own in fit] for name in fit[0] if all(name in own for own in fit)}
+
+
 def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:
     """The answer that there is none."""
     nothing = np.full(len(problem.contributions), np.nan)

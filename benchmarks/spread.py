@@ -101,7 +101,9 @@ def checkpoint(measures: int, positions: int) -> tuple[float, float, float]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.npz"
         start = time.perf_counter()
-        Checkpoint(path, Nothing(1, tally.counts.size)).keep(tally)
+        kept = Checkpoint(path, Nothing(1, tally.counts.size))
+        kept.tally = tally
+        kept.keep()
         return tally.counts.nbytes, path.stat().st_size, time.perf_counter() - start
 
 

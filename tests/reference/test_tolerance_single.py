@@ -137,4 +137,4 @@ def test_derivatives_against_samples(name: str) -> None:
             width = moves[i, i] - moves[i, count + i]
             slope = (figures[k, i] - figures[k, count + i]) / width
             size = max(np.abs(of.reference.figure), 1e-3) / abs(found.inputs.tolerances[i].nominal)
-            assert of.sensitivity[i] == pytest.approx(slope, rel=1e-4, abs=2e-4 * size), (of.measure.name, i)
+            assert of.figure.sensitivity[i] == pytest.approx(slope, rel=1e-4, abs=2e-4 * size), (of.measure.name, i)

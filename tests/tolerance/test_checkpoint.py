@@ -12,7 +12,7 @@ import pytest
 from toy_job import ToyJob, ToyTally
 from trunnion import MechanismError
 from trunnion.studies.tolerance import checkpoint as module
-from trunnion.studies.tolerance.checkpoint import Checkpoint, job_hash
+from trunnion.studies.tolerance.checkpoint import Checkpoint, settings
 from trunnion.studies.tolerance.runner import run
 
 
@@ -22,7 +22,8 @@ def part(tmp_path: Path) -> Path:
     path = tmp_path / "run.npz"
     saved = Checkpoint(path, ToyJob())
     prepared = ToyJob().prepare()
-    saved.keep(prepared.evaluate(0, 10).merge(prepared.evaluate(20, 25)))
+    saved.tally = prepared.evaluate(0, 10).merge(prepared.evaluate(20, 25))
+    saved.keep()
     assert saved.trouble is None
     return path
 
@@ -144,7 +145,7 @@ def test_a_full_disk_does_not_end_the_run(tmp_path: Path, monkeypatch: pytest.Mo
 def test_written_from_time_to_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written: list[ToyTally] = []
     keep = Checkpoint.keep
-    monkeypatch.setattr(Checkpoint, "keep", lambda self, tally: (written.append(tally), keep(self, tally)))
+    monkeypatch.setattr(Checkpoint, "keep", lambda self: (written.append(self.tally), keep(self)))
     monkeypatch.setattr(module, "INTERVAL", 0.02)
     monkeypatch.setattr(module, "SHARE", 1.0)
     run(ToyJob(pause=0.01), chunk=500, checkpoint=tmp_path / "run.npz")
@@ -152,9 +153,9 @@ def test_written_from_time_to_time(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert written[-1].blocks == ((0, 37),)
 
 
-def test_the_hash_is_of_the_job_alone() -> None:
-    assert job_hash(ToyJob()) == job_hash(ToyJob(pause=1.0, folder=Path()))
-    assert job_hash(ToyJob()) != job_hash(ToyJob(seed=2))
+def test_the_settings_are_of_the_job_alone() -> None:
+    assert settings(ToyJob()) == settings(ToyJob(pause=1.0, folder=Path()))
+    assert settings(ToyJob()) != settings(ToyJob(seed=2))
     arrays = [ToyJob(model={"a": np.linspace(0.0, last, 2000)}) for last in (1.0, 1.0, 1.0 + 1e-12)]
-    assert job_hash(arrays[0]) == job_hash(arrays[1]) != job_hash(arrays[2])
-    assert job_hash(ToyJob(model={"a": 1.0, "b": 2.0})) == job_hash(ToyJob(model={"b": 2.0, "a": 1.0}))
+    assert settings(arrays[0]) == settings(arrays[1]) != settings(arrays[2])
+    assert settings(ToyJob(model={"a": 1.0, "b": 2.0})) == settings(ToyJob(model={"b": 2.0, "a": 1.0}))

@@ -19,7 +19,7 @@ from trunnion import MechanismError
 from trunnion.errors import Finding, Severity
 from trunnion.studies.tolerance import processes
 from trunnion.studies.tolerance.checkpoint import Checkpoint
-from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count, gaps, union
+from trunnion.studies.tolerance.ranges import Portions, count, gaps
 from trunnion.studies.tolerance.runner import run
 
 
@@ -93,7 +93,8 @@ def test_machines_of_several_kinds_are_told(tmp_path: Path) -> None:
     path = tmp_path / "run.npz"
     saved = Checkpoint(path, ToyJob())
     saved.arithmetic.add("another")
-    saved.keep(ToyJob().prepare().evaluate(0, 10))
+    saved.tally = ToyJob().prepare().evaluate(0, 10)
+    saved.keep()
     (note,) = run(ToyJob(), checkpoint=path, resume=True).notes
     assert note.figures["kinds"] == 2
     assert note.severity == Severity.NOTE
@@ -207,37 +208,41 @@ def test_arguments_that_make_no_sense_are_findings() -> None:
     assert [finding.where for finding in caught.value.findings] == ["jobs", "chunk", "resume"]
 
 
-def test_gaps_and_plan() -> None:
+def test_gaps_and_portions() -> None:
     assert gaps([], 5) == [(0, 5)]
     assert gaps([(0, 5)], 5) == []
     assert gaps([(1, 2), (4, 5)], 7) == [(0, 1), (2, 4), (5, 7)]
-    assert union([(4, 5), (0, 2), (2, 3)]) == ((0, 3), (4, 5))
-    plan = BlockRanges([(1, 2), (4, 5)], 16)
+    portions = Portions([(1, 2), (4, 5)], 16, 4, 1.0)
     taken = []
-    while plan.left:
-        taken.append(plan.take(4, aligned=False))
+    while portions.left:
+        taken.append(portions.take(1))
     assert taken == [(0, 1), (2, 4), (5, 9), (9, 13), (13, 16)]
 
 
 def test_aligned_portions_are_nodes_of_the_tree() -> None:
-    plan = BlockRanges([(3, 5)], 100)
+    portions = Portions([(3, 5)], 100, None, 17.0)
+    portions.seen((0, 1), 1.0)
     taken = []
-    while plan.left:
-        taken.append(plan.take(17, aligned=True))
+    while portions.left:
+        taken.append(portions.take(1))
     assert sorted(block for first, last in taken for block in range(first, last)) == [0, 1, 2, *range(5, 100)]
     for first, last in taken:
         size = last - first
         assert size & (size - 1) == 0
         assert first % size == 0
         assert size <= 16
+    assert max(last - first for first, last in taken) == 16
 
 
 def test_portions_follow_the_pace() -> None:
-    pace = Pace(None, 1.0)
-    assert pace.blocks(1000, 2) == 1  # nothing is known yet
-    pace.seen(1, 0.01)
-    assert pace.blocks(10**6, 2) == 100
-    assert pace.blocks(10**8, 1000) == 5000  # none comes more often than it can be merged
-    assert pace.blocks(40, 2) == 10  # the end is shared out
-    assert pace.blocks(10, 2) == 6  # but not endlessly
-    assert Pace(7, 1.0).blocks(1000, 2) == 7
+    def size(blocks: int, workers: int) -> int:
+        portions = Portions([], blocks, None, 1.0)
+        assert portions.size(workers) == 1  # nothing is known yet
+        portions.seen((0, 1), 0.01)
+        return portions.size(workers)
+
+    assert size(10**6, 2) == 100
+    assert size(10**8, 1000) == 5000  # none comes more often than it can be merged
+    assert size(40, 2) == 10  # the end is shared out
+    assert size(10, 2) == 6  # but not endlessly
+    assert Portions([], 1000, 7, 1.0).size(2) == 7

@@ -164,5 +164,5 @@ def test_costs_of_formulas_are_a_line_and_a_play_has_no_sign() -> None:
     assert panels["joints.O.clearance"].get_xlabel().startswith("clearance")
     assert "±" not in panels["joints.O.clearance"].get_title(loc="left")
     assert panels["dimensions.k"].get_xlabel().startswith("±")
-    steps = trade_off(result, [(0.5, 3.0), (1.0, 1.0), (2.0, 1.0)], stepped=True)  # type: ignore[list-item]
+    steps = trade_off(result, [(0.5, 3.0), (1.0, 1.0), (2.0, 1.0)], stepped=True)
     assert steps.axes[0].lines[0].get_drawstyle() == "steps-post"

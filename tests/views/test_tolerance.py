@@ -18,11 +18,12 @@ from trunnion.cli.result import check_files
 from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
-from trunnion.views.allocation.cost import Offer, PriceCurve, tolerance_cost, trade_off
+from trunnion.results.quantities import scaled
+from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.cycle.plots import save
 from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, check_kind, drawable, figure, sheet
-from trunnion.views.tolerance.readings import fixed, limits_text, readings, scaled, share, share_interval
+from trunnion.views.tolerance.readings import fixed, limits_text, readings, share, share_interval
 from trunnion.views.tolerance.tables import corners, figures, indices, inputs, overview, tables
 
 
@@ -267,13 +268,13 @@ def test_the_trade_off_marks_the_stated_limits_and_what_cannot_be_kept():
     result = toleranced(24, 100)
     shares = np.linspace(0.25, 2, 8)
     costs = np.where(shares < 0.4, np.nan, 16.456705 / shares**0.45)
-    drawn = trade_off(result, [Offer(*pair) for pair in zip(shares, costs, strict=True)], ("angle-error", LIMIT, "rad"))
+    drawn = trade_off(result, list(zip(shares, costs, strict=True)), ("angle-error", LIMIT, "rad"))
     (axes,) = drawn.axes
     assert not outside(drawn)
     assert axes.get_xlabel() == "limit of angle-error ± [°]"
     assert line(axes, "stated limits") == pytest.approx(np.array([[0.1, 16.456705]]), rel=1e-3)
     assert [text.get_text() for text in axes.texts] == ["infeasible"]
-    stepped = trade_off(result, [Offer(one, float(np.ceil(6 / one) // 3)) for one in shares])
+    stepped = trade_off(result, [(one, float(np.ceil(6 / one) // 3)) for one in shares], stepped=True)
     assert stepped.axes[0].lines[0].get_drawstyle() == "steps-post"
 
 

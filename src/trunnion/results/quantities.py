@@ -9,7 +9,8 @@ import math
 from collections.abc import Iterable
 
 __all__ = [
-    "between", "drawn_in", "number", "parts", "prefixed", "quantity", "readable", "scale_of", "scaled", "signed",
+    "between", "drawn_in", "joined", "number", "parts", "prefixed", "quantity", "readable", "scale_of", "scaled",
+    "signed",
 ]  # fmt: skip
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
@@ -55,8 +56,12 @@ def quantity(value: object, unit: str = "") -> str:
     if math.isnan(value):
         return number(value)
     factor, shown = prefixed(value, unit)
-    separator = "" if shown in ("°", "") else "\u00a0"
-    return f"{number(value * factor)}{separator}{shown}"
+    return joined(number(value * factor), shown)
+
+
+def joined(text: str, shown: str) -> str:
+    """A number with its unit, which stays on its line: "18.75 kN", "0.5°"."""
+    return f"{text}{shown}" if shown in ("°", "") else f"{text}\u00a0{shown}"
 
 
 def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:

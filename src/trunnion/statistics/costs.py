@@ -1,6 +1,6 @@
 """What a tolerance costs, by its half width t (of a clearance: the radial clearance).
 
-A model is three functions, the cost, its slope and its curvature over t, and one entry of `COST_MODELS`. Both models
+A model is two functions, the cost and its slope over t, and one entry of `COST_MODELS`. Both models
 fall and are convex in t wherever B ≥ 0 and k > 0; the power model is convex in log t too, the exponential one only
 where k t ≥ unit. So an allocation is solved in t, where it is convex with either.
 """
@@ -33,21 +33,20 @@ class CostParameter:
 
 
 class CostFunction(Protocol):
-    """A cost, or a derivative of it, from the half width t (m or rad)."""
+    """A cost, or its derivative, from the half width t (m or rad)."""
 
     def __call__(self, t: float, *, A: float, B: float, k: float, unit: float) -> float: ...
 
 
 @dataclass(frozen=True)
 class CostModel:
-    """A cost of a tolerance, with its first two derivatives with respect to the half width.
+    """A cost of a tolerance, with its derivative with respect to the half width.
 
     cone: the cone of a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
     """
 
     value: CostFunction
     slope: CostFunction
-    curvature: CostFunction
     parameters: Mapping[str, CostParameter]
     formula: str
     source: str
@@ -64,11 +63,6 @@ def power_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float
     return float(-k * B / unit * (t / unit) ** (-k - 1)) if B else 0.0  # also where t is 0, and the cost A
 
 
-def power_curvature(t: float, *, A: float, B: float, k: float, unit: float) -> float:
-    """k (k + 1) B/unit² (t/unit)^(−k − 2)."""
-    return float(k * (k + 1) * B / unit**2 * (t / unit) ** (-k - 2)) if B else 0.0
-
-
 def exponential(t: float, *, A: float, B: float, k: float, unit: float) -> float:
     """A + B exp(−k t/unit): cost of a half width t, m or rad; A + B at t = 0."""
     return A + B * float(np.exp(-k * t / unit))
@@ -77,11 +71,6 @@ def exponential(t: float, *, A: float, B: float, k: float, unit: float) -> float
 def exponential_slope(t: float, *, A: float, B: float, k: float, unit: float) -> float:
     """−k B/unit exp(−k t/unit)."""
     return -k * B / unit * float(np.exp(-k * t / unit))
-
-
-def exponential_curvature(t: float, *, A: float, B: float, k: float, unit: float) -> float:
-    """(k/unit)² B exp(−k t/unit)."""
-    return (k / unit) ** 2 * B * float(np.exp(-k * t / unit))
 
 
 _PARAMETERS: Mapping[str, CostParameter] = {
@@ -95,7 +84,6 @@ COST_MODELS: dict[str, CostModel] = {
     "power": CostModel(
         power,
         power_slope,
-        power_curvature,
         _PARAMETERS,
         "A + B/(t/unit)^k",
         "G. H. Sutherland and B. Roth, Mechanism design: accounting for manufacturing tolerances and costs in "
@@ -105,7 +93,6 @@ COST_MODELS: dict[str, CostModel] = {
     "exponential": CostModel(
         exponential,
         exponential_slope,
-        exponential_curvature,
         _PARAMETERS,
         "A + B exp(−k t/unit)",
         "F. H. Speckhart, Calculation of tolerance based on a minimum cost approach, ASME Journal of Engineering for "
@@ -133,10 +120,6 @@ class Cost:
     def slope(self, t: float) -> float:
         """Rise of the cost with t: never above zero."""
         return COST_MODELS[self.model].slope(t, **self._values())
-
-    def curvature(self, t: float) -> float:
-        """Second derivative of the cost: never below zero."""
-        return COST_MODELS[self.model].curvature(t, **self._values())
 
     def findings(self, where: str = "") -> list[Finding]:
         """What is missing or out of range."""

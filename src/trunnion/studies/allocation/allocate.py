@@ -8,6 +8,7 @@ they stay the same. Then the mechanism is analysed with the tolerances found: wo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +35,7 @@ from trunnion.studies.allocation.problem import (
 from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
 from trunnion.studies.allocation.solve import CHOICES, solve, trade_off
 from trunnion.studies.allocation.solve import Choice as Way
-from trunnion.studies.tolerance.first_order import ToleranceStudy, study
+from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, tolerance
 from trunnion.studies.tolerance.targets import limits
 
@@ -94,9 +95,12 @@ def allocate(
         what = f"the criterion {criterion} does not use a yield of {target:g}"
         raise MechanismError(Finding(what, "yield", "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
-    asked = AllocationRequest(criterion, share, choice, steps, at, samples, seed, friction_method, jobs, curve, exact)
-    _check(asked)
-    found = _found(mechanism, _limited(mechanism, measures), asked)
+    _check(criterion, choice, share, samples, curve)
+    asked = AllocationRequest(
+        mechanism, _limited(mechanism, measures), criterion, share, choice, steps, at, samples, seed, friction_method,
+        jobs, curve, exact,
+    )  # fmt: skip
+    found = _found(asked)
     with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
     names = [of.measure.name for of in found.study.linear.measures]
     methods = ["linear", "worst-case"] if found.answer.found else ["linear"]
@@ -125,21 +129,21 @@ def half_widths(result: xr.Dataset) -> dict[str, float]:
     return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
 
 
-def _check(asked: AllocationRequest) -> None:
+def _check(criterion: str, choice: str, target: float, samples: int, curve: int) -> None:
     findings = []
-    if asked.criterion not in CRITERIA:
+    if criterion not in CRITERIA:
         remedy = f"use {', '.join(CRITERIA)}"
-        findings.append(Finding(f"there is no criterion '{asked.criterion}'", "criterion", remedy))
-    if asked.choice not in ("auto", *CHOICES):
+        findings.append(Finding(f"there is no criterion '{criterion}'", "criterion", remedy))
+    if choice not in ("auto", *CHOICES):
         remedy = f"use {', '.join(('auto', *CHOICES))}"
-        findings.append(Finding(f"there is no choice '{asked.choice}'", "choice", remedy))
-    if not 0 < asked.target < 1:
-        what = f"a yield of {asked.target:g} is not possible"
+        findings.append(Finding(f"there is no choice '{choice}'", "choice", remedy))
+    if not 0 < target < 1:
+        what = f"a yield of {target:g} is not possible"
         findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))
-    if asked.samples < 0:
-        findings.append(Finding(f"{asked.samples} samples", "samples", "give a number from 0"))
-    if not (asked.curve == 0 or 2 <= asked.curve <= MOST_FACTORS):
-        findings.append(Finding(f"a curve of {asked.curve} points", "curve", f"give 2 to {MOST_FACTORS}"))
+    if samples < 0:
+        findings.append(Finding(f"{samples} samples", "samples", "give a number from 0"))
+    if not (curve == 0 or 2 <= curve <= MOST_FACTORS):
+        findings.append(Finding(f"a curve of {curve} points", "curve", f"give 2 to {MOST_FACTORS}"))
     if findings:
         raise MechanismError(findings)
 
@@ -157,27 +161,26 @@ def _limited(mechanism: Mechanism, measures: Sequence[str] | None) -> list[str]:
     return found
 
 
-def _found(mechanism: Mechanism, measures: Sequence[str], asked: AllocationRequest) -> Allocated:
+def _found(asked: AllocationRequest) -> Allocated:
     """The allocation, with effects that belong to the tolerances found."""
+    mechanism = asked.mechanism
     if not mechanism.costs:
         remedy = "state the costs of tolerances, as costs: {AB: {model: power, B: 1, k: 0.45, unit: mm}}"
         raise MechanismError(Finding("no tolerance has a cost", "costs", remedy))
     absent = {one.path: _start(one) for one in mechanism.prices() if one.play and not _clearance(mechanism, one.path)}
-    now = _studied(mechanism.with_tolerances(absent) if absent else mechanism, measures, asked)
+    now = asked.studied(absent)
     prices, notes = _prices(now)
     before = {**_stated(now, prices), **{path: 0.0 for path in absent if path in prices}}
     way: Way = asked.choice if asked.choice != "auto" else _way(prices)
-    first = rows_of(now, _stated(now, prices), asked.criterion)
-    notes += [_unknown(name) for name in first.unknown]
-    search = _Search(mechanism, measures, asked, prices, way)
+    search = _Search(asked, prices, way)
     answer, now, rows, more = search.run(now)
     if asked.exact and asked.criterion == "worst-case" and answer.found:
         answer, now, rows, more = search.tightened(answer, now, rows, more)
     offers: list[tuple[float, Answer]] = []
     if asked.curve and answer.found:
         offers = _curve(answer, way, asked)
-    findings = (*notes, *more)
-    return Allocated(asked, now, rows, answer, way, prices, before, findings, search.tight, tuple(offers))
+    notes += [finding_for("allocation.unknown", f"measures.{name}") for name in rows.unknown]
+    return Allocated(asked, now, rows, answer, way, prices, before, (*notes, *more), search.tight, tuple(offers))
 
 
 def _curve(answer: Answer, way: Way, asked: AllocationRequest) -> list[tuple[float, Answer]]:
@@ -186,19 +189,10 @@ def _curve(answer: Answer, way: Way, asked: AllocationRequest) -> list[tuple[flo
     Of a yield they have that of normal deviations which the answer has: what samples have shown the target to take.
     """
     factors: list[float] = np.geomspace(*RANGE, asked.curve).tolist()
-    target = _target(asked)
-    if target is not None and answer.sampled is not None and 0 < answer.expected < 1:
-        target = answer.expected
+    sampled = answer.sampled is not None and 0 < answer.expected < 1
+    target = answer.expected if sampled else asked.target
     offers = trade_off(answer.problem, factors, way, target)
     return [(factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, offers, strict=True)]
-
-
-def _studied(mechanism: Mechanism, measures: Sequence[str], asked: AllocationRequest) -> ToleranceStudy:
-    return study(mechanism, measures, asked.steps, asked.at, asked.friction)
-
-
-def _target(asked: AllocationRequest) -> float | None:
-    return asked.target if asked.criterion == "yield" else None
 
 
 def _way(prices: Mapping[str, Price]) -> Way:
@@ -285,19 +279,14 @@ def _contribution(one: Price) -> Contribution:
 Found = tuple[Answer, ToleranceStudy, Rows, list[Finding]]
 
 
+@dataclass
 class _Search:
     """Rounds of rows and answers until they belong together."""
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        measures: Sequence[str],
-        asked: AllocationRequest,
-        prices: Mapping[str, Price],
-        way: Way,
-    ) -> None:
-        self.mechanism, self.measures, self.asked, self.prices, self.way = mechanism, measures, asked, prices, way
-        self.tight: dict[str, float] = {}
+    asked: AllocationRequest
+    prices: Mapping[str, Price]
+    way: Way
+    tight: dict[str, float] = field(default_factory=dict)
 
     def run(self, now: ToleranceStudy) -> Found:
         """The answer with rows taken at its own tolerances, from those of a study."""
@@ -311,7 +300,7 @@ class _Search:
             if not answer.found:
                 break
             bought = self._bought(answer)
-            after = _studied(self.mechanism.with_tolerances(bought), self.measures, self.asked)
+            after = self.asked.studied(bought)
             ahead = self._rows(after, bought)
             if _same(answer.problem, answer.tolerances, rows, ahead):
                 return answer, after, whole, []
@@ -350,7 +339,7 @@ class _Search:
         def verify(tolerances: Array, stream: int = 0) -> tuple[float, float, float]:
             bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
             sampled = tolerance(
-                self.mechanism.with_tolerances(bought), self.measures, ["monte-carlo"], asked.samples,
+                asked.mechanism.with_tolerances(bought), asked.measures, ["monte-carlo"], asked.samples,
                 asked.seed + FRESH * stream, asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
             )  # fmt: skip
             if sampled.attrs["stopped"]:  # a part of the samples decides no tolerances
@@ -359,7 +348,7 @@ class _Search:
             return share, low, high
 
         judges = (verify, verify) if asked.samples else (None, None)
-        return solve(problem, self.way, _target(asked), *judges)
+        return solve(problem, self.way, asked.target, *judges)
 
 
 def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
@@ -399,7 +388,3 @@ def _off(now: ToleranceStudy) -> list[Finding]:
                 )
             )
     return found
-
-
-def _unknown(name: str) -> Finding:
-    return finding_for("allocation.unknown", f"measures.{name}")

@@ -1,12 +1,14 @@
 """An allocation as a conic program: power and exponential cones for costs, second-order cones for RSS rows.
 
+Its dual objective is a lower bound of the cost of all that keep the limits, and proves the answer.
+
 P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives,
 arXiv:2405.12762
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import clarabel
@@ -17,14 +19,15 @@ from scipy import sparse
 from trunnion.statistics.costs import COST_MODELS
 from trunnion.studies.allocation.task import Task
 
-__all__ = ["settled", "solved"]
+__all__ = ["Optimum", "settled"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SOUND = ("Solved", "AlmostSolved", "InsufficientProgress")
-FINE = 1e-9
-CLOSE = 1e-4  # an answer that goes into Newton's method; the proof is of what comes out
-BROKEN = 1e-7  # of a limit: a row to add
+FINE = 1e-12
+CLOSE = 1e-4  # residuals of an answer that is looked at; its gap tells what it is worth
+BROKEN = 1e-11  # of a limit: a row to add
+ACTIVE = 1e-6  # of the largest multiplier: a side that limits
 AT_ONCE = 16  # rows added in one round
 
 
@@ -49,25 +52,53 @@ class _Cones:
         return self.rows - len(right)
 
 
-def settled(task: Task, relaxed: bool = False) -> tuple[Array, Rows, Array, int] | None:
-    """Unknowns u, the sides that were needed, their multipliers, rounds; None if the solver did not come to an end.
+@dataclass(frozen=True)
+class Optimum:
+    """Unknowns u within all limits, the sides that hold them with their multipliers, and how good they are.
+
+    bound: no u within the limits costs less; gap: cost from this bound, in units of the cost that tolerances change;
+    wider: the share by which all limits had to be widened; rounds: of the solver.
+    """
+
+    u: Array
+    rows: Rows
+    weights: Array
+    bound: float
+    wider: float = 0.0
+    gap: float = np.nan
+    rounds: int = 0
+
+
+def settled(task: Task, relaxed: bool = False) -> Optimum | None:
+    """The point of least cost; None if the solver did not come to an end.
 
     Sides that the answer breaks are added until there is none: thousands of rows cost little.
     relaxed: the least share by which all limits have to be widened, in place of the least cost.
     """
     rows, rounds = _first(task), 0
     while True:
-        found = solved(task, rows, relaxed)
+        point = _solved(task, rows, relaxed)
         rounds += 1
-        if found is None:
+        if point is None:
             return None
-        u, weights, wider = found
-        value = task.sides.value(task.tolerances(u)) - wider
+        value = task.sides.value(task.tolerances(point.u)) - point.wider
         value[rows] = 0.0
         broken = np.flatnonzero(value > 1 + BROKEN)
         if not len(broken):
-            return u, rows, weights, rounds
+            break
         rows = np.concatenate([rows, broken[np.argsort(-value[broken], kind="stable")[:AT_ONCE]]])
+    if relaxed:
+        return point
+    u = _within(task, point.u)
+    return replace(point, u=u, gap=abs(task.cost(u) - point.bound) / task.scale(u), rounds=rounds)
+
+
+def _within(task: Task, u: Array) -> Array:
+    """The same brought back within the limits, which the solver keeps to its tolerance only."""
+    over, least = (np.max(task.sides.value(task.tolerances(one)), initial=0.0) for one in (u, task.low))
+    if over <= 1 or least >= 1:
+        return u
+    return task.low + (1 - least) / (over - least) * (u - task.low)  # on a line to the least the sides are convex
 
 
 def _first(task: Task) -> Rows:
@@ -79,8 +110,8 @@ def _first(task: Task) -> Rows:
     return np.array(sorted(picked), np.intp)
 
 
-def solved(task: Task, rows: Rows, relaxed: bool) -> tuple[Array, Array, float] | None:
-    """Unknowns u, multipliers of these sides, and how much wider the limits are taken (0 if not relaxed)."""
+def _solved(task: Task, rows: Rows, relaxed: bool) -> Optimum | None:
+    """What the solver finds with these sides alone."""
     count, priced = len(task.unit), [] if relaxed else task.costs
     cones = _Cones(count + len(priced) + int(relaxed))
     bounds, right = np.concatenate([-np.eye(count), np.eye(count)]), np.concatenate([-task.low, task.high])
@@ -93,16 +124,19 @@ def solved(task: Task, rows: Rows, relaxed: bool) -> tuple[Array, Array, float] 
         aim[-1] = 1.0
         cones.add(clarabel.NonnegativeConeT(1), -np.eye(cones.columns)[-1:], np.zeros(1))
     else:
-        weights = [_epigraph(task, place, cones) for place in range(len(priced))]
-        scale = sum(weights) or 1.0
-        aim[count:] = np.array(weights) / scale
+        shares = [_epigraph(task, place, cones) for place in range(len(priced))]
+        scale = sum(shares) or 1.0
+        aim[count:] = np.array(shares) / scale
     nothing = sparse.csc_matrix((cones.columns, cones.columns))
     whole, b = sparse.csc_matrix(np.vstack(cones.blocks)), np.concatenate(cones.right)
     found = clarabel.DefaultSolver(nothing, aim, whole, b, cones.cones, _settings()).solve()
     if str(found.status) not in SOUND or found.r_prim > CLOSE or found.r_dual > CLOSE:
         return None
-    x = np.asarray(found.x)
-    return x[:count], scale * np.maximum(np.asarray(found.z)[firsts], 0.0), float(x[-1]) if relaxed else 0.0
+    x, weights = np.asarray(found.x), scale * np.maximum(np.asarray(found.z)[firsts], 0.0)
+    active = weights > ACTIVE * np.max(weights, initial=0.0)
+    bound = sum(cost.value(np.inf) for _, cost in priced) + scale * found.obj_val_dual
+    wider = float(x[-1]) if relaxed else 0.0
+    return Optimum(np.clip(x[:count], task.low, task.high), rows[active], weights[active], bound, wider)
 
 
 def _side(task: Task, k: int, cones: _Cones, relaxed: bool) -> int:

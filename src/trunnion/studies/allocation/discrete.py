@@ -23,14 +23,15 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
+from trunnion.studies.allocation.cones import Optimum
 from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
-from trunnion.studies.allocation.interior import Optimum
 from trunnion.studies.allocation.problem import (
     ALLOWED,
     PROVEN,
     AllocationProblem,
     Answer,
     Contribution,
+    common_options,
     none,
     shortfalls,
 )
@@ -74,18 +75,17 @@ class _Search:
         place = {one.name: i for i, one in enumerate(problem.contributions)}
         self.limits: Sides = sides(problem)
         self.task: Task = task_of(problem, self.limits)
-        self.names = [_common(members) for members in groups]
+        options = [common_options(members) for members in groups]
+        self.names = [list(each) for each in options]
         self.widths = [len(names) for names in self.names]
         self.starts = [0, *accumulate(self.widths)]
         self.members = [[place[one.name] for one in members] for members in groups]
         self.table = np.zeros((len(place), self.starts[-1]))  # half widths by option
         self.prices = np.zeros((len(place), self.starts[-1]))
-        for start, names, members in zip(self.starts, self.names, groups, strict=False):
-            for k, name in enumerate(names):
-                for one in members:
-                    option = next(each for each in one.options if each.name == name)
-                    self.table[place[one.name], start + k] = option.tolerance
-                    self.prices[place[one.name], start + k] = option.cost
+        for start, own, members in zip(self.starts, options, self.members, strict=False):
+            for k, each in enumerate(own.values(), start):
+                self.table[members, k] = [option.tolerance for option in each]
+                self.prices[members, k] = [option.cost for option in each]
         self.scale = float(np.sum(np.abs(self.prices))) or 1.0
         self.rows: list[Array] = []  # rows · unknowns ≤ right
         self.right: list[float] = []
@@ -270,16 +270,8 @@ class _Search:
             min(bound, best.cost),
             gap,
             proven,
-            residual=best.point.residual if best.point else 0.0,
             choices=choices,
             price=nothing,
             findings=() if proven else (doubt,),
             rounds=rounds,
         )
-
-
-def _common(members: list[Contribution]) -> list[str]:
-    """Names of the options that all members of a group have within their bounds, in order."""
-    least, most = max(one.least for one in members), min(one.most for one in members)
-    fit = [{each.name for each in one.options if least <= each.tolerance <= most} for one in members]
-    return [each.name for each in members[0].options if all(each.name in names for names in fit)]

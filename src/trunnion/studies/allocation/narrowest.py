@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from trunnion.studies.allocation.normal import normal_yield, plain_yield
-from trunnion.studies.allocation.problem import FAR, AllocationProblem, Answer, Contribution
+from trunnion.studies.allocation.problem import FAR, AllocationProblem, Answer, common_options
 from trunnion.studies.allocation.task import sides, task_of
 
 __all__ = ["bought_at", "freed", "narrowest", "with_caps"]
@@ -30,12 +30,12 @@ def narrowest(problem: AllocationProblem) -> Array:
     place = {one.name: i for i, one in enumerate(problem.contributions)}
     t = np.array([one.value if one.fixed else 0.0 for one in problem.contributions])
     for members in problem.groups().values():
-        widths = _widths(members)
-        if members[0].options and not widths:
+        options = common_options(members)
+        if members[0].options and not options:
             continue
         least = np.full(len(members), max(one.least for one in members))
-        if widths:
-            table = np.array(list(widths.values()))
+        if options:
+            table = np.array([[option.tolerance for option in each] for each in options.values()])
             scale = np.maximum(np.min(table, axis=0), np.finfo(float).tiny)
             least = table[int(np.argmin(np.sum(table / scale, axis=1)))]
         t[[place[one.name] for one in members]] = least
@@ -117,10 +117,3 @@ def bought_at(problem: AllocationProblem, tolerances: Array, bound: float) -> An
         return None
     nothing = np.full(len(problem.effects.worst), np.nan)
     return Answer(problem, tolerances, costs, cost, bound, np.nan, proven=False, choices=choices, price=nothing)
-
-
-def _widths(members: list[Contribution]) -> dict[str, list[float]]:
-    """Half widths of the members by option, of the options that all have within their bounds."""
-    least, most = max(one.least for one in members), min(one.most for one in members)
-    fit = [{o.name: o.tolerance for o in one.options if least <= o.tolerance <= most} for one in members]
-    return {name: [each[name] for each in fit] for name in fit[0] if all(name in each for each in fit)}

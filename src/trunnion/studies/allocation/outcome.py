@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from trunnion.errors import Finding
+from trunnion.model.mechanism import Mechanism
 from trunnion.model.prices import Price
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows
 from trunnion.studies.allocation.solve import Choice as Way
-from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 
 __all__ = ["CLOSE", "DEFAULT_YIELD", "Allocated", "AllocationRequest", "Choice", "share_of"]
 
@@ -26,8 +27,10 @@ CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought
 
 @dataclass(frozen=True)
 class AllocationRequest:
-    """What was asked for; see `allocate`."""
+    """What was asked for; see `allocate`. measures: those with limits; target: the yield, for that criterion."""
 
+    mechanism: Mechanism
+    measures: Sequence[str]
     criterion: Criterion
     target: float
     choice: Choice
@@ -39,6 +42,11 @@ class AllocationRequest:
     jobs: int | None
     curve: int
     exact: bool
+
+    def studied(self, bought: Mapping[str, float]) -> ToleranceStudy:
+        """First order of the mechanism with these half widths and clearances, by path."""
+        mechanism = self.mechanism.with_tolerances(bought)
+        return study(mechanism, self.measures, self.steps, self.at, self.friction)
 
 
 @dataclass(frozen=True, eq=False)

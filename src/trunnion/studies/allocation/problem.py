@@ -47,7 +47,7 @@ CRITERIA: dict[Criterion, str] = {
 }
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
-PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
+PROVEN = 1e-8  # of the cost that tolerances change: a gap below it proves the optimum
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ class Answer:
 
     tolerances, costs: by contribution, m or rad; a fixed one costs nothing. choices: names of the options taken.
     bound: no allocation costs less than this; gap: cost minus bound, a share of the cost that tolerances change.
-    residual: of the optimality conditions, relative; proven: whether the gap proves a global optimum.
+    proven: whether the gap proves a global optimum.
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
     active: rows that limit; used: share of its room each row takes. rounds: of the solver.
     Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; checked, by samples that had no
@@ -252,7 +252,6 @@ class Answer:
     bound: float
     gap: float
     proven: bool
-    residual: float = np.nan
     choices: dict[str, str] = field(default_factory=dict)
     price: Array = field(default_factory=lambda: np.zeros(0))
     findings: tuple[Finding, ...] = ()
@@ -292,6 +291,13 @@ class Answer:
             return "no allocation meets the limits"
         word = "global optimum" if self.proven else "best found"
         return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
+
+
+def common_options(members: Sequence[Contribution]) -> dict[str, list[Option]]:
+    """Options by name that all members of a group have within the bounds of all, one for each member."""
+    least, most = max(one.least for one in members), min(one.most for one in members)
+    fit = [{each.name: each for each in one.options if least <= each.tolerance <= most} for one in members]
+    return {name: [own[name] for own in fit] for name in fit[0] if all(name in own for own in fit)}
 
 
 def none(problem: AllocationProblem, findings: Sequence[Finding]) -> Answer:

@@ -67,10 +67,10 @@ def _block(of: Of) -> _Block:
     if (by_position(of.reference) and of.place >= 0) or root:
         index = np.asarray(of.reference.window.index, np.intp)
         moving = measure.kind == "path_error"
-        return _Block(of.curve_sensitivity, of.curve_spread, lower, upper, index, moving)
-    spread = Spread(*(np.asarray(part)[:, None] for part in of.spread))
+        return _Block(of.course.sensitivity, of.course.spread, lower, upper, index, moving)
+    spread = Spread(*(np.asarray(part)[:, None] for part in of.figure.spread))
     place = of.reference.window.index[of.place] if of.place >= 0 else -1
-    return _Block(of.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(of.reference))
+    return _Block(of.figure.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(of.reference))
 
 
 def rows_of(

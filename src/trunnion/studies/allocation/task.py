@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.statistics.costs import Cost
+from trunnion.statistics.streams import factor
 from trunnion.studies.allocation.problem import AllocationProblem
 
 __all__ = ["Sides", "Task", "sides", "task_of"]
@@ -56,19 +57,6 @@ class Sides:
         back = along if self.factor is None else along @ self.factor
         return np.asarray(self.linear[which] + self.spread[which] * back, float)
 
-    def curvature(self, t: Array, weights: Array, which: Rows) -> Array:
-        """Σ weights_k ∂²g_k/∂t², (contribution, contribution)."""
-        total = np.zeros((len(t), len(t)))
-        for weight, k in zip(weights, which, strict=True):
-            parts = self.parts(t, np.array([k]))[0]
-            norm = float(np.linalg.norm(parts))
-            if norm == 0:
-                continue
-            matrix = np.diag(self.spread[k]) if self.factor is None else self.factor * self.spread[k]
-            across = (matrix - np.outer(parts, parts @ matrix) / norm**2) / norm
-            total += weight * matrix.T @ across
-        return total
-
 
 def sides(problem: AllocationProblem) -> Sides:
     """The sides of a problem's rows that can bind; of a symmetric row only the nearer one."""
@@ -87,8 +75,9 @@ def sides(problem: AllocationProblem) -> Sides:
     keep = np.asarray(np.isfinite(room))
     keep &= ~(one_sided & (room > room[::-1]))
     keep[1] &= ~(one_sided & (room[0] == room[1]))
-    factor = _root(effects.correlation) if spread.any() else None
-    least = 1.0 if factor is None else float(np.sqrt(max(np.linalg.eigvalsh(factor.T @ factor)[0], 0.0)))
+    matrix, root, least = effects.correlation, None, 1.0
+    if matrix is not None and spread.any() and not np.array_equal(matrix, np.eye(len(matrix))):
+        root, least = factor(matrix).T, float(np.sqrt(max(np.linalg.eigvalsh(matrix)[0], 0.0)))
     half = worst + least * np.abs(spread)
     linear = np.concatenate([(worst + drift)[keep[0]], (worst - drift)[keep[1]]])
     both = np.concatenate([spread[keep[0]], spread[keep[1]]])
@@ -102,20 +91,12 @@ def sides(problem: AllocationProblem) -> Sides:
     return Sides(
         linear,
         both,
-        factor,
+        root,
         np.concatenate([np.flatnonzero(keep[0]), np.flatnonzero(keep[1])]),
         rooms,
         np.min(np.where(np.isnan(bounds), np.inf, bounds), axis=0, initial=np.inf),
-        factor is None and bool(np.all(rising)),
+        root is None and bool(np.all(rising)),
     )
-
-
-def _root(correlation: Array | None) -> Array | None:
-    """K with Kᵀ K the correlation; None for independent contributions."""
-    if correlation is None or np.array_equal(correlation, np.eye(len(correlation))):
-        return None
-    values, vectors = np.linalg.eigh(correlation)
-    return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T, float)
 
 
 @dataclass(frozen=True)
@@ -148,13 +129,6 @@ class Task:
         total = np.zeros(len(u))
         for g, cost in self.costs:
             total[g] += self.unit[g] * cost.slope(float(self.unit[g] * u[g]))
-        return total
-
-    def curvature(self, u: Array) -> Array:
-        """∂²cost/∂u², (unknown,)."""
-        total = np.zeros(len(u))
-        for g, cost in self.costs:
-            total[g] += self.unit[g] ** 2 * cost.curvature(float(self.unit[g] * u[g]))
         return total
 
     def scale(self, u: Array) -> float:

@@ -53,7 +53,7 @@ def _of_measure(outcome: Outcome, of: Of, i: int, unit: str, dial: Any) -> Itera
         yield Figure(f"{name}.nominal", f"{name}, nominal", of.reference.figure, unit)
     placed = of.place >= 0 and outcome.study.run.cycle.duration > 0
     at = f"at {dial.at(of.reference.window.index[of.place])}" if placed else ""
-    lower, upper, rss, _, deviation = (float(part) for part in of.total)
+    lower, upper, rss, _, deviation = map(float, of.total)
     yield Figure(f"{name}.worst_case", f"{name}, worst case, linear", max(-lower, upper), unit, place=at)
     if outcome.worst is not None:
         for end, key, corner in zip(("lower", "upper"), ("least", "largest"), outcome.worst[i], strict=True):
@@ -78,12 +78,12 @@ def _of_samples(counted: Sampled, of: Of, i: int, unit: str) -> Iterator[Figure]
 
 def _contributions(outcome: Outcome, of: Of) -> Iterator[Figure]:
     """The number that contributes most, by RSS and by variance."""
-    halves = np.nan_to_num(of.spread.half) ** 2
+    halves = np.nan_to_num(of.figure.spread.half) ** 2
     if np.sum(halves) > 0:
         yield _most(outcome, of, "rss", halves / np.sum(halves), "share of RSS²")
-    deviation = float(of.total[4])
+    deviation = float(of.total.deviation)
     if outcome.study.effects.correlated and deviation > 0:
-        parts = outcome.study.effects.covariances(of.spread, of.slope) / deviation**2
+        parts = of.figure.covariances / deviation**2
         yield _most(outcome, of, "variance", parts, "share of the variance")
 
 
@@ -176,7 +176,7 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     position = of.reference.window.index[of.place] if of.place >= 0 else -1
     if position >= 0 and not of.measure.of_motion and outcome.study.linear.status[position] == Status.ZERO_SLIP:
         yield finding_for("first_order.one_sided", f"measures.{of.measure.name}")
-    where, lower, upper = f"measures.{of.measure.name}", float(of.total[0]), float(of.total[1])
+    where, lower, upper = f"measures.{of.measure.name}", float(of.total.lower), float(of.total.upper)
     if not np.isfinite(upper):
         yield finding_for("first_order.no_answer", where)
         return
@@ -197,10 +197,10 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
 
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """Plays whose part in the scatter is another if the pin keeps its place on the other link."""
-    study, whole = outcome.study, float(of.total[4])
+    study, whole = outcome.study, float(of.total.deviation)
     others: list[tuple[str, float]] = []
     for joint in study.inputs.loose:
-        taken, *more = (float(part) for part in study.effects.scatters(joint, of.slope))
+        taken, *more = (float(part) for part in of.figure.scatters(joint))
         ratios = [np.sqrt(max(1 + (other**2 - taken**2) / whole**2, 0.0)) for other in more if whole > 0]
         others += [(joint, ratio) for ratio in ratios if abs(ratio - 1) > CARRIED]
     if others:
@@ -213,7 +213,7 @@ def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     """Measures whose samples scatter quite otherwise than first order says."""
     for i, of in enumerate(outcome.study.linear.measures):
-        linear, found = float(of.total[4]), float(counted.arrays["deviation"][i])
+        linear, found = float(of.total.deviation), float(counted.arrays["deviation"][i])
         if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
             continue
         if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:

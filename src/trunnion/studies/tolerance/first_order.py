@@ -80,15 +80,15 @@ class ToleranceStudy:
         spread, curves = [], []
         for of in self.linear.measures:
             known = of.reference
-            centre = known.figure + _finite(of.total[3])
-            spread.append((centre, _finite(of.total[4])))
+            centre = known.figure + _finite(of.total.shift)
+            spread.append((centre, _finite(of.total.deviation)))
             middle = 0.0 * of.curve if known.against else of.curve  # what `shown` gives of the nominal mechanism
-            curves.append((np.nan_to_num(middle), np.nan_to_num(of.curve_total[4])))
+            curves.append((np.nan_to_num(middle), np.nan_to_num(of.course.total.deviation)))
         model = self.run.system.mechanism.data()
         rotation = None
         if method == "quasi-monte-carlo" and self.inputs.tolerances:
             count = len(self.inputs.tolerances)
-            rotation = towards(np.array([self.effects.gradient(of.slope)[:count] for of in self.linear.measures]))
+            rotation = towards(np.array([of.figure.gradient()[:count] for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
             tuple(spread), tuple(curves), rotation,

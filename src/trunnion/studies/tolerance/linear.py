@@ -20,40 +20,33 @@ from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference, figure, shown, span
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
-from trunnion.studies.tolerance.effects import Effects
+from trunnion.studies.tolerance.effects import Effects, FirstOrder
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
 
-__all__ = ["Linear", "Of", "Total", "by_position", "linear", "searched"]
+__all__ = ["Linear", "Of", "by_position", "linear", "searched"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
 MOST_PAIRS = 720  # positions between which a peak-to-peak deviation is looked for
-Total = tuple[Array, Array, Array, Array, Array]
 
 
 @dataclass(frozen=True)
 class Of:
     """One measure to first order.
 
-    real, slope: of the figure by rows of the batch; sensitivity, spread: (parameter,); total: all together. curve,
-    curve_sensitivity, curve_spread, curve_total: the same of the course at every position of the window. place:
-    position in the window at which the figure is taken, −1 if it is of no single one. lead: derivatives that the search
-    of the worst case begins with, slope where there is one.
+    figure: of its figure; course: of the course at every position of the window, curve: the nominal one. total: of the
+    figure, all together. place: position in the window at which the figure is taken, −1 if it is of no single one.
+    lead: what the search of the worst case begins with, figure where that has derivatives.
     """
 
     reference: Reference
-    real: Array
-    slope: Array
-    sensitivity: Array
-    spread: Spread
-    total: Total
+    figure: FirstOrder
+    course: FirstOrder
+    total: Spread
     curve: Array
-    curve_sensitivity: Array
-    curve_spread: Spread
-    curve_total: Total
     place: int
-    lead: Array
+    lead: FirstOrder
 
     @property
     def measure(self) -> Measure:
@@ -104,46 +97,38 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     measure, window = known.measure, known.window
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
     real, slope = _scalar(known, effects, course, parts)
-    slope = effects.without_noise(slope)
-    curve_spread = effects.spread(slope)
-    curve_total = effects.total(curve_spread, slope)
+    whole = FirstOrder(effects, effects.without_noise(slope))
     lead = None
     if by_position(known):
-        place, whole, steep = _worst(measure, effects, real, slope, curve_total)
+        place, steep = _worst(measure, whole)
     elif (known.against and measure.rule not in ("mean", "value")) or measure.kind == "path_error":
-        place, whole, steep = -1, *(np.full(len(real), np.nan),) * 2
-        lead = slope[:, _top(curve_total[1])]
+        place, steep = -1, np.full(len(real), np.nan)
+        lead = FirstOrder(effects, whole.slope[:, _top(whole.total.upper)])
     else:
-        place, (whole, steep) = -1, effects.slopes(figure(course, known), ())
+        value, steep = effects.slopes(figure(course, known), ())
         place = 0 if measure.rule == "value" and not measure.in_time else -1
-        steep = np.where(np.isfinite(whole), steep, np.nan)  # of what does not exist
-    steep = effects.without_noise(steep)
-    spread = effects.spread(steep)
-    total = effects.total(spread, steep)
-    if by_position(known):
-        total = _ends(measure, curve_total, total)
-    return Of(
-        known, whole, steep, effects.sensitivity(steep), spread, total,
-        real[0], effects.sensitivity(slope), curve_spread, curve_total, place, steep if lead is None else lead,
-    )  # fmt: skip
+        steep = np.where(np.isfinite(value), steep, np.nan)  # of what does not exist
+    one = FirstOrder(effects, effects.without_noise(steep))
+    total = _ends(measure, whole.total, one.total) if by_position(known) else one.total
+    return Of(known, one, whole, total, real[0], place, lead or one)
 
 
-def _ends(measure: Measure, course: Total, total: Total) -> Total:
+def _ends(measure: Measure, course: Spread, total: Spread) -> Spread:
     """Least and largest deviation of a figure that is made of the deviations at all positions.
 
     A distance and a spread are at least 0; a maximum over the positions is at least the largest of what each can be at
     least.
     """
-    lower, upper, *rest = total
+    lower, upper = total.lower, total.upper
     if measure.kind == "path_error" or measure.rule in ("peak-to-peak", "largest"):
         # to either side: a distance has a direction that has no sign, a largest |deviation| none either
         upper = upper if measure.rule == "peak-to-peak" else np.maximum(-lower, upper)
         lower = np.zeros_like(lower)
     elif measure.rule == "maximum":
-        lower, upper = (np.asarray(np.max(np.nan_to_num(end, nan=-np.inf))) for end in course[:2])
+        lower, upper = (np.asarray(np.max(np.nan_to_num(end, nan=-np.inf))) for end in (course.lower, course.upper))
     elif measure.rule == "minimum":
-        lower, upper = (np.asarray(np.min(np.nan_to_num(end, nan=np.inf))) for end in course[:2])
-    return (lower, upper, rest[0], rest[1], rest[2])
+        lower, upper = (np.asarray(np.min(np.nan_to_num(end, nan=np.inf))) for end in (course.lower, course.upper))
+    return total._replace(lower=lower, upper=upper)
 
 
 def by_position(known: Reference) -> bool:
@@ -175,22 +160,22 @@ def _scalar(known: Reference, effects: Effects, course: Course, parts: Sequence[
     return effects.slopes(number, (len(known.window.index),))
 
 
-def _worst(measure: Measure, effects: Effects, real: Array, slope: Array, total: Total) -> tuple[int, Array, Array]:
-    """Where the worst case is largest, and the figure and its derivatives there."""
-    zero = np.zeros(len(real))
+def _worst(measure: Measure, course: FirstOrder) -> tuple[int, Array]:
+    """Where the worst case of a course is largest, and the derivatives of the figure there."""
+    slope = course.slope
     if measure.rule == "peak-to-peak":
         pick = np.unique(np.linspace(0, slope.shape[1] - 1, min(slope.shape[1], MOST_PAIRS)).astype(int))
         best, found = -1.0, slope[:, 0] * 0.0
         for i in pick:
             change = slope[:, pick] - slope[:, [i]]
-            upper = np.nan_to_num(effects.total(effects.spread(change), change)[1])
+            upper = np.nan_to_num(FirstOrder(course.effects, change).total.upper)
             top = int(np.argmax(upper))
             if upper[top] > best:
                 best, found = float(upper[top]), change[:, top]
-        return -1, zero, found
-    size = np.maximum(-total[0], total[1])
+        return -1, found
+    size = course.total.worst
     place = int(np.nanargmax(size)) if np.any(np.isfinite(size)) else 0
-    return place, real[:, place] - real[0, place], slope[:, place]
+    return place, slope[:, place]
 
 
 def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner]:
@@ -211,7 +196,7 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
                 return whole, _slope_at(of, effects, course, sign)
             return whole, effects.slopes(figure(course, known), ())[1]
 
-        start = found.effects.corner(of.lead, sign)
+        start = of.lead.corner(sign)
         return search(found.effects, objective, start, sign, bool(np.isfinite(known.figure)))
 
     return ends(-1.0), ends(1.0)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.indices import Indices
 from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 from trunnion.studies.tolerance.search import Corner
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["Outcome"]
 

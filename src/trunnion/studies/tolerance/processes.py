@@ -186,16 +186,14 @@ class Interruption:
     def during(self, waiting: Callable[[], A]) -> A | None:
         """What `waiting` returns; None if Ctrl-C ended it."""
         try:
-            self._open = True
-            found = waiting()
-            self._open = False  # here and not in a `finally`, in which it could still be raised
+            try:
+                self._open = True
+                return waiting()
+            finally:
+                self._open = False
         except KeyboardInterrupt:
             self.asked = True
             return None
-        except BaseException:
-            self._open = False
-            raise
-        return found
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from trunnion.studies.tolerance.protocol import Blocks
 
-__all__ = ["BlockRanges", "Pace", "count", "gaps", "union"]
+__all__ = ["Portions", "count", "gaps"]
 
 
 def count(ranges: Iterable[Blocks]) -> int:
@@ -21,77 +21,52 @@ def gaps(done: Iterable[Blocks], blocks: int) -> list[Blocks]:
     return [(first, last) for first, last in zip(ends[::2], ends[1::2], strict=True) if first < last]
 
 
-def union(ranges: Iterable[Blocks]) -> tuple[Blocks, ...]:
-    """Disjoint ranges sorted, neighbours joined."""
-    joined: list[Blocks] = []
-    for first, last in sorted(ranges):
-        if joined and first == joined[-1][1]:
-            joined[-1] = (joined[-1][0], last)
-        else:
-            joined.append((first, last))
-    return tuple(joined)
+EACH = 0.05  # s for every worker: ten times what one portion costs the main process (`python -m benchmarks.spread`)
+LEAST = 16  # part of a full portion that is not worth dividing further
 
 
-class BlockRanges:
-    """Hands out the blocks that are not yet done, in order."""
+class Portions:
+    """Hands out the blocks that are not yet done, in order: so many as stated, or what takes `seconds` at this pace.
 
-    def __init__(self, done: Iterable[Blocks], blocks: int) -> None:
+    With many workers portions are longer, so that this process, which merges what all of them send, is busy a tenth of
+    the time at most. Near the end they shrink with what is left, so that all workers end at about the same time. Where
+    no size is stated it is a power of two that divides the first block: the tally is one node of the binary tree then.
+    """
+
+    def __init__(self, done: Iterable[Blocks], blocks: int, stated: int | None, seconds: float) -> None:
         self._gaps = gaps(done, blocks)[::-1]
+        self._stated = stated
+        self._seconds = seconds
+        self._per_block = math.nan
 
     @property
     def left(self) -> int:
         """Blocks not yet handed out."""
         return count(self._gaps)
 
-    def take(self, most: int, aligned: bool) -> Blocks:
-        """The next range, at most `most` blocks (at least one).
-
-        aligned: a power of two that divides the first block, so that the range is one node of a binary tree over the
-        blocks and its tally has one node too.
-        """
+    def take(self, workers: int) -> Blocks:
+        """The next portion."""
+        size = self.size(workers)
         first, last = self._gaps.pop()
-        size = min(max(most, 1), last - first)
-        if aligned:
+        size = min(size, last - first)
+        if self._stated is None:
             size = 1 << (size.bit_length() - 1)
             size = min(size, first & -first) if first else size
         if first + size < last:
             self._gaps.append((first + size, last))
         return first, first + size
 
-
-EACH = 0.05  # s for every worker: ten times what one portion costs the main process (`python -m benchmarks.spread`)
-LEAST = 16  # part of a full portion that is not worth dividing further
-
-
-class Pace:
-    """How many blocks make a portion: those stated, or what takes `seconds` at the pace measured so far.
-
-    With many workers portions are longer, so that this process, which merges what all of them send, is busy a tenth of
-    the time at most. Near the end they shrink with what is left, so that all workers end at about the same time.
-    """
-
-    def __init__(self, stated: int | None, seconds: float) -> None:
-        self._stated = stated
-        self._seconds = seconds
-        self._per_block = math.nan
-
-    @property
-    def aligned(self) -> bool:
-        """Whether portions are to be nodes of the binary tree."""
-        return self._stated is None
-
-    def seen(self, blocks: int, seconds: float) -> None:
-        """Blocks took so long; half the weight to the news, for the first portion may have included compilation."""
-        now = seconds / blocks
-        self._per_block = now if math.isnan(self._per_block) else (self._per_block + now) / 2
-
-    def blocks(self, left: int, workers: int) -> int:
-        """Blocks of the next portion."""
+    def size(self, workers: int) -> int:
+        """Blocks of the next portion, at most."""
         if self._stated is not None:
             return self._stated
         if math.isnan(self._per_block):
             return 1
-        seconds = max(self._seconds, EACH * workers)
-        full = int(seconds / max(self._per_block, 1e-9))
-        share = math.ceil(left / (2 * workers)) if workers > 1 else left
+        full = int(max(self._seconds, EACH * workers) / max(self._per_block, 1e-9))
+        share = math.ceil(self.left / (2 * workers)) if workers > 1 else self.left
         return max(1, full // LEAST, min(share, full))
+
+    def seen(self, blocks: Blocks, seconds: float) -> None:
+        """Blocks took so long; half the weight to the news, for the first portion may have included compilation."""
+        now = seconds / count([blocks])
+        self._per_block = now if math.isnan(self._per_block) else (self._per_block + now) / 2

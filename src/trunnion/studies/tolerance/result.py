@@ -22,6 +22,7 @@ from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.outcome import Outcome
 from trunnion.studies.tolerance.sampled import QUANTILES, sampled
 from trunnion.studies.tolerance.targets import MISSED
+from trunnion.studies.tolerance.zones import Spread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,32 +188,29 @@ def _units(own: Sequence[str], courses: Sequence[str], parameters: Sequence[str]
 def _linear(found: ToleranceStudy) -> dict[str, Any]:
     first, inputs = found.linear, found.inputs
     rows = first.measures
-    effects = found.effects
-    total = np.array([[float(part) for part in of.total] for of in rows]).reshape(-1, 5).T
-    halves = np.array([of.spread.half for of in rows])
-    scatter = np.array([effects.covariances(of.spread, of.slope) for of in rows])
-    worst = np.array([np.maximum(-of.spread.lower, of.spread.upper) for of in rows])
+    total = Spread(*np.array([of.total for of in rows], float).reshape(-1, 5).T)
+    halves = np.array([of.figure.spread.half for of in rows])
+    scatter = np.array([of.figure.covariances for of in rows])
     with np.errstate(all="ignore"):
         shares = halves**2 / np.sum(halves**2, axis=1, keepdims=True)
         variance = scatter / np.sum(scatter, axis=1, keepdims=True)
-    numbers = effects.numbers()
     return {
         "nominal": np.array([of.reference.figure for of in rows]),
         "place": np.array([_place(found, of) for of in rows], float),
-        **{f"parameter_{key}": array for key, array in numbers.items()},
-        "sensitivity": np.array([of.sensitivity for of in rows]),
-        "contribution_worst_case": worst,
+        **{f"parameter_{key}": array for key, array in found.effects.numbers().items()},
+        "sensitivity": np.array([of.figure.sensitivity for of in rows]),
+        "contribution_worst_case": np.array([of.figure.spread.worst for of in rows]),
         "contribution_rss": shares,
         "contribution_variance": variance,
-        "worst_case_lower": total[0], "worst_case_upper": total[1], "rss": total[2],
-        "shift_linear": total[3], "deviation_linear": total[4],
+        "worst_case_lower": total.lower, "worst_case_upper": total.upper, "rss": total.half,
+        "shift_linear": total.shift, "deviation_linear": total.deviation,
         "curve": _spread_out(found, [of.curve for of in rows], ()),
-        "curve_sensitivity": _spread_out(found, [of.curve_sensitivity for of in rows], (len(inputs.names),)),
-        "curve_worst_case_lower": _spread_out(found, [of.curve_total[0] for of in rows], ()),
-        "curve_worst_case_upper": _spread_out(found, [of.curve_total[1] for of in rows], ()),
-        "curve_rss": _spread_out(found, [of.curve_total[2] for of in rows], ()),
-        "curve_shift": _spread_out(found, [of.curve_total[3] for of in rows], ()),
-        "curve_deviation": _spread_out(found, [of.curve_total[4] for of in rows], ()),
+        "curve_sensitivity": _spread_out(found, [of.course.sensitivity for of in rows], (len(inputs.names),)),
+        "curve_worst_case_lower": _spread_out(found, [of.course.total.lower for of in rows], ()),
+        "curve_worst_case_upper": _spread_out(found, [of.course.total.upper for of in rows], ()),
+        "curve_rss": _spread_out(found, [of.course.total.half for of in rows], ()),
+        "curve_shift": _spread_out(found, [of.course.total.shift for of in rows], ()),
+        "curve_deviation": _spread_out(found, [of.course.total.deviation for of in rows], ()),
         "status": first.status,
     }  # fmt: skip
 

@@ -19,7 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.studies.tolerance.checkpoint import Checkpoint
 from trunnion.studies.tolerance.processes import Interruption, Processes, unheard
 from trunnion.studies.tolerance.protocol import Blocks, Crew, Job, Portion, Prepared, T, Tally, mixed, part_of
-from trunnion.studies.tolerance.ranges import BlockRanges, Pace, count
+from trunnion.studies.tolerance.ranges import Portions
 
 __all__ = ["Crew", "Job", "JobRun", "Portion", "Prepared", "Tally", "run"]
 
@@ -130,69 +130,46 @@ def run(
     end three workers in turn, if the cluster cannot be reached. Whatever is raised, what is done is kept first.
     """
     jobs = _checked(jobs, chunk, resume, checkpoint)
-    kept = None if checkpoint is None else Checkpoint(checkpoint, job)
-    tally = job.empty() if kept is None else kept.begin(resume)
-    arithmetic = set[str]() if kept is None else kept.arithmetic
-    plan = BlockRanges(tally.blocks, job.blocks)
-    stopped = False
-    if plan.left:
-        stated = None if chunk is None else math.ceil(chunk / job.block_size)
-        pace = Pace(stated, NEAR if cluster is None else FAR)
-        with Interruption() as interruption:
-            crew = _crew(job, jobs, cluster, plan.left, threads)
-            spread = _Spread(job, crew, plan, pace, kept, progress, arithmetic, tally)
+    done = Checkpoint(checkpoint, job)
+    done.begin(resume)
+    stated = None if chunk is None else math.ceil(chunk / job.block_size)
+    portions = Portions(done.tally.blocks, job.blocks, stated, NEAR if cluster is None else FAR)
+
+    def tell() -> None:
+        if progress is not None:
+            progress(round(job.samples * (1 - done.left / job.blocks)))
+
+    with Interruption() as interruption:
+        tell()
+        if portions.left:
+            crew = _crew(job, jobs, cluster, portions.left, threads)
             try:
-                spread.go(interruption)
+                _spread(crew, portions, done, tell, interruption)
             finally:
-                tally = spread.tally
-                stopped = count(tally.blocks) < job.blocks
                 try:
-                    if kept is not None:
-                        kept.keep(tally)
+                    done.keep()
                 finally:
-                    crew.close(finished=not stopped)
-    elif progress is not None:
-        progress(job.samples)
-    trouble = (kept.trouble,) if kept is not None and kept.trouble is not None else ()
-    return JobRun(tally, stopped, trouble + mixed(arithmetic))
+                    crew.close(finished=not done.left)
+    trouble = () if done.trouble is None else (done.trouble,)
+    return JobRun(done.tally, done.left > 0, trouble + mixed(done.arithmetic))
 
 
-@dataclass
-class _Spread(Generic[T]):
-    """A run under way."""
-
-    job: Job[T]
-    crew: Crew[T]
-    plan: BlockRanges
-    pace: Pace
-    kept: Checkpoint[T] | None
-    progress: Callable[[int], None] | None
-    arithmetic: set[str]
-    tally: T
-
-    def go(self, interruption: Interruption) -> None:
-        """Until all blocks are done or Ctrl-C is pressed."""
-        blocks = self.job.blocks
-        under_way = 0
-        self._tell()
-        while not interruption.asked:
-            while self.plan.left and under_way < AHEAD * self.crew.workers:
-                size = self.pace.blocks(self.plan.left, self.crew.workers)
-                self.crew.give(self.plan.take(size, self.pace.aligned))
-                under_way += 1
-            if not under_way:
-                break
-            for part in interruption.during(self.crew.wait) or ():
-                under_way -= 1
-                self.tally = self.tally.merge(part.tally)
-                self.arithmetic.add(part.arithmetic)
-                self.pace.seen(count([part.blocks]), part.seconds)
-                self._tell()
-            if self.kept is not None and (under_way or self.plan.left):
-                self.kept.perhaps(self.tally)
-        assert interruption.asked or count(self.tally.blocks) == blocks
-
-    def _tell(self) -> None:
-        if self.progress is not None:
-            done = count(self.tally.blocks)
-            self.progress(round(self.job.samples * (done / self.job.blocks)))
+def _spread(
+    crew: Crew[T], portions: Portions, done: Checkpoint[T], tell: Callable[[], None], interruption: Interruption
+) -> None:
+    """Until all blocks are done or Ctrl-C is pressed."""
+    under_way = 0
+    while not interruption.asked:
+        while portions.left and under_way < AHEAD * crew.workers:
+            crew.give(portions.take(crew.workers))
+            under_way += 1
+        if not under_way:
+            break
+        for part in interruption.during(crew.wait) or ():
+            under_way -= 1
+            done.add(part)
+            portions.seen(part.blocks, part.seconds)
+            tell()
+        if done.left:
+            done.perhaps()
+    assert interruption.asked or not done.left

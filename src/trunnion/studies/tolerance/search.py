@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.studies.tolerance.effects import NOBODY, EffectRow, Effects
+from trunnion.studies.tolerance.effects import NOBODY, EffectRow, Effects, FirstOrder
 
 __all__ = ["Corner", "search"]
 
@@ -52,7 +52,7 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
         assembles = assembles and (rounds > 1 or bool(np.isfinite(real[0])))
         if not np.all(np.isfinite(slope)):
             break
-        turned = effects.corner(slope, sign, at)
+        turned = FirstOrder(effects, slope).corner(sign, at)
         if _same(turned, at):
             break
         at = turned

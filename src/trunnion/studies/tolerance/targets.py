@@ -116,7 +116,7 @@ def _worst(outcome: Outcome, i: int, of: Of) -> tuple[tuple[float, float], bool]
     """Worst case to either side, as far as it was asked for, and whether it is outside the limits."""
     known, slight = (np.nan, np.nan), CLOSE
     if "linear" in outcome.methods:
-        known = float(of.total[0]), float(of.total[1])
+        known = float(of.total.lower), float(of.total.upper)
     if outcome.worst is not None and all(np.isfinite(one.value) for one in outcome.worst[i]):
         known, slight = (outcome.worst[i][0].value, outcome.worst[i][1].value), SLIGHT
     lower, upper = limits(of)
@@ -207,7 +207,7 @@ def _middle(outcome: Outcome, of: Of) -> tuple[float, bool]:
     study = outcome.study
     priced = {one.path for one in study.run.system.mechanism.prices()}
     alone = [name for name in study.inputs.names if name not in priced]
-    lower, upper = np.asarray(of.spread.lower, float), np.asarray(of.spread.upper, float)
+    lower, upper = of.figure.spread.lower, of.figure.spread.upper
     middles = 0.5 * (lower + upper)
     some = np.array([name in alone for name in study.inputs.names])
     ends = [float(np.sum(np.where(some, end, middles))) for end in (lower, upper)]
@@ -233,10 +233,7 @@ def _largest(outcome: Outcome, of: Of) -> tuple[str, float, bool]:
     Where a yield is asked for of correlated numbers, in the variance: the worst case knows no correlation.
     """
     study = outcome.study
-    if _by_variance(outcome):
-        worst = np.nan_to_num(study.effects.covariances(of.spread, of.slope))
-    else:
-        worst = np.nan_to_num(np.maximum(-of.spread.lower, of.spread.upper))
+    worst = np.nan_to_num(of.figure.covariances if _by_variance(outcome) else of.figure.spread.worst)
     top = int(np.argmax(worst))
     total = float(np.sum(worst))
     priced = bool(study.run.system.mechanism.costs)

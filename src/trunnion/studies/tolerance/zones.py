@@ -27,7 +27,7 @@ Radii = Sequence[tuple[float, float]]  # of each end: the largest, and E|c|²
 
 
 class Spread(NamedTuple):
-    """What first order makes of every varying number, (parameter, …): of the deviation of a measure from nominal.
+    """What first order makes of every varying number, (parameter, …), or of all: deviation of a measure from nominal.
 
     lower, upper: least and largest; half: of the classical sum of squares; shift: of the mean; deviation: standard.
     """
@@ -37,6 +37,11 @@ class Spread(NamedTuple):
     half: Array
     shift: Array
     deviation: Array
+
+    @property
+    def worst(self) -> Array:
+        """The largest deviation to either side."""
+        return np.maximum(-self.lower, self.upper)
 
 
 class Far(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.statistics.costs import Cost
-from trunnion.views.allocation.cost import Offer, PriceCurve, tolerance_cost, trade_off
+from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.allocation.tables import bought, headed, is_play, offers_table, room, tables, trials
 from trunnion.views.common.cycle import names
 from trunnion.views.common.page import Section
@@ -51,18 +51,13 @@ def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
         return tolerance_figure(result, kind)
     if "trade_off_cost" not in result:
         raise MechanismError(Finding("no measure has a figure 'trade-off'", "--kind", "add --curve 21"))
-    return trade_off(result, offers(result), _limit(result), stepped=_all_choices(result))
+    pairs = zip(result["trade_off_factor"].values.tolist(), result["trade_off_cost"].values.tolist(), strict=True)
+    return trade_off(result, list(pairs), _limit(result), stepped=_all_choices(result))
 
 
 def _all_choices(result: xr.Dataset) -> bool:
     """Whether every tolerance is chosen from processes, so that the cost goes in steps."""
     return result.attrs["choices"] == "discrete" and not any(one["model"] for one in attribute(result, "prices"))
-
-
-def offers(result: xr.Dataset) -> list[Offer]:
-    """The points of cost over accuracy."""
-    pairs = zip(result["trade_off_factor"].values.tolist(), result["trade_off_cost"].values.tolist(), strict=True)
-    return [Offer(factor, cost) for factor, cost in pairs]
 
 
 def _limit(result: xr.Dataset) -> tuple[str, float, str] | None:

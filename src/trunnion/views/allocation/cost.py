@@ -1,7 +1,6 @@
 """Figures of an allocation: what accuracy costs, and what each tolerance costs with the chosen one marked.
 
-They take plain numbers. A trade-off is a row of `Offer`s: the limits as a share of the stated ones, and the least cost
-that keeps them. What a tolerance costs is a `PriceCurve`: a curve, or the processes that can be chosen from.
+What a tolerance costs is a `PriceCurve`: a curve, or the processes that can be chosen from.
 """
 
 from __future__ import annotations
@@ -9,12 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from trunnion.results.quantities import number, scaled
+from trunnion.results.quantities import joined, number, scaled
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, PALETTE, dress, legend, new
 from trunnion.views.common.lettering import plain
@@ -24,19 +23,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["MOST_PRICES", "Offer", "PriceCurve", "tolerance_cost", "trade_off"]
+__all__ = ["MOST_PRICES", "PriceCurve", "tolerance_cost", "trade_off"]
 
 MOST_PRICES = 12
 NAME = 30  # characters of a name over a panel
 COLUMNS, SIDE = 3, 2.3  # panels in a row, height of one in inches
 POINT: dict[str, Any] = {"marker": "D", "color": PALETTE[1], "markersize": 6.5, "linestyle": "none", "zorder": 5}
-
-
-class Offer(NamedTuple):
-    """One point of the trade-off. share: of the stated limits; cost: the least, NaN if nothing keeps such limits."""
-
-    share: float
-    cost: float
 
 
 @dataclass(frozen=True)
@@ -60,19 +52,20 @@ class PriceCurve:
 
 def trade_off(
     result: xr.Dataset,
-    offers: Sequence[Offer],
+    points: Sequence[tuple[float, float]],
     limit: tuple[str, float, str] | None = None,
-    stepped: bool | None = None,
+    stepped: bool = False,
 ) -> Figure:
     """Least cost over accuracy, the stated limits marked.
 
-    result: whose name stands beneath; limit: (measure, half width, SI unit) of the one limit there is: the axis is then
+    result: whose name stands beneath; points: share of the stated limits, and the least cost that keeps them, NaN if
+    nothing does; limit: (measure, half width, SI unit) of the one limit there is: the axis is then
     that limit, else its share of the stated ones. stepped: as with processes to choose from: what keeps a limit keeps
-    any wider one too; None where only the costs can say so, as of which many are the same.
+    any wider one too.
     """
     drawn = new("Minimum cost of all tolerances over accuracy", result)
     axes = drawn.subplots()
-    share, cost = (np.array([one[k] for one in sorted(offers)], float) for k in (0, 1))
+    share, cost = (np.array([one[k] for one in sorted(points)], float) for k in (0, 1))
     if limit is None:
         factor, title = 100.0, "limits relative to the stated ones [%]"
     else:
@@ -80,7 +73,6 @@ def trade_off(
         scale, unit = scaled(half, si)
         factor, title = half * scale, f"limit of {name} ± [{unit}]" if unit else f"limit of {name} ±"
     dress(axes, plain(title), "minimum cost")
-    stepped = _is_stepped(cost) if stepped is None else stepped
     steps: dict[str, Any] = {"drawstyle": "steps-post"} if stepped else {}
     axes.plot(factor * share, cost, color=PALETTE[0], linewidth=1.8, marker="o", markersize=3.2,
               label="minimum cost", **steps)  # fmt: skip
@@ -101,12 +93,6 @@ def trade_off(
     axes.yaxis.set_major_locator(MaxNLocator(nbins=7))
     legend(axes, least=1)
     return drawn
-
-
-def _is_stepped(cost: Array) -> bool:
-    """Whether neighbours cost the same, as with processes to choose from."""
-    known = cost[np.isfinite(cost)]
-    return known.size > 2 and bool(np.mean(np.diff(known) == 0) > 0.25)
 
 
 def tolerance_cost(result: xr.Dataset, prices: Sequence[PriceCurve]) -> Figure:
@@ -158,9 +144,8 @@ def _told(price: PriceCurve, factor: float, unit: str) -> list[str]:
     if not math.isfinite(t + cost):
         return ["none chosen"]
     found = [name for name, half, _ in price.processes if half == t]
-    gap = "" if unit in ("°", "") else "\u00a0"
-    sign = "" if price.play else "±"
-    return [f"{sign}{t * factor:.4g}{gap}{unit}, cost {number(cost)}", *(_end(name) for name in found[:1])]
+    told = joined(f"{'' if price.play else '±'}{t * factor:.4g}", unit)
+    return [f"{told}, cost {number(cost)}", *(_end(name) for name in found[:1])]
 
 
 def _end(name: str) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import scaled
+from trunnion.results.quantities import drawn_in, joined
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.readings import readings, share
@@ -73,9 +73,8 @@ def half_width(t: float, unit: str, sign: str = "±") -> str:
     """A half width in mm or degrees, to five digits."""
     if not math.isfinite(t):
         return "—"
-    factor, shown = (1e3, "mm") if unit == "m" else scaled(t, unit)
-    gap = "" if shown in ("°", "") else "\u00a0"
-    return f"{sign}{t * factor:.5g}{gap}{shown}"
+    factor, shown = drawn_in(t, unit)
+    return joined(f"{sign}{t * factor:.5g}", shown)
 
 
 def is_play(path: str) -> bool:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import number, scale_of, scaled
+from trunnion.results.quantities import drawn_in, joined, number, scale_of
 from trunnion.views.common.cycle import Abscissa, Array, names
 
 if TYPE_CHECKING:
@@ -155,10 +155,8 @@ class MeasureReading:
 
     def say(self, value: float, sign: bool = False) -> str:
         """A value of the measure with its unit; sign: a plus before what is above 0."""
-        gap = "" if self.label in ("°", "") else "\u00a0"
         text = fixed(value * self.factor, self.decimals)
-        plus = "+" if sign and value > 0 and math.isfinite(value) else ""
-        return f"{plus}{text}{gap}{self.label}" if math.isfinite(value) else text
+        return joined(f"{'+' if sign and value > 0 else ''}{text}", self.label) if math.isfinite(value) else text
 
     @property
     def titled(self) -> str:
@@ -171,12 +169,10 @@ class MeasureReading:
         found = []
         lower, upper = self.limits
         if math.isfinite(lower) or math.isfinite(upper):
-            gap = "" if self.label in ("°", "") else "\u00a0"
-            found.append(limits_text(lower * self.factor, upper * self.factor) + gap + self.label)
+            found.append(joined(limits_text(lower * self.factor, upper * self.factor), self.label))
         for word, bound in zip(("at least", "at most"), self.bounds, strict=True):
             if math.isfinite(bound):
-                gap = "" if self.label in ("°", "") else "\u00a0"
-                found.append(f"{word} {_short(bound * self.factor)}{gap}{self.label}")
+                found.append(f"{word} {joined(_short(bound * self.factor), self.label)}")
         return ", ".join(found)
 
     # ---- over the drive -------------------------------------------------------------------------------------------
@@ -332,9 +328,8 @@ def with_unit(lower: float, upper: float, unit: str) -> str:
     if math.isnan(lower) or math.isnan(upper):
         return ""
     size = max(abs(lower), abs(upper))
-    factor, shown = (1e3, "mm") if unit == "m" else scaled(size, unit)
-    shown, gap = shown.replace(" ", "\u00a0"), "" if shown in ("°", "") else "\u00a0"
-    return f"{limits_text(lower * factor, upper * factor)}{gap}{shown}"
+    factor, shown = drawn_in(size, unit)
+    return joined(limits_text(lower * factor, upper * factor), shown.replace(" ", "\u00a0"))
 
 
 def _known(value: float) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.quantities import number, scaled
+from trunnion.results.quantities import drawn_in, joined, number
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
 from trunnion.views.tolerance.readings import (
@@ -250,7 +250,7 @@ def _sensitivity(read: MeasureReading, one: ContributionRow) -> str:
     """Change of the measure by the number, in the units in which both are told: "0.01365 °/mm"."""
     if math.isnan(one.sensitivity):
         return "—"
-    factor, shown = (1e3, "mm") if one.unit == "m" else scaled(1.0, one.unit)
+    factor, shown = drawn_in(1.0, one.unit)
     shown = shown.replace(" ", "\u00a0")
     unit = f"{read.label or '1'}/{shown}" if shown else read.label
     return f"{number(one.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
@@ -279,10 +279,8 @@ def value_text(value: float, unit: str, digits: int = 8) -> str:
     """A toleranced number with its unit, lengths in mm, with all digits that a drawing would show."""
     if not math.isfinite(value):
         return "—"
-    factor, shown = (1e3, "mm") if unit == "m" else scaled(abs(value), unit)
-    shown = shown.replace(" ", "\u00a0")
-    gap = "" if shown in ("°", "") else "\u00a0"
-    return f"{value * factor + 0.0:.{digits}g}".replace("-", "−") + f"{gap}{shown}"
+    factor, shown = drawn_in(abs(value), unit)
+    return joined(f"{value * factor + 0.0:.{digits}g}".replace("-", "−"), shown.replace(" ", "\u00a0"))
 
 
 # ---- of the whole result --------------------------------------------------------------------------------------------

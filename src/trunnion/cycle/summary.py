@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis, near_locking
+from trunnion.cycle import contact_loss, diagnosis, near_locking, uncounted
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
@@ -114,6 +114,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *_over_the_cycle(run, at.arrays, at.causes, at.time, near),
         *_missed_peaks(run.system, at),
         *_beside_jumps(run, at),
+        *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), run.system.dial(run.values, at.time)),
     ], near
 

@@ -104,6 +104,17 @@ CYCLE: dict[str, Sentence] = {
     "load.drives": Sentence(
         WARNING, "this resistance is negative {at}: it drives the joint", "use max(0 N, …), or a load with a sign"
     ),
+    "load.not_counted": Sentence(
+        NOTE,
+        "beside the drive, which supplies {drive:~J}, this load supplies {work:~J} over the cycle; the efficiency does "
+        "not count it as input",
+        "leave out a load that stands for the drive itself, such as the force of a hand",
+    ),
+    "efficiency.above_one": Sentence(
+        WARNING,
+        "the efficiency of the cycle is {efficiency:.4g}, above 1: the drive supplies {drive:~J}, beside it {supplies}",
+        "work beside the drive is not counted as input; leave out a load that stands for the drive itself",
+    ),
     "load.undefined": Sentence(
         ERROR,
         "has no value {at}",

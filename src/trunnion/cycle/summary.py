@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from trunnion.cycle import contact_loss, diagnosis, near_locking, uncounted
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
+from trunnion.cycle.positions import Positions, positions
 from trunnion.cycle.scene import DRAWN
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
@@ -34,7 +36,6 @@ from trunnion.solve.system import Dial, System, felt, rubbing
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.cycle.positions import Positions
     from trunnion.solve.run import Run
 
 from trunnion.cycle.model_measures import positions_told, watched
@@ -42,6 +43,7 @@ from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "beside_jumps",
     "effort_units",
     "inputs",
     "model_notes",
@@ -214,6 +216,12 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
         largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
         if rms > (1 + 1e-6) * largest:
             yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
+
+
+def beside_jumps(run: Run, steps: int) -> Iterator[Finding]:
+    """Largest efforts of a cycle that are beside a jump, for studies that look at more than one mechanism."""
+    with suppress(MechanismError):  # of seats that over-constrained links cannot take
+        yield from _beside_jumps(run, positions(run, steps, margin=False, averaged=False))
 
 
 def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:

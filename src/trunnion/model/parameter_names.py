@@ -47,8 +47,12 @@ class ParameterNames:
             raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
-        known = [*self.paths, *self.endings] if "." in name or not dimensions else dimensions
-        raise MechanismError(Finding(f"there is no number named '{name}'", remedy=nearest(name, known)))
+        every = [*self.paths, *self.endings]
+        remedy = nearest(name, every if "." in name or not dimensions else dimensions)
+        if not remedy.startswith("did you mean"):
+            longer = [one for one in every if len(one) > 2]
+            remedy = near if (near := nearest(name, longer)).startswith("did you mean") else remedy
+        raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 
     def _error(self, name: str) -> str:
         """The path of the deviation of a number by a name of that number."""

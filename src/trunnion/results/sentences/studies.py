@@ -189,7 +189,16 @@ TOLERANCE = {
         "check the unit of the data",
     ),
     "tolerance.negative": Sentence(
-        WARNING, "its tolerance includes the negative value {least:g} (SI unit)", "narrow the tolerance"
+        WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
+    ),
+    "tolerance.beside_jump": Sentence(
+        WARNING,
+        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
+        "first order leaves out what moves the jump, and samples tell its place to one step",
+        "use the samples, with more --steps",
+    ),
+    "tolerance.impossible": Sentence(
+        WARNING, "its tolerance includes {value:~{unit}}, which no model may have: {why}", "narrow the tolerance"
     ),
     "tolerance.nominal_no_answer": Sentence(ERROR, "nominal mechanism: {status} {at}", "there is no result there"),
     "tolerance.near_singular": Sentence(

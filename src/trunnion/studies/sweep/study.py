@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, inputs, references
+from trunnion.cycle.summary import beside_jumps, effort_units, inputs, references
 from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
@@ -88,6 +88,8 @@ def sweep(
         if progress:
             progress(done)
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    first = say(points.swept, (0,) * len(points.shape))
+    found += (replace(one, what=f"at {first} {one.what}") for one in beside_jumps(points.run, steps))
     found += _not_steady(points, watched.values(), arrays)
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
-from trunnion.cycle.summary import model_notes
+from trunnion.cycle.summary import beside_jumps, model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
-from trunnion.model.checks.values import NOT_NEGATIVE
+from trunnion.model.checks.values import check_values
+from trunnion.model.parameters import measured
+from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.studies.tolerance.linear import by_position
@@ -29,6 +34,8 @@ __all__ = ["findings_of", "summary"]
 Array = NDArray[np.float64]
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
+TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
+EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -113,6 +120,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
+    if any(of.measure.kind == "effort" and of.measure.statistic in EXTREMES for of in study.linear.measures):
+        for one in beside_jumps(study.run, study.steps):
+            yield finding_for("tolerance.beside_jump", one.where, **one.figures)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
@@ -144,11 +154,27 @@ def _measured(outcome: Outcome) -> Iterator[Finding]:
 
 
 def _impossible(outcome: Outcome) -> Iterator[Finding]:
-    """Limits that let a number be what the model itself would refuse."""
-    for one in outcome.study.inputs.tolerances:
-        least = one.nominal + one.lower
-        if one.path.rpartition(".")[2] in NOT_NEGATIVE and least < 0:
-            yield finding_for("tolerance.negative", one.path, least=least)
+    """Limits that let a number be what the model itself would refuse, or a length turn round; each name once."""
+    study, mechanism = outcome.study, outcome.study.run.system.mechanism
+    numbers, kinds = copy(mechanism.parameter_set), measured(mechanism, mechanism.parameter_set.entries.values())
+    names, seen = variations(mechanism, numbers), set()
+    far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
+    for one, end in product(study.inputs.tolerances, ("lower", "upper")):
+        where = f"tolerances.{names[one.path][0]}" if one.path in names else one.path
+        deviation, unit = getattr(one, end), kinds[one.path].unit
+        if (where, end) in seen or not np.isfinite(deviation):
+            continue
+        seen.add((where, end))
+        numbers.nominal = mechanism.parameters(deviations={numbers.entries[one.path].alias or one.path: deviation})
+        changed = [path for path, value in numbers.nominal.items() if value != mechanism.parameter_set.nominal[path]]
+        refused = [one for one in check_values(mechanism, numbers, changed) if one.severity is Severity.ERROR]
+        reached = one.nominal + deviation
+        length = one.path.startswith("dimensions.") and unit == "m" and one.nominal > far
+        if reached < 0 <= one.nominal and (refused or length):
+            yield finding_for("tolerance.negative", where, least=reached, unit=unit)
+        elif refused:
+            why = f"{refused[0].where} {refused[0].what}"
+            yield finding_for("tolerance.impossible", where, value=reached, unit=unit, phrases={"why": why})
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from toleranced import clutch, rssr, slider_crank
 from trunnion import Mechanism, save, tolerance
 from trunnion.views.tolerance.figure import drawable, figure
 from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.tables import figures
+from trunnion.views.tolerance.tables import figures, headline
 
 MEASURES: dict[str, dict[str, Any]] = {
     "top": {"point": "piston.P", "axis": "x", "at": "60 deg"},
@@ -53,6 +53,13 @@ def test_where_a_measure_is_taken(result: Any) -> None:
     }
     still = tolerance(clutch(), methods=("linear",))
     assert told(still, "measure_texts") == {"wedge": "angle of link strut"}
+
+
+def test_the_headline_has_the_nominal_value_before_the_deviation(result: Any) -> None:
+    """So that a deviation is not taken for the measure itself."""
+    told = {name: {label: text for text, label in pairs} for name, pairs in headline(result)}
+    assert list(told["top"]) == ["nominal", "worst-case deviation, first order"]
+    assert told["top"]["nominal"] == readings(result)[0].say(float(result["nominal"].sel(measure="top")))
 
 
 def test_place_on_a_slide_and_axis_in_space() -> None:

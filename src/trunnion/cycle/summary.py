@@ -153,11 +153,8 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     """What the model says that this analysis leaves out, and warnings about the data."""
     notes = list(mechanism.checked)
     values = mechanism.parameters()
-    playing = [
-        name
-        for name, joint in mechanism.effective_joints.items()
-        if name not in mechanism.seated and clearance(name, values) is not None
-    ]
+    play = {name: clearance(name, values) for name in mechanism.effective_joints if name not in mechanism.seated}
+    playing = [name for name, own in play.items() if own is not None and own > 0]
     bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
@@ -170,7 +167,9 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
-        if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(name, values) is not None
+        if joint.seat not in (None, "free")
+        and play.get(name) is not None
+        and f"joints.{name}.pin.hole_radius" in values
     ]
     if tight:
         notes.append(finding_for("model.seat_without_play", "joints", joints=tight))

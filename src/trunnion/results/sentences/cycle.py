@@ -16,10 +16,7 @@ def _centred(joints: Sequence[str], seatable: Sequence[str]) -> str:
     if not seatable:
         return "see `trunnion play` for the effect of the play, `trunnion assemble` for whether the links fit together"
     of = f" of {', '.join(seatable)}" if len(seatable) < len(joints) else ", or analyse with --seat loaded"
-    return (
-        f"for pins pressed to one side by their loads state seat: loaded{of}; `trunnion play` and `trunnion tolerance` "
-        "cover all positions of these pins, also with that seat"
-    )
+    return f"for pins pressed to one side by their loads state seat: loaded{of}"
 
 
 def _locked(at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None) -> str:

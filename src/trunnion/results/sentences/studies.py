@@ -162,6 +162,12 @@ TOLERANCE = {
         "loaded) is left out, and scatter and limits are about the mechanism with every pin in the middle of its hole",
         "`trunnion analyse` has the shift by that seat; pins that are always pressed one way: state seat: {{xi: …}}",
     ),
+    "tolerance.pressed": Sentence(
+        NOTE,
+        "the loads press the pins of {joints} to one side of their holes throughout; nominal value, mean and scatter "
+        "are about pins in the middle of their holes",
+        "`trunnion analyse --seat loaded` has the effect; pins that lie so in every piece: state seat: {{xi: …}}",
+    ),
     "tolerance.correlations_left_out": Sentence(
         NOTE,
         "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include them",

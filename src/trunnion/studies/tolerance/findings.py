@@ -25,6 +25,7 @@ from trunnion.studies.tolerance.sampling import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed
 
 if TYPE_CHECKING:
+    from trunnion.studies.tolerance.first_order import ToleranceStudy
     from trunnion.studies.tolerance.linear import Of
     from trunnion.studies.tolerance.outcome import Outcome
     from trunnion.studies.tolerance.sampled import Sampled
@@ -35,6 +36,9 @@ Array = NDArray[np.float64]
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
+LOOKED = 72  # positions at which loads of pins are looked at
+UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
+ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
 EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
@@ -112,6 +116,8 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     loaded = [seat.joint for seat in study.run.seats if seat.given is None]
     if loaded:
         yield finding_for("tolerance.seats_not_taken", "joints", joints=loaded)
+    elif pressed := _pressed(study):
+        yield finding_for("tolerance.pressed", "joints", joints=pressed)
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from shared_dimensions.findings(mechanism)
@@ -130,6 +136,26 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
         yield finding_for("tolerance.indices_lost", count=outcome.indices.lost)
+
+
+def _pressed(study: ToleranceStudy) -> list[str]:
+    """Of planar pins that may lie anywhere, those that the nominal loads press to one side of their holes, wherever
+    they are loaded."""
+    found: list[str] = []
+    if study.run.system.mechanism.space != "planar" or not study.inputs.loose:
+        return found
+    with np.errstate(all="ignore"):
+        back = study.run.solve(study.run.cycle.times(LOOKED))
+        for joint in study.inputs.loose:
+            if study.run.system.joints[joint][0] != "revolute":
+                continue
+            force = np.array([np.broadcast_to(primal(part), LOOKED) for part in back.on_hole(joint)[0]])
+            size = np.hypot(*force)
+            ways = (force / size)[:, size > UNLOADED * np.nanmax(size, initial=0.0)]
+            mean = np.mean(ways, axis=1) if ways.shape[1] else np.zeros(2)
+            if np.min(mean @ ways, initial=np.inf) > ONE_SIDE * np.hypot(*mean) > 0:
+                found.append(joint)
+    return found
 
 
 def _play_sizes(outcome: Outcome) -> Iterator[Finding]:

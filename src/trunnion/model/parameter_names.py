@@ -50,7 +50,7 @@ class ParameterNames:
         every = [*self.paths, *self.endings]
         remedy = nearest(name, every if "." in name or not dimensions else dimensions)
         if not remedy.startswith("did you mean"):
-            longer = [one for one in every if len(one) > 2]
+            longer = [one for one in self.endings if len(one) > 2 and "." not in one]
             remedy = near if (near := nearest(name, longer)).startswith("did you mean") else remedy
         raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 

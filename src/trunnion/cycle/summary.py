@@ -291,7 +291,7 @@ def _summary(run: Run, found: Positions, near: near_locking.Locking | None) -> I
     solved = int(np.count_nonzero(counted)) - lost
     yield Figure("positions_solved", "positions solved", solved, aspect=f"of {len(found.time)}")
     if lost:
-        yield Figure("positions_lost", "positions not valid (a pin loses contact)", lost)
+        yield Figure("positions_lost", "positions not valid (a pin loses contact or bears no load)", lost)
 
 
 def _effort_figures(system: System, found: Positions, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:

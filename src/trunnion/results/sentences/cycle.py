@@ -176,6 +176,11 @@ CYCLE: dict[str, Sentence] = {
         "cross its play",
         _impact,
     ),
+    "contact.unloaded": Sentence(
+        NOTE,
+        "no load presses the pins of {joints} {at}: they float in their play, and positions there are not valid",
+        "expect impact where the load sets in",
+    ),
     "contact.lifted": Sentence(
         WARNING,
         "the {part} lifts off the wall {at}: the inertia force of its motion within the play exceeds the load",

@@ -160,6 +160,8 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     if heavy and mechanism.gravity is None:
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
         notes.append(finding_for("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
+    if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
+        notes.append(finding_for("model.no_mass", "gravity"))
     sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:

@@ -42,6 +42,10 @@ class ParameterNames:
         short = [path for path in below if path.endswith(f"{name}.{SHORT_FORM}")]
         if len(short) == 1 and name.endswith("friction"):  # `friction: 0.1` in a file is the coefficient, so here too
             return short[0]
+        if below and name == "friction":
+            joint = next(path for path in below if path.startswith("joints.")).split(".")[1]
+            remedy = f"set joint_defaults.friction, or that of one joint, such as {joint}.friction"
+            raise MechanismError(Finding(f"'{name}' is not one number", remedy=remedy))
         if below:
             some = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
             raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))

@@ -68,6 +68,9 @@ CYCLE: dict[str, Sentence] = {
         "state gravity: {down}, or gravity: {none}",
         quiet=True,
     ),
+    "model.no_mass": Sentence(
+        NOTE, "has no effect: no link has a mass", "state mass: … and centre: … of the links, or no gravity"
+    ),
     "model.point_mass": Sentence(
         NOTE,
         "{links} have a mass but no inertia: each is a point mass at its centre",

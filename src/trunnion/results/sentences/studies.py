@@ -54,6 +54,11 @@ PLAY = {
         "use the seats of {joints}",
         "`trunnion analyse` has the deviation with these seats",
     ),
+    "play.mean_of_fits": Sentence(
+        NOTE,
+        "the play of {joints} is the mean of their fits; the largest is {largest:~m}, of {most}",
+        "--set fits=maximum takes the largest play",
+    ),
     "play.beyond_first_order": Sentence(
         NOTE,
         "pins in their holes can change it by {exact:~{unit}} (at {at}), {percent:.2g} % more than the worst case to "

@@ -167,6 +167,10 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
     if found := _SYMMETRIC.match(text):
         main, parts = found[1], [found[2]]
+        if not main.strip():
+            raise UnitError(
+                f"'{text}' is a tolerance without a value", f"write 60 mm {text}, or tolerances: {{NAME: {text}}}"
+            )
     elif found := _LIMITS.match(text):
         main, parts = found[1], [found[2], found[3]]
     else:

@@ -305,7 +305,11 @@ def _loads(mechanism: Numbers) -> Iterator[Finding]:
     for name, load in mechanism.loads.items():
         where = f"loads.{name}"
         if (load.link is None) == (load.joint is None):
-            yield Finding("acts on neither or both of a link and a joint", where, "state link: … or joint: …")
+            link, _, point = str(load.at or "").rpartition(".")
+            remedy = (
+                f"state link: {link}, at: {point}" if link in mechanism.effective_links else "state link: … or joint: …"
+            )
+            yield Finding("acts on neither or both of a link and a joint", where, remedy)
         elif load.link is not None:
             yield from _link_load(mechanism, load, load.link, where)
         else:

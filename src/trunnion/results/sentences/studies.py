@@ -35,7 +35,7 @@ def _below(excess: float | None) -> str:
 PLAY = {
     "play.measures_left_out": Sentence(
         NOTE,
-        "left out: {measures}; this study covers the measures {known} and effort",
+        "left out: {measures}, which have no one value at every position",
         "use `trunnion tolerance` for other measures",
     ),
     "measure.none_stated": Sentence(

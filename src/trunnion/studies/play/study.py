@@ -166,7 +166,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
-    notes = [finding_for("play.measures_left_out", "measures", known=list(MOTIONS), measures=others)] if others else []
+    notes = [finding_for("play.measures_left_out", "measures", measures=others)] if others else []
     found = [one for one in found if one.name not in others]
     if found:
         return found, notes

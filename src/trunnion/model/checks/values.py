@@ -133,7 +133,7 @@ def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Fin
     for part, size in (("pin", "radius"), ("guide", "length")):
         clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
         if clearance >= body > 0:
-            what = f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}"
+            what = f"is {1e3 * clearance:g} mm, not less than the {size} {1e3 * body:g} mm of the {part}"
             yield Finding(what, stated(f"{part}.clearance"), "check its unit")
 
 

@@ -39,6 +39,7 @@ TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn ro
 LOOKED = 72  # positions at which loads of pins are looked at
 UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
 ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
+SIZES = ("pin.clearance", "guide.clearance", "pin.hole_radius", "pin.radius")  # what the size of a play depends on
 EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
@@ -159,13 +160,20 @@ def _pressed(study: ToleranceStudy) -> list[str]:
 
 
 def _play_sizes(outcome: Outcome) -> Iterator[Finding]:
-    """Tolerances of clearances whose pins may lie anywhere: their effect is that of the play."""
-    sizes = [(one.path, joint) for joint in outcome.study.inputs.loose for one in outcome.study.inputs.tolerances
-             if one.path in (f"joints.{joint}.pin.clearance", f"joints.{joint}.guide.clearance")]  # fmt: skip
-    if sizes:
-        numbers = [path.removeprefix("joints.") for path, _ in sizes]
-        plays = [f"{joint}.clearance" for _, joint in sizes]
-        yield finding_for("tolerance.play_size", "tolerances", numbers=numbers, plays=plays)
+    """Tolerances of clearances, and fits, whose pins may lie anywhere: their effect is that of the play."""
+    inputs = outcome.study.inputs
+    varied, fits = {one.path for one in inputs.tolerances}, outcome.study.run.system.mechanism.effective_joints
+    numbers: dict[str, str] = {}  # what sizes a play, and the play
+    for joint in inputs.loose:
+        for key in (key for key in SIZES if f"joints.{joint}.{key}" in varied):
+            pin = fits[joint].pin
+            radius = key.endswith("radius")
+            if radius and (pin is None or pin.fit is None):
+                continue
+            numbers[f"{joint}.{'pin.fit' if radius else key}"] = f"{joint}.clearance"
+    if numbers:
+        plays = list(dict.fromkeys(numbers.values()))
+        yield finding_for("tolerance.play_size", "tolerances", numbers=list(numbers), plays=plays)
 
 
 def _measured(outcome: Outcome) -> Iterator[Finding]:

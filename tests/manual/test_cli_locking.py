@@ -56,6 +56,20 @@ def test_the_margin_is_that_of_the_seats(program: Run, tmp_path: Path) -> None:
         assert float(np.abs(free["locking_margin"] - loaded["locking_margin"]).max()) > 1e-3
 
 
+def test_without_friction_the_ranges_are_those_of_coefficients_of_zero(program: Run) -> None:
+    off = program("locking", FREE, "--friction", "off", "--steps", 24).out.splitlines()
+    zero = program("locking", FREE, "--set", "joint_defaults.friction=0", "--steps", 24).out.splitlines()
+    start = next(k for k, line in enumerate(zero) if line.startswith("ranges of "))
+    assert len(zero) - start > 3
+    assert off[-len(zero[start:]) :] == zero[start:]
+
+
+def test_ranges_with_seats_are_labelled_as_of_centred_pins(program: Run) -> None:
+    options = "locking", PRESS, "--steps", 6, "--set", "joint_defaults.pin.clearance=0.1mm"
+    for seats in ((), ("--seat", "loaded")):
+        assert ("ranges of Z, pins centred" in program(*options, *seats).out) == bool(seats)
+
+
 def test_nothing_to_draw_without_friction(program: Run, tmp_path: Path) -> None:
     code, _, err = program("locking", PRESS, "--friction", "off", "--steps", 4, "--out", "l.png")
     assert code == 2

@@ -13,6 +13,7 @@ from trunnion import MechanismError
 from trunnion.cli.options import PLOT_KINDS, over, points
 from trunnion.views.cycle.plots import PLOTS
 
+TOLERANCED = EXAMPLES / "toleranced-fourbar.yaml"
 FOUR_BAR, CARDAN = EXAMPLES / "durango-fourbar.yaml", EXAMPLES / "pezzuti-cardan.yaml"
 STRIBECK = {"joint_defaults.friction.static": "0.5", "joint_defaults.friction.stribeck_speed": "0.1 m/s"}
 LAW = ("--friction", "stribeck")
@@ -119,3 +120,17 @@ def test_some_variables_in_blocks(program: Run, tmp_path: Path, monkeypatch: pyt
     trunnion.analyse(mechanism, 200, variables=["drive_effort"], dtype="float32", out=tmp_path / "same.csv")
     assert (tmp_path / "some.csv").read_text() == (tmp_path / "same.csv").read_text()
     assert (tmp_path / "some.csv").read_text().startswith("time,A.effort,status\n")
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [("l2=40", True), ("l2=0.04", False), ("l2=40mm", False), ("A.speed=100", True), ("A.speed=14", False)],
+)
+def test_a_number_that_is_set_without_the_unit_of_the_file(program: Run, value: str, told: bool) -> None:
+    """It is told where the number is nearer to the one in the file than to that in SI units; also of a sweep."""
+    done = program("analyse", TOLERANCED, "--set", value, "--steps", 4)
+    assert ("is in SI units, where the model states" in done.err) == told
+    name, _, number = value.partition("=")
+    if told and name == "l2":
+        swept = trunnion.sweep(trunnion.read(TOLERANCED), {name: [float(number), 41.0]}, steps=4).trunnion.findings
+        assert [one.severity for one in swept if one.where == "dimensions.l2"] == ["warning"]

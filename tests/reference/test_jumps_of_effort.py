@@ -49,3 +49,15 @@ def test_the_bound_holds(steps: int) -> None:
 
 def test_a_load_that_rises_is_no_jump() -> None:
     assert told("-50 kN * max(sin(drive), 0)", 180)[1] == []
+
+
+def test_sweeps_and_tolerances_tell_it_too() -> None:
+    """With the bound that `analyse` has; a tolerance only of an extreme of the effort."""
+    _, (one,) = told(PRESS["loads"]["cut"]["force"][0], 180)
+    tolerances = {"rod.points.Q.x": "±0.05 mm"}
+    model = trunnion.Mechanism.model_validate({**PRESS, "tolerances": tolerances})
+    swept = trunnion.sweep(model, {"rod.points.Q.x": [0.2, 0.201]}, steps=180).trunnion.findings
+    assert [found.figures for found in swept if found.code == "effort.beside_jump"] == [one.figures]
+    for measure, expected in (("effort:O", []), ("maximum:effort:O", [("warning", one.figures)])):
+        found = trunnion.tolerance(model, [measure], methods=("linear",), steps=180).trunnion.findings
+        assert [(f.severity, f.figures) for f in found if f.code == "tolerance.beside_jump"] == expected

@@ -297,6 +297,9 @@ def test_dead_centres_have_no_answer_and_say_so() -> None:
     ("measure", "what"),
     [
         ("nothing", "is no measure"),
+        ("rocker.C", "'rocker.C.x'"),
+        ("max:effort:A", "did you mean 'maximum'"),
+        ("angel:rocker", "'angle'"),
         ("rotation:Q", "no joint 'Q'"),
         ("slide:D", "no slide"),
         ("angle:rod", "no link 'rod'"),

@@ -14,7 +14,7 @@ from trunnion.solve.run import prepare
 from trunnion.studies.play.study import plays
 
 STEPS, TRIALS = 24, 4000
-LARGE, SMALL = 4e-3, 1e-7  # m: play at which the second order shows, and at which it does not
+LARGE, SMALL = 9.5e-3, 1e-7  # m: play at which the second order shows, and at which it does not
 
 
 def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
@@ -25,7 +25,7 @@ def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
     (found,) = [one.figures for one in findings_of(result) if one.code == "play.beyond_first_order"]
     first, exact = found["first"], found["exact"]
     assert first == pytest.approx(float(result["worst_case_total"].max()))
-    assert 1e-3 < exact / first - 1 < 0.2
+    assert 1e-2 < exact / first - 1 < 0.2
     assert found["percent"] == pytest.approx(100 * (exact / first - 1))
     run, rng = prepare(mechanism), np.random.default_rng(7)
     measure = named(mechanism, [f"angle:{link}"], run.values)[0]

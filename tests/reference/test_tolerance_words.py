@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from mechanisms_parts import prismatic, slide
+from mechanisms_parts import prismatic, revolute, slide
 from toleranced import clutch, rssr, slider_crank
 from trunnion import Mechanism, save, tolerance
 from trunnion.views.tolerance.figure import drawable, figure
 from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.tables import figures
+from trunnion.views.tolerance.tables import figures, headline
 
 MEASURES: dict[str, dict[str, Any]] = {
     "top": {"point": "piston.P", "axis": "x", "at": "60 deg"},
@@ -53,6 +53,13 @@ def test_where_a_measure_is_taken(result: Any) -> None:
     }
     still = tolerance(clutch(), methods=("linear",))
     assert told(still, "measure_texts") == {"wedge": "angle of link strut"}
+
+
+def test_the_headline_has_the_nominal_value_before_the_deviation(result: Any) -> None:
+    """So that a deviation is not taken for the measure itself."""
+    told = {name: {label: text for text, label in pairs} for name, pairs in headline(result)}
+    assert list(told["top"]) == ["nominal", "worst-case deviation, first order"]
+    assert told["top"]["nominal"] == readings(result)[0].say(float(result["nominal"].sel(measure="top")))
 
 
 def test_place_on_a_slide_and_axis_in_space() -> None:
@@ -125,3 +132,46 @@ def test_unit_of_all_measures() -> None:
     found = tolerance(slider_crank(dimensions=LENGTHS), methods=("linear",))
     assert {found[name].attrs["units"] for name in ("nominal", "curve", "curve_rss", "rss")} == {"m"}
     assert found.curve_sensitivity.attrs["units"] == found.sensitivity.attrs["units"] == "m/m"
+
+
+@pytest.mark.parametrize(
+    ("tolerances", "options", "expected"),
+    [
+        ({"r": "±60 mm"}, {}, [("tolerance.negative", "tolerances.r", -0.01)]),
+        ({"r": "±40 mm", "e": "±1 mm"}, {}, []),  # an offset may turn round
+        ({"joint_defaults.friction.coefficient": "±0.2"}, {"friction": 0.06},
+         [("tolerance.negative", "tolerances.joint_defaults.friction.coefficient", -0.14)]),
+        ({"joint_defaults.friction.coefficient": "±0.02"}, {"friction": 0.06}, []),
+        ({"joint_defaults.pin.radius": "±4 mm"}, {"friction": 0.1},
+         [("tolerance.negative", "tolerances.joint_defaults.pin.radius", -0.001)]),
+        ({"joint_defaults.pin.radius": "±3 mm"}, {"friction": 0.1},
+         [("tolerance.impossible", "tolerances.joint_defaults.pin.radius", 0.0)]),
+    ],
+)  # fmt: skip
+def test_tolerances_of_what_no_model_may_have(
+    tolerances: dict[str, str], options: dict[str, float], expected: list[tuple[str, str, float]]
+) -> None:
+    """A negative size or coefficient, a length that turns round; of a default once for all its joints."""
+    dimensions = {"r": "50 mm", "l": "200 mm", "e": "0.5 mm"}
+    defaults = {"pin": {"radius": "3 mm"}, "guide": {"length": "30 mm"}, "friction": 0.06, **options}
+    model = slider_crank(dimensions=dimensions, joint_defaults=defaults, tolerances=tolerances)
+    found = tolerance(model, ["slide:C"], methods=("linear",), steps=24).trunnion.findings
+    told = [(one.code, one.where, one.figures) for one in found if one.code.endswith((".negative", ".impossible"))]
+    assert [(code, where) for code, where, _ in told] == [(code, where) for code, where, _ in expected]
+    for (_, _, own), (_, _, reached) in zip(told, expected, strict=True):
+        assert own["least" if reached < 0 else "value"] == pytest.approx(reached, abs=1e-12)
+
+
+@pytest.mark.parametrize(("swing", "load", "pressed"), [(40, -10.0, True), (100, -10.0, False), (40, 0.0, False)])
+def test_pins_that_are_pressed_to_one_side_throughout_are_told(swing: int, load: float, pressed: bool) -> None:
+    """A weight on a lever, whose hole turns with it: to either side of the mean by half of what the lever swings."""
+    model = Mechanism(
+        trunnion=1,
+        links={"ground": {"points": {"A": [0, 0]}}, "lever": {"points": {"A": [0, 0], "P": [1, 0]}}},
+        joints={"A": {**revolute("ground", "lever"), "pin": {"clearance": 1e-4}}},
+        drivers={"A": {"speed": 1.0, "range": ["0 deg", f"{swing} deg"]}},
+        loads={"weight": {"link": "lever", "at": "P", "force": [0, load]}},
+    )
+    found = tolerance(model, ["lever.P.y"], methods=("linear",), steps=12).trunnion.findings
+    told = [one.figures["joints"] for one in found if one.code == "tolerance.pressed"]
+    assert told == ([["A"]] if pressed else [])

@@ -76,6 +76,9 @@ def test_a_dimension_of_one_link_or_without_tolerance_is_not() -> None:
 def test_the_tolerance_of_a_clearance_is_in_the_row_of_the_play() -> None:
     (found,) = coded(trunnion.tolerance(slider(), methods=["linear"], steps=12), "tolerance.play_size")
     assert found.figures == {"numbers": ["O.pin.clearance"], "plays": ["O.clearance"]}
+    fits = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
+    (found,) = coded(trunnion.tolerance(fits, methods=["linear"], steps=12), "tolerance.play_size")
+    assert found.figures["numbers"] == ["O.pin.fit", "P.pin.fit", "Q.pin.clearance"]
 
 
 def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() -> None:

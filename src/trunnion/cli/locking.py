@@ -52,7 +52,6 @@ def locking(
     from trunnion.cycle.locking import look, report_figures
     from trunnion.results.attributes import attribute
     from trunnion.solve.run import prepare
-    from trunnion.solve.system import rubbing
 
     check_files(out or [])
     mechanism = stated(file, set_, table, friction, seat)
@@ -65,9 +64,10 @@ def locking(
 
     def show() -> None:
         show_figures(mechanism.name or str(file), figures)
-        if rubbing(run.system) and mechanism.drivers:
+        if mechanism.drivers:
             console().print()
-            _show_ranges(every["of"], [row["cells"] for row in every["rows"]])
+            title = f"ranges of {every['of']}".removesuffix(" of ") + ", pins centred" * bool(run.seats)
+            _show_ranges(title, [row["cells"] for row in every["rows"]])
 
     def draw(path: Path) -> Any:
         from trunnion.views.cycle.locking_plot import locking as figure
@@ -80,10 +80,10 @@ def locking(
     ).finish()  # fmt: skip
 
 
-def _show_ranges(of: str, rows: list[list[str]]) -> None:
-    """The ranges as a table, in the order of the cycle; those near locking last. of: the driver."""
+def _show_ranges(title: str, rows: list[list[str]]) -> None:
+    """The ranges as a table, in the order of the cycle; those near locking last."""
     from trunnion.cycle.locking_states import HEAD
 
-    show_rows(f"ranges of {of}" if of else "ranges", list(HEAD), rows[:MOST_RANGES])
+    show_rows(title, list(HEAD), rows[:MOST_RANGES])
     if len(rows) > MOST_RANGES:
         console().print(f"{len(rows) - MOST_RANGES} more ranges; --out has every position", markup=False)

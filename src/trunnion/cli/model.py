@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,9 +35,24 @@ def stated(
     values = dict(setting(text) for text in settings or ())
     if seat is not None:
         mechanism = mechanism.with_seats(seat)
+    bare = list(_bare(mechanism, values))
     if friction:
-        return mechanism.with_friction(friction, {**(swept or {}), **values})
-    return mechanism.with_values(values) if values else mechanism
+        mechanism = mechanism.with_friction(friction, {**(swept or {}), **values})
+    elif values:
+        mechanism = mechanism.with_values(values)
+    mechanism.checked[:] = [*(one for one in mechanism.checked if one.where not in {own.where for own in bare}), *bare]
+    return mechanism
+
+
+def _bare(mechanism: Mechanism, values: Mapping[str, float | str]) -> Iterator[Finding]:
+    """Numbers that lack the unit that the model has."""
+    from trunnion.model.checks.magnitudes import bare_number
+
+    numbers = mechanism.parameter_set
+    for name, value in values.items():
+        with suppress(MechanismError):  # of a name that means nothing, which is said where it is set
+            if not isinstance(value, str):
+                yield from bare_number(numbers, numbers.resolve(name), value)
 
 
 @contextmanager

@@ -253,7 +253,7 @@ def _seen(
 
 def _once(found: Iterable[tuple[float, float]], count: int, periodic: bool) -> Iterator[tuple[float, float]]:
     """Each passage once: one near a position is seen from both sides of it, over a turn also from its other end."""
-    places = sorted((place % count if periodic else place, size) for place, size in found)
+    places = sorted((place % count if periodic else min(max(place, 0.0), count - 1.0), size) for place, size in found)
     for k, (place, size) in enumerate(places):
         before = places[k - 1][0] if k else places[-1][0] - count if periodic and len(places) > 1 else -np.inf
         if place - before > 0.5 * FINE:
@@ -303,12 +303,19 @@ def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial:
     if len(held):
         joint, jump = _jump(arrays["seat_offset"], held, joints)
         yield finding_for("seat.held", "joints", at=dial.intervals(held), joint=joint, jump=jump)
+    idle: dict[str, list[str]] = {}  # joints by the range in which they bear no load
+    for loss in found:
+        for _, text, long in _told(loss.places, dial):
+            if long:
+                idle.setdefault(text, []).append(loss.joint)
+    for text, unloaded in idle.items():
+        yield finding_for("contact.unloaded", "joints", joints=unloaded, at=text)
     for loss in found:
         where = f"joints.{loss.joint}"
         if not loss.loaded:
             yield finding_for("seat.unloaded", where, part=loss.part)
             continue
-        if loss.places:
+        if not all(long for _, _, long in _told(loss.places, dial)):
             yield _lost(loss, arrays["contact_loss_number"][joints.index(loss.joint)], dial)
         if len(loss.lifted):
             yield finding_for("contact.lifted", where, part=loss.part, at=dial.intervals(loss.lifted))
@@ -331,7 +338,7 @@ def _jump(offsets: NDArray[np.float64], held: NDArray[np.intp], joints: Sequence
 
 
 def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:
-    shown = [text for _, text in sorted(_told(loss.places, dial))]
+    shown = [text for _, text, long in sorted(_told(loss.places, dial)) if not long]
     more = len(shown) - MOST_PLACES
     at = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
     least = loss.least if loss.least > NO_LOAD * loss.peak else 0.0  # less than that is rounding
@@ -342,15 +349,15 @@ def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:
     )  # fmt: skip
 
 
-def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str]]:
-    """Where, and in words, of every passage; those of an end without a load for a while are one."""
+def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str, bool]]:
+    """Where, and in words, of every passage; those of an end without a load for a while are one, and long."""
     for end, name in enumerate(ENDS):
         own = np.array(sorted(place for place, one in places if one == end))
         for run in np.split(own, np.flatnonzero(np.diff(own) > 1.5) + 1):
             if len(run) > MOST_PLACES:
-                yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}{name}"
+                yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}{name}", True
             else:
-                yield from ((place, f"at {_at(dial, place)}{name}") for place in run)
+                yield from ((place, f"at {_at(dial, place)}{name}", False) for place in run)
 
 
 def _at(dial: Dial, place: float) -> str:

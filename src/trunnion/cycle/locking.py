@@ -30,6 +30,7 @@ from trunnion.cycle.near_locking import (
     reverse,
     reverse_figure,
 )
+from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
@@ -130,19 +131,10 @@ def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
         names = [str(name) for name, stores in zip(result["spring"].values, storing, strict=True) if stores]
         if names:
             notes.append(finding_for("locking.springs_not_useful", "springs", springs=names, count=len(names)))
-    beside = _beside_the_drive(mechanism) if rubbing(run.system) else []
+    beside = beside_the_drive(mechanism) if rubbing(run.system) else []
     if beside:
         notes.append(finding_for("locking.load_beside_drive", "loads", loads=beside, count=len(beside)))
     return notes
-
-
-def _beside_the_drive(mechanism: Mechanism) -> list[str]:
-    """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
-    if not useful_springs(mechanism) and not any(load.useful for load in mechanism.loads.values()):
-        return []
-    driven = {link for name in mechanism.drivers for link in mechanism.effective_joints[name].links}
-    driven.discard(mechanism.fixed_link)
-    return [name for name, load in mechanism.loads.items() if load.link in driven and not load.useful]
 
 
 def _efficiency_reverse(back: Passage) -> NDArray[np.float64]:
@@ -160,10 +152,8 @@ def ranges(found: xr.Dataset, near: float = NEAR) -> list[LockingRange]:
 def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     """The figures of a result of `look` that one looks at first."""
     dial = run.system.dial(run.values, found["time"].values)
-    if not rubbing(run.system):
-        return [Figure("locking_margin", "locking margin (no joint has friction)", None)]
-    margin = found["locking_margin"].values
-    figures = [least_margin("locking_margin", "locking margin, all friction together", margin, dial)]
+    what = ", all friction together" if rubbing(run.system) else " (no joint has friction)"
+    figures = [least_margin("locking_margin", f"locking margin{what}", found["locking_margin"].values, dial)]
     for joint in felt(run.system, run.values):
         figures += _of_joint(run, joint, found["critical_multiple"].sel(joint=joint).values, dial)
     more = found["other_solutions"].values
@@ -184,7 +174,8 @@ def _turning(found: xr.Dataset) -> list[Figure]:
     if not places:
         return []
     where = ", ".join(places[:MOST_PLACES]) + (f" and {len(places) - MOST_PLACES} more" * (len(places) > MOST_PLACES))
-    return [Figure("drive_effort_sign", "the drive effort changes sign at", where)]
+    centred = ", pins centred," * ("seat_offset" in found)
+    return [Figure("drive_effort_sign", f"the drive effort changes sign{centred} at", where)]
 
 
 def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[Figure]:

@@ -108,6 +108,11 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
     figures = np.array([of_cycle.get(one.name, np.nan) for one in measures], float)
     valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
     notes: dict[str, str] = {}
+    for measure, figure in zip(measures, figures, strict=True):
+        if measure.rule.startswith("dead centre") and not np.isfinite(figure):
+            ends = "minimum", "maximum: leave out as"
+            what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
+            notes[measure.name] = f"no {what} within the cycle; for a {other}"
     if np.all(valid):
         return Watched(run, measures, values, figures, findings, valid, notes)
     dial = run.system.dial(run.values, time)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis, near_locking
+from trunnion.cycle import contact_loss, diagnosis, near_locking, uncounted
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import Means
+from trunnion.cycle.positions import Positions, positions
 from trunnion.cycle.scene import DRAWN
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
@@ -35,7 +37,6 @@ from trunnion.solve.system import Dial, System, felt, rubbing
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.cycle.positions import Positions
     from trunnion.solve.run import Run
 
 from trunnion.cycle.model_measures import Watched, positions_told, watched
@@ -43,6 +44,7 @@ from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "beside_jumps",
     "books",
     "dataset_of",
     "effort_units",
@@ -130,6 +132,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *_over_the_cycle(run, at, near),
         *_missed_peaks(run.system, at),
         *_beside_jumps(run, at),
+        *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
 
@@ -166,16 +169,15 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     """What the model says that this analysis leaves out, and warnings about the data."""
     notes = list(mechanism.checked)
     values = mechanism.parameters()
-    playing = [
-        name
-        for name, joint in mechanism.effective_joints.items()
-        if name not in mechanism.seated and clearance(name, values) is not None
-    ]
+    play = {name: clearance(name, values) for name in mechanism.effective_joints if name not in mechanism.seated}
+    playing = [name for name, own in play.items() if own is not None and own > 0]
     bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
     heavy = [name for name, link in bodies.items() if link.mass.source != 0]
     if heavy and mechanism.gravity is None:
         down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
         notes.append(finding_for("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
+    if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
+        notes.append(finding_for("model.no_mass", "gravity"))
     sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
     points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
     if points:
@@ -183,7 +185,9 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     tight = [
         name
         for name, joint in mechanism.effective_joints.items()
-        if joint.seat not in (None, "free") and name not in mechanism.seated and clearance(name, values) is not None
+        if joint.seat not in (None, "free")
+        and play.get(name) is not None
+        and f"joints.{name}.pin.hole_radius" in values
     ]
     if tight:
         notes.append(finding_for("model.seat_without_play", "joints", joints=tight))
@@ -223,6 +227,12 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
         largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
         if rms > (1 + 1e-6) * largest:
             yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
+
+
+def beside_jumps(run: Run, steps: int) -> Iterator[Finding]:
+    """Largest efforts of a cycle that are beside a jump, for studies that look at more than one mechanism."""
+    with suppress(MechanismError):  # of seats that over-constrained links cannot take
+        yield from _beside_jumps(run, positions(run, steps, margin=False, averaged=False))
 
 
 def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
@@ -294,7 +304,7 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
     solved = int(np.count_nonzero(counted)) - lost
     yield Figure("positions_solved", "positions solved", solved, aspect=f"of {len(found.time)}")
     if lost:
-        yield Figure("positions_lost", "positions not valid (a pin loses contact)", lost)
+        yield Figure("positions_lost", "positions not valid (a pin loses contact or bears no load)", lost)
 
 
 def _effort_figures(system: System, found: Positions, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:

@@ -24,6 +24,7 @@ from trunnion.model.contact import motions
 from trunnion.model.measure_parts import STATISTICS
 from trunnion.model.measure_table import MEASURES, MeasureKind
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import nearest
 from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
@@ -222,14 +223,24 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
             stated = _read(name)
             findings += [] if stated is None else list(check_measure(mechanism, stated, f"--measure {name}"))
         if stated is None:
-            known = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
-            kinds = f"; KIND: {', '.join(list(MEASURES)[1:])}; STATISTIC: {', '.join(STATISTICS)}"
-            findings.append(Finding(f"'{name}' is no measure", "--measure", f"write {FORMS}{known}{kinds}"))
+            findings.append(Finding(f"'{name}' is no measure", "", _meant(name, mechanism), code="input.measure"))
         else:
             found.append(_measure(name, stated, values, mechanism))
     if findings:
         raise MechanismError(findings)
     return found
+
+
+def _meant(name: str, mechanism: Mechanism) -> str:
+    """A remedy for a text that is no measure: what is most like it, else how one is written."""
+    head, colon, _ = name.partition(":")
+    points = (f"{link}.{point}" for link, one in mechanism.effective_links.items() for point in one.points)
+    components = [f"{point}.{axis}" for point in points for axis in AXES[: mechanism.coordinates]]
+    near = nearest(head, [*STATISTICS, *MEASURES]) if colon else nearest(name, [*mechanism.measures, *components])
+    if near.startswith("did you mean"):
+        return near
+    known = f"; the model's measures are {', '.join(mechanism.measures)}" if mechanism.measures else ""
+    return f"write {FORMS}, with KIND and STATISTIC as in a model file{known}"
 
 
 def _read(text: str) -> Stated | None:

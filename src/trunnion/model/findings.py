@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping
@@ -65,7 +66,9 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = f"the file is of version {error['input']!r}, this program reads 1", f"write {key}: 1"
     elif kind == "literal_error":
         wrong = f"'{error['input'][:40]}' " if isinstance(error["input"], str) else ""
-        what, remedy = f"{wrong}is not one of {context['expected']}", f"write one of {context['expected']}"
+        what, remedy = f"{wrong}is not one of {context['expected']}", "write one of these"
+        near = nearest(str(error["input"]), re.findall(r"'([^']*)'", context["expected"]))
+        remedy = near if near.startswith("did you mean") else remedy
         if key == "seat":
             remedy = "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}"
     elif kind in _MEANINGS:

@@ -27,7 +27,7 @@ def half_width(stated: object, kind: Kind, name: str) -> float:
     try:
         text = _EITHER.sub("", normalise(stated)) if isinstance(stated, str) else stated
         quantity = Quantity.read(text, kind)
-        if quantity.tolerance or quantity.names:
+        if quantity.tolerance or quantity.names or "%" in str(text):
             raise UnitError("is no number with a unit")
         value = float(quantity.evaluate())
     except UnitError as error:

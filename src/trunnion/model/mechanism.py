@@ -360,9 +360,10 @@ class Mechanism(Numbers):
         values: what else is replaced at the same time, as by `with_values`: parameters of the new law among it.
         """
         if law != "off" and law not in FRICTION_LAWS:
-            raise MechanismError(
-                Finding(f"'{law}' is not a friction law", remedy=nearest(law, [*FRICTION_LAWS, "off"]))
-            )
+            remedy = nearest(law, [*FRICTION_LAWS, "off"])
+            if law[:1].isdigit():
+                remedy = f"a coefficient is set by joint_defaults.friction={law}, of one joint by NAME.friction={law}"
+            raise MechanismError(Finding(f"'{law}' is not a friction law", remedy=remedy))
         if law == "off":
             stated = self.with_values(values) if values else self
             return Mechanism(**kept(stated, with_law(stated.data(), law)))

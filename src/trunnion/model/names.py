@@ -12,6 +12,8 @@ __all__ = ["FORMULA", "as_key", "guarded", "nearest", "unguarded"]
 SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
 _PLAIN = re.compile(r"[^\W\d](?:[\w. +/-]*\w)?")  # what YAML takes for a text as it stands, in braces too
+# words in common use for those of a model file: too unlike them to be found by their letters
+MEANT = {"rectangular": "uniform", "gauss": "normal", "gaussian": "normal", "diameter": "radius"}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
 
 
@@ -25,6 +27,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known ones, else the first few that exist."""
     names = list(dict.fromkeys(known))
     folded = {one.casefold(): one for one in reversed(names)}
+    if (meant := MEANT.get(name.casefold())) in names:
+        return f"did you mean '{meant}'{', half the diameter' * (meant == 'radius')}?"
     close = [folded[one] for one in get_close_matches(name.casefold()[:80], folded, n=3, cutoff=0.6)]
     if close:
         return "did you mean " + " or ".join(f"'{one}'" for one in close) + "?"

@@ -42,13 +42,21 @@ class ParameterNames:
         short = [path for path in below if path.endswith(f"{name}.{SHORT_FORM}")]
         if len(short) == 1 and name.endswith("friction"):  # `friction: 0.1` in a file is the coefficient, so here too
             return short[0]
+        if below and name == "friction":
+            joint = next(path for path in below if path.startswith("joints.")).split(".")[1]
+            remedy = f"set joint_defaults.friction, or that of one joint, such as {joint}.friction"
+            raise MechanismError(Finding(f"'{name}' is not one number", remedy=remedy))
         if below:
             some = ", ".join(below[:6]) + (", …" if len(below) > 6 else "")
             raise MechanismError(Finding(f"'{name}' is not one number", remedy=f"set one of {some}"))
         dimensions = [path.partition(".")[2] for path in self.paths if path.startswith("dimensions.")]
         # a short name is most likely a mistyped dimension; endings such as `x` resemble everything
-        known = [*self.paths, *self.endings] if "." in name or not dimensions else dimensions
-        raise MechanismError(Finding(f"there is no number named '{name}'", remedy=nearest(name, known)))
+        every = [*self.paths, *self.endings]
+        remedy = nearest(name, every if "." in name or not dimensions else dimensions)
+        if not remedy.startswith("did you mean"):
+            longer = [one for one in self.endings if len(one) > 2 and "." not in one]
+            remedy = near if (near := nearest(name, longer)).startswith("did you mean") else remedy
+        raise MechanismError(Finding(f"there is no number named '{name}'", remedy=remedy))
 
     def _error(self, name: str) -> str:
         """The path of the deviation of a number by a name of that number."""

@@ -108,7 +108,8 @@ class Quantity:
             assert dimension is not None  # None fits every kind
             raise UnitError(
                 f"'{self.source}' is {dimension_text(dimension)} where {_needed(kind)} is needed",
-                f"write {_needed(kind)} such as {kind.example}",
+                f"write {_needed(kind)} such as {kind.example}"
+                + ("; a percentage of another value is not read" if "%" in str(self.source) else ""),
             )
         return dimension
 
@@ -166,6 +167,10 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     """Value text and tolerance in SI; a unit stated once serves the value and the tolerance."""
     if found := _SYMMETRIC.match(text):
         main, parts = found[1], [found[2]]
+        if not main.strip():
+            raise UnitError(
+                f"'{text}' is a tolerance without a value", f"write 60 mm {text}, or tolerances: {{NAME: {text}}}"
+            )
     elif found := _LIMITS.match(text):
         main, parts = found[1], [found[2], found[3]]
     else:
@@ -174,6 +179,9 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
     value = LITERAL.fullmatch(main.strip().lstrip("-+ "))
     unit_of_value = value["unit"] or "" if value else ""
     unit = next((one for _, one in reversed(terms) if one), unit_of_value)
+    if value and unit == "%" and unit_of_value != unit:
+        own = ", ".join(f"{number.lstrip('+')} % is {_share(number, value)}" for number, _ in terms)
+        raise UnitError(f"the tolerance in '{text}' is in percent, the value is not", f"write the deviation: {own}")
     if value and not unit_of_value and unit:
         main = f"{main.strip()} {unit}"
     if not unit and not value and kind.dimensions != KINDS["number"].dimensions:
@@ -198,6 +206,12 @@ def _split(text: str, kind: Kind) -> tuple[str, tuple[float, float] | None]:
             raise UnitError(f"the tolerance in '{text}' has a sign after ±", "write ± 0.05 mm")
         deviations.append(-deviations[0])
     return main, (min(deviations), max(deviations))
+
+
+def _share(percent: str, value: re.Match[str]) -> str:
+    """A deviation in percent of a value, as it is to be written."""
+    share = float(percent) / 100 * float(value["number"])
+    return f"{share:.6g} {value['unit'] or ''}".strip()
 
 
 def deviation_spans(text: str) -> list[tuple[int, int]]:

@@ -24,6 +24,7 @@ from trunnion.joints.motion import Span
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.joint_parts import Losses
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.quantities import readable
 from trunnion.solve import shifts
 from trunnion.structure.decompose import Module, Plan
 
@@ -366,7 +367,8 @@ class System:
         for name, span in spans.items():
             if span.duration < 0:
                 speed = nominal[f"drivers.{name}.speed"]
-                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {speed:g} (SI)"
+                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
+                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
                 findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
         found = {name for name, driver in drivers.items() if free and driver.found}
         longest = float(

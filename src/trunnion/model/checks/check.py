@@ -21,6 +21,7 @@ from trunnion.model.checks.errors import errors, joint_errors
 from trunnion.model.checks.free_motion import FREE, free_motion
 from trunnion.model.checks.gears import gears
 from trunnion.model.checks.loads import losses, motion_dimensions, springs, tables, unknown_name, unread
+from trunnion.model.checks.magnitudes import magnitudes
 from trunnion.model.checks.measures import check_measure, measure_values, point_exists
 from trunnion.model.checks.space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.checks.tolerances import stated_entries, tolerance_names, tolerance_values
@@ -59,7 +60,7 @@ def check_model(mechanism: Numbers, lost: Collection[str] = ()) -> list[Finding]
         ParameterSet(mechanism.entries, mechanism.dimensions, unreadable) if unreadable else mechanism.parameter_set
     )
     with np.errstate(all="ignore"):  # absurd numbers may overflow in a check; they are still only numbers
-        findings += check_values(mechanism, numbers)
+        findings += [*check_values(mechanism, numbers), *magnitudes(mechanism, numbers)]
         findings += measure_values(mechanism, numbers)
         findings += [*tolerance_values(mechanism, numbers), *cost_values(mechanism, numbers)]
     findings = list(dict.fromkeys(findings))  # a default that several joints share is found once
@@ -304,7 +305,11 @@ def _loads(mechanism: Numbers) -> Iterator[Finding]:
     for name, load in mechanism.loads.items():
         where = f"loads.{name}"
         if (load.link is None) == (load.joint is None):
-            yield Finding("acts on neither or both of a link and a joint", where, "state link: … or joint: …")
+            link, _, point = str(load.at or "").rpartition(".")
+            remedy = (
+                f"state link: {link}, at: {point}" if link in mechanism.effective_links else "state link: … or joint: …"
+            )
+            yield Finding("acts on neither or both of a link and a joint", where, remedy)
         elif load.link is not None:
             yield from _link_load(mechanism, load, load.link, where)
         else:

@@ -79,6 +79,8 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
     """A name in an expression that means nothing there."""
     section = path.partition(".")[0]
     what = f"'{source}' refers to '{name}', which is not one of the dimensions"
+    if name in ("off", "none"):
+        return Finding(f"'{source}' is no number", path, "write 0")
     if PLACED in name and section != "loads":
         return Finding(what, path, "motions of joints and points are for loads; give a number or a dimension")
     if section == "loads" and name in mechanism.measures:

@@ -91,7 +91,7 @@ def _entries(value: Any, where: str, location: tuple[str | int, ...], kind: Kind
 def tolerance_names(mechanism: Numbers, found: Sequence[Entry]) -> Iterator[Finding]:
     """Whether each name is of a number that can vary, once, and each distribution gets what it takes."""
     names = ParameterNames(entry.path for entry in found)
-    known = {entry.path: entry for entry in found}
+    known, kinds = {entry.path: entry for entry in found}, measured(mechanism, found)
     used = {name for entry in found for name in entry.quantity.names}
     first: dict[str, str] = {}
     for name, variation in mechanism.variations.items():
@@ -106,6 +106,7 @@ def tolerance_names(mechanism: Numbers, found: Sequence[Entry]) -> Iterator[Find
             yield Finding(f"'{name}' and '{first[path]}' are the same number", where, "keep one of them")
         first.setdefault(path, name)
         yield from _number(known, path, used, where)
+        yield from _percent(variation, known[path], kinds[path], where)
     yield from _default_distribution(mechanism)
     for row, one in enumerate(mechanism.correlations):
         for place, name in enumerate(one.of):
@@ -129,6 +130,18 @@ def _number(known: Mapping[str, Entry], path: str, used: set[str], where: str) -
         yield Finding(f"no joint follows '{path}'", where, "name the number of a joint, as B.pin.clearance")
     elif path.startswith("dimensions.") and path.partition(".")[2] not in used:
         yield Finding(f"no result depends on '{path}'", where, "use it, or remove it", Severity.WARNING)
+
+
+def _percent(variation: Variation, entry: Entry, kind: Kind, where: str) -> Iterator[Finding]:
+    """Limits in percent of a number that is not stated so: of the number is meant, one hundredth would be taken."""
+    limits = "" if variation.limits is None else str(variation.limits.source)
+    if "%" not in limits or "%" in str(entry.quantity.source) or NUMBER.dimensions[0] not in (kind.dimensions or ()):
+        return
+    remedy = "write the deviation itself"
+    if variation.limits is not None and not {*variation.limits.upper.names, *entry.quantity.names}:
+        share = float(variation.limits.upper.evaluate()) * abs(float(entry.quantity.evaluate()))
+        remedy += f": {share:.4g}, if percent of {entry.quantity.source} is meant"
+    yield Finding(f"the limits '{limits}' are in percent, the number is not", where, remedy)
 
 
 def _shape(mechanism: Numbers, variation: Variation, where: str) -> Iterator[Finding]:

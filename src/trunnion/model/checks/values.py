@@ -99,7 +99,8 @@ NOT_NEGATIVE = frozenset(
 
 def _radians(path: str, angle: float) -> Iterator[Finding]:
     """A plain number that is many turns is likely meant in degrees."""
-    if abs(angle) > 2 * np.pi and not path.startswith("drivers."):
+    whole = float(angle).is_integer() or not path.startswith("drivers.")  # a driver may well go through turns
+    if abs(angle) > 2 * np.pi and whole:
         what = f"is {angle:g} rad, which is {angle / (2 * np.pi):.3g} turns: a plain number is in radians"
         yield Finding(what, path, f"write {angle:g} deg if it is in degrees", Severity.WARNING)
 
@@ -132,7 +133,7 @@ def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Fin
     for part, size in (("pin", "radius"), ("guide", "length")):
         clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
         if clearance >= body > 0:
-            what = f"is {clearance:g} m, not less than the {size} {body:g} m of the {part}"
+            what = f"is {1e3 * clearance:g} mm, not less than the {size} {1e3 * body:g} mm of the {part}"
             yield Finding(what, stated(f"{part}.clearance"), "check its unit")
 
 

@@ -17,10 +17,7 @@ def _centred(joints: Sequence[str], seatable: Sequence[str]) -> str:
     if not seatable:
         return "see `trunnion play` for the effect of the play, `trunnion assemble` for whether the links fit together"
     of = f" of {', '.join(seatable)}" if len(seatable) < len(joints) else ", or analyse with --seat loaded"
-    return (
-        f"for pins pressed to one side by their loads state seat: loaded{of}; `trunnion play` and `trunnion tolerance` "
-        "cover all positions of these pins, also with that seat"
-    )
+    return f"for pins pressed to one side by their loads state seat: loaded{of}"
 
 
 def _locked(at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None) -> str:
@@ -72,6 +69,9 @@ CYCLE: dict[str, Sentence] = {
         "state gravity: {down}, or gravity: {none}",
         quiet=True,
     ),
+    "model.no_mass": Sentence(
+        NOTE, "has no effect: no link has a mass", "state mass: … and centre: … of the links, or no gravity"
+    ),
     "model.point_mass": Sentence(
         NOTE,
         "{links} have a mass but no inertia: each is a point mass at its centre",
@@ -118,6 +118,17 @@ CYCLE: dict[str, Sentence] = {
     ),
     "load.drives": Sentence(
         WARNING, "this resistance is negative {at}: it drives the joint", "use max(0 N, …), or a load with a sign"
+    ),
+    "load.not_counted": Sentence(
+        NOTE,
+        "beside the drive, which supplies {drive:~J}, this load supplies {work:~J} over the cycle; the efficiency does "
+        "not count it as input",
+        "leave out a load that stands for the drive itself, such as the force of a hand",
+    ),
+    "efficiency.above_one": Sentence(
+        WARNING,
+        "the efficiency of the cycle is {efficiency:.4g}, above 1: the drive supplies {drive:~J}, beside it {supplies}",
+        "work beside the drive is not counted as input; leave out a load that stands for the drive itself",
     ),
     "load.undefined": Sentence(
         ERROR,
@@ -182,6 +193,11 @@ CYCLE: dict[str, Sentence] = {
         "the {part} loses contact {at}: its load falls to {least:~N} (peak {peak:~N}) and reverses, and the pin would "
         "cross its play",
         _impact,
+    ),
+    "contact.unloaded": Sentence(
+        NOTE,
+        "no load presses the pins of {joints} {at}: they float in their play, and positions there are not valid",
+        "expect impact where the load sets in",
     ),
     "contact.lifted": Sentence(
         WARNING,

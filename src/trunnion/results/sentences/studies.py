@@ -35,7 +35,7 @@ def _below(excess: float | None) -> str:
 PLAY = {
     "play.measures_left_out": Sentence(
         NOTE,
-        "left out: {measures}; this study covers the measures {known} and effort",
+        "left out: {measures}, which have no one value at every position",
         "use `trunnion tolerance` for other measures",
     ),
     "measure.none_stated": Sentence(
@@ -53,6 +53,11 @@ PLAY = {
         "play is relative to the middle of the holes: the worst case is over all positions of the pins and does not "
         "use the seats of {joints}",
         "`trunnion analyse` has the deviation with these seats",
+    ),
+    "play.mean_of_fits": Sentence(
+        NOTE,
+        "the play of {joints} is the mean of their fits; the largest is {largest:~m}, of {most}",
+        "--set fits=maximum takes the largest play",
     ),
     "play.beyond_first_order": Sentence(
         NOTE,
@@ -162,6 +167,12 @@ TOLERANCE = {
         "loaded) is left out, and scatter and limits are about the mechanism with every pin in the middle of its hole",
         "`trunnion analyse` has the shift by that seat; pins that are always pressed one way: state seat: {{xi: …}}",
     ),
+    "tolerance.pressed": Sentence(
+        NOTE,
+        "the loads press the pins of {joints} to one side of their holes throughout; nominal value, mean and scatter "
+        "are about pins in the middle of their holes",
+        "`trunnion analyse --seat loaded` has the effect; pins that lie so in every piece: state seat: {{xi: …}}",
+    ),
     "tolerance.correlations_left_out": Sentence(
         NOTE,
         "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include them",
@@ -189,7 +200,16 @@ TOLERANCE = {
         "check the unit of the data",
     ),
     "tolerance.negative": Sentence(
-        WARNING, "its tolerance includes the negative value {least:g} (SI unit)", "narrow the tolerance"
+        WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
+    ),
+    "tolerance.beside_jump": Sentence(
+        WARNING,
+        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
+        "first order leaves out what moves the jump, and samples tell its place to one step",
+        "use the samples, with more --steps",
+    ),
+    "tolerance.impossible": Sentence(
+        WARNING, "its tolerance includes {value:~{unit}}, which no model may have: {why}", "narrow the tolerance"
     ),
     "tolerance.nominal_no_answer": Sentence(ERROR, "nominal mechanism: {status} {at}", "there is no result there"),
     "tolerance.near_singular": Sentence(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["beyond_first_order", "exact_changes"]
 
 Array = NDArray[np.float64]
-SLIGHT, GRAVE = 1e-3, 0.05  # of the worst case to first order: by how much it is exceeded, to be a note, and a warning
+SLIGHT, GRAVE = 0.01, 0.05  # of the worst case to first order: by how much it is exceeded, to be a note, and a warning
 
 
 def exact_changes(effect: Effect, i: int) -> Array:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative
+from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.cycle.positions import check_steps
@@ -166,7 +166,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
-    notes = [finding_for("play.measures_left_out", "measures", known=list(MOTIONS), measures=others)] if others else []
+    notes = [finding_for("play.measures_left_out", "measures", measures=others)] if others else []
     found = [one for one in found if one.name not in others]
     if found:
         return found, notes
@@ -312,6 +312,7 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     yield from _spinning(run, effect.measures)
     if run.seats:
         yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
+    yield from _fits(run, effect.plays)
     yield from _limits(run, effect)
     yield from _places(run, effect)
     yield from _idle(run, effect)
@@ -340,6 +341,21 @@ def _left_out(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
     })  # fmt: skip
     if toothed:
         yield finding_for("play.gears", "gears", joints=toothed)
+
+
+def _fits(run: Run, known: Mapping[str, Play]) -> Iterator[Finding]:
+    """Plays that are the mean of a fit, with the largest that its limits allow."""
+    mechanism, limits = run.system.mechanism, run.system.mechanism.tolerances()
+    largest: dict[str, float] = {}
+    for name in known if mechanism.fits == "mean" else ():
+        hole, pin = (f"joints.{name}.pin.{key}" for key in ("hole_radius", "radius"))
+        joint = mechanism.effective_joints[name]
+        if joint.pin is not None and joint.pin.fit is not None and {hole, pin} <= limits.keys():
+            own = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
+            largest[name] = float(np.ravel(primal(own))[0])
+    if largest:
+        most = max(largest, key=largest.__getitem__)
+        yield finding_for("play.mean_of_fits", "fits", joints=list(largest), largest=largest[most], most=most)
 
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:

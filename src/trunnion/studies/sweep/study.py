@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, inputs, references
+from trunnion.cycle.summary import beside_jumps, effort_units, inputs, references
 from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
+from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
@@ -88,6 +89,11 @@ def sweep(
         if progress:
             progress(done)
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
+    first = say(points.swept, (0,) * len(points.shape))
+    found += (replace(one, what=f"at {first} {one.what}") for one in beside_jumps(points.run, steps))
+    numbers, plain = mechanism.parameter_set, [one for one in points.swept if not one.written]
+    bare = [finding for one in plain for finding in bare_number(numbers, one.path, float(one.values[-1]))]
+    found = [*(one for one in found if one.where not in {own.where for own in bare}), *bare]
     found += _not_steady(points, watched.values(), arrays)
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")

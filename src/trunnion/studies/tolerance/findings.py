@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
-from trunnion.cycle.summary import model_notes
+from trunnion.cycle.summary import beside_jumps, model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
-from trunnion.model.checks.values import NOT_NEGATIVE
+from trunnion.model.checks.values import check_values
+from trunnion.model.parameters import measured
+from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.studies.tolerance.linear import by_position
@@ -20,6 +25,7 @@ from trunnion.studies.tolerance.sampling import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed
 
 if TYPE_CHECKING:
+    from trunnion.studies.tolerance.first_order import ToleranceStudy
     from trunnion.studies.tolerance.linear import Of
     from trunnion.studies.tolerance.outcome import Outcome
     from trunnion.studies.tolerance.sampled import Sampled
@@ -29,6 +35,12 @@ __all__ = ["findings_of", "summary"]
 Array = NDArray[np.float64]
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
+TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
+LOOKED = 72  # positions at which loads of pins are looked at
+UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
+ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
+SIZES = ("pin.clearance", "guide.clearance", "pin.hole_radius", "pin.radius")  # what the size of a play depends on
+EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -105,6 +117,8 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     loaded = [seat.joint for seat in study.run.seats if seat.given is None]
     if loaded:
         yield finding_for("tolerance.seats_not_taken", "joints", joints=loaded)
+    elif pressed := _pressed(study):
+        yield finding_for("tolerance.pressed", "joints", joints=pressed)
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from shared_dimensions.findings(mechanism)
@@ -113,6 +127,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
+    if any(of.measure.kind == "effort" and of.measure.statistic in EXTREMES for of in study.linear.measures):
+        for one in beside_jumps(study.run, study.steps):
+            yield finding_for("tolerance.beside_jump", one.where, **one.figures)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
@@ -122,14 +139,41 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield finding_for("tolerance.indices_lost", count=outcome.indices.lost)
 
 
+def _pressed(study: ToleranceStudy) -> list[str]:
+    """Of planar pins that may lie anywhere, those that the nominal loads press to one side of their holes, wherever
+    they are loaded."""
+    found: list[str] = []
+    if study.run.system.mechanism.space != "planar" or not study.inputs.loose:
+        return found
+    with np.errstate(all="ignore"):
+        back = study.run.solve(study.run.cycle.times(LOOKED))
+        for joint in study.inputs.loose:
+            if study.run.system.joints[joint][0] != "revolute":
+                continue
+            force = np.array([np.broadcast_to(primal(part), LOOKED) for part in back.on_hole(joint)[0]])
+            size = np.hypot(*force)
+            ways = (force / size)[:, size > UNLOADED * np.nanmax(size, initial=0.0)]
+            mean = np.mean(ways, axis=1) if ways.shape[1] else np.zeros(2)
+            if np.min(mean @ ways, initial=np.inf) > ONE_SIDE * np.hypot(*mean) > 0:
+                found.append(joint)
+    return found
+
+
 def _play_sizes(outcome: Outcome) -> Iterator[Finding]:
-    """Tolerances of clearances whose pins may lie anywhere: their effect is that of the play."""
-    sizes = [(one.path, joint) for joint in outcome.study.inputs.loose for one in outcome.study.inputs.tolerances
-             if one.path in (f"joints.{joint}.pin.clearance", f"joints.{joint}.guide.clearance")]  # fmt: skip
-    if sizes:
-        numbers = [path.removeprefix("joints.") for path, _ in sizes]
-        plays = [f"{joint}.clearance" for _, joint in sizes]
-        yield finding_for("tolerance.play_size", "tolerances", numbers=numbers, plays=plays)
+    """Tolerances of clearances, and fits, whose pins may lie anywhere: their effect is that of the play."""
+    inputs = outcome.study.inputs
+    varied, fits = {one.path for one in inputs.tolerances}, outcome.study.run.system.mechanism.effective_joints
+    numbers: dict[str, str] = {}  # what sizes a play, and the play
+    for joint in inputs.loose:
+        for key in (key for key in SIZES if f"joints.{joint}.{key}" in varied):
+            pin = fits[joint].pin
+            radius = key.endswith("radius")
+            if radius and (pin is None or pin.fit is None):
+                continue
+            numbers[f"{joint}.{'pin.fit' if radius else key}"] = f"{joint}.clearance"
+    if numbers:
+        plays = list(dict.fromkeys(numbers.values()))
+        yield finding_for("tolerance.play_size", "tolerances", numbers=list(numbers), plays=plays)
 
 
 def _measured(outcome: Outcome) -> Iterator[Finding]:
@@ -144,11 +188,27 @@ def _measured(outcome: Outcome) -> Iterator[Finding]:
 
 
 def _impossible(outcome: Outcome) -> Iterator[Finding]:
-    """Limits that let a number be what the model itself would refuse."""
-    for one in outcome.study.inputs.tolerances:
-        least = one.nominal + one.lower
-        if one.path.rpartition(".")[2] in NOT_NEGATIVE and least < 0:
-            yield finding_for("tolerance.negative", one.path, least=least)
+    """Limits that let a number be what the model itself would refuse, or a length turn round; each name once."""
+    study, mechanism = outcome.study, outcome.study.run.system.mechanism
+    numbers, kinds = copy(mechanism.parameter_set), measured(mechanism, mechanism.parameter_set.entries.values())
+    names, seen = variations(mechanism, numbers), set()
+    far = TURNED * float(np.ravel(primal(study.run.system.size(study.run.values)))[0])
+    for one, end in product(study.inputs.tolerances, ("lower", "upper")):
+        where = f"tolerances.{names[one.path][0]}" if one.path in names else one.path
+        deviation, unit = getattr(one, end), kinds[one.path].unit
+        if (where, end) in seen or not np.isfinite(deviation):
+            continue
+        seen.add((where, end))
+        numbers.nominal = mechanism.parameters(deviations={numbers.entries[one.path].alias or one.path: deviation})
+        changed = [path for path, value in numbers.nominal.items() if value != mechanism.parameter_set.nominal[path]]
+        refused = [one for one in check_values(mechanism, numbers, changed) if one.severity is Severity.ERROR]
+        reached = one.nominal + deviation
+        length = one.path.startswith("dimensions.") and unit == "m" and one.nominal > far
+        if reached < 0 <= one.nominal and (refused or length):
+            yield finding_for("tolerance.negative", where, least=reached, unit=unit)
+        elif refused:
+            why = f"{refused[0].where} {refused[0].what}"
+            yield finding_for("tolerance.impossible", where, value=reached, unit=unit, phrases={"why": why})
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:

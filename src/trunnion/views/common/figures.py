@@ -121,7 +121,7 @@ def shade(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:
         low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))
         axes.axvspan(low - half, high + half, facecolor="none", edgecolor=SHADE, hatch="////", linewidth=0, zorder=0.5)
     if lost:
-        _write_cause(axes, float(x[lost[0].start]), "not valid")
+        _write_cause(axes, float(x[lost[0].start] + x[lost[0].stop - 1]) / 2, "not valid")
     said: set[str] = set()
     for run in runs:
         low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))

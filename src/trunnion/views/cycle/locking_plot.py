@@ -56,7 +56,8 @@ def locking(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     drawn = any(
         np.isfinite(result[name].values).any() for name in ("locking_margin", "critical_multiple") if name in result
     )
-    figure = new("Locking by friction", result, 6.2 if drawn else 5.2)
+    centred = "; ranges: pins centred" * ("seat_offset" in result and "locking_state" in result)
+    figure = new(f"Locking by friction{centred}", result, 6.2 if drawn else 5.2)
     margin, efficiency = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2) if drawn else (1, 2))
     _margin(margin, result, over)
     _efficiency(efficiency, result, over)

@@ -98,7 +98,8 @@ def _holding(result: xr.Dataset) -> dict[str, Any] | None:
         return None
     rows = found["rows"]
     strip = [row for row in rows if row["state"]]
-    return {**found, "head": HEAD, "strip": strip, "rows": rows[:MOST_RANGES], "more": max(0, len(rows) - MOST_RANGES)}
+    told = {"head": HEAD, "centred": "seat_offset" in result, "strip": strip, "more": max(0, len(rows) - MOST_RANGES)}
+    return {**found, **told, "rows": rows[:MOST_RANGES]}
 
 
 def _findings(result: xr.Dataset) -> list[dict[str, str]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from trunnion.errors import Status
 from trunnion.results.tables.studies import swept as figures
+from trunnion.solve.friction_method import MARGIN
 from trunnion.views.sweep.scales import Arrangement, arrange, cause, grid, statuses, thinned
 
 if TYPE_CHECKING:
@@ -135,4 +136,6 @@ def _word(code: int) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value + 0.0:.6g}".replace("inf", "∞")  # + 0.0: no negative zero
+    if value == np.inf:  # of a locking margin: as far as it is looked for
+        return f"> {MARGIN:g}"
+    return f"{value + 0.0:.6g}"  # + 0.0: no negative zero

@@ -301,16 +301,18 @@ def overview(result: xr.Dataset) -> TextTable:
 
 
 def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
-    """What is read first: of each measure, at most MOST_HEADS, the yield or else the worst case; then of all limits."""
+    """What is read first: of each measure, at most MOST_HEADS, the yield, the nominal value and the worst case; then of
+    all limits."""
     found = []
     reads = sorted(readings(result), key=lambda read: not read.limited)[:MOST_HEADS]
     for read in reads:
         cells = {label: tell(read) for label, tell in FIGURES}
         worst = cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
         told = [(cells["yield"].get("sampled", ""), f"yield, {cells['yield'].get('interval', '')}")]
-        searched = bool(cells["worst case"].get("searched"))
+        order = "" if cells["worst case"].get("searched") else ", first order"
         told += [
-            (worst, "worst case" if searched else "worst case, first order"),
+            ("" if read.is_size else cells["nominal"]["linear"], "nominal"),
+            (worst, f"worst case{order}" if read.is_size else f"worst-case deviation{order}"),
             (cells["Cpk"].get("sampled", ""), "Cpk"),
         ]
         kept = [pair for pair in told if pair[0]]

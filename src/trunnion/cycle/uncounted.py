@@ -1,0 +1,67 @@
+"""Work that enters a mechanism beside its drives, which an efficiency does not count as input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.quadrature import integrals
+from trunnion.cycle.means import Means
+from trunnion.errors import Finding
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.quantities import readable
+from trunnion.results.sentences import finding_for
+from trunnion.solve.loads import useful_loads, useful_springs
+from trunnion.solve.run import Run
+
+__all__ = ["beside_the_drive", "findings"]
+
+LEAST = 0.01  # of the drive work: what supplies less is not worth a word
+
+
+def beside_the_drive(mechanism: Mechanism) -> list[str]:
+    """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
+    useful = useful_loads(mechanism)
+    driven = {link for name in mechanism.drivers for link in mechanism.effective_joints[name].links}
+    driven.discard(mechanism.fixed_link)
+    return [name for name, load in mechanism.loads.items() if load.link in driven and name not in useful]
+
+
+def findings(run: Run, means: Means) -> Iterator[Finding]:
+    """A warning of an efficiency above 1, with the work of each source beside the drives; else a note of loads that
+    act beside the drive and supply work. means: of the cycle."""
+    beside = beside_the_drive(run.system.mechanism)
+    above = means.efficiency > 1 + 1e-9 + means.efficiency_error
+    if not (above or beside) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
+        return
+    drive = means.drive_power.net * run.cycle.duration
+    work = {name: value for name, value in _work(run, means).items() if value > LEAST * abs(drive)}
+    if above:
+        supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
+        yield finding_for(
+            "efficiency.above_one", efficiency=means.efficiency, drive=drive, work=work, phrases={"supplies": supplies}
+        )
+        return
+    for name in beside:
+        if (supplied := work.get(f"load {name}")) is not None:
+            yield finding_for("load.not_counted", f"loads.{name}", work=supplied, drive=drive)
+
+
+def _work(run: Run, means: Means) -> dict[str, float]:
+    """Work over the cycle, J, into the mechanism by each load and spring that is not useful, and by its masses."""
+    mechanism, duration = run.system.mechanism, run.cycle.duration
+    loads = [name for name in mechanism.loads if name not in useful_loads(mechanism)]
+    springs = [name for name in mechanism.springs if name not in useful_springs(mechanism)]
+
+    def powers(rows: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.float64]:
+        back = run.solve(time.ravel())
+        every = [*(back.load_powers[name] for name in loads), *(back.springs[name].power for name in springs)]
+        return np.array([np.broadcast_to(primal(one), time.size) for one in every]).reshape(len(every), *time.shape)
+
+    found = integrals(powers, [run.edges]).value[:, 0].tolist() if loads or springs else []
+    names = [*(f"load {name}" for name in loads), *(f"spring {name}" for name in springs)]
+    rest = means.useful_power.net + means.friction_power.net - means.drive_power.net
+    return {**dict(zip(names, found, strict=True)), "weight and inertia": rest * duration - sum(found)}

@@ -46,7 +46,7 @@ def _studio(model: str) -> Iterator[str]:
 
 
 def _go(page: Page, index: int) -> None:
-    page.evaluate(f"import('/studio/motion.js').then(motion => motion.crank.go({index}))")
+    page.evaluate(f"import('/modules.js').then(m => m.module_studio_motion.crank.go({index}))")
 
 
 def _at_rest(page: Page) -> None:
@@ -104,7 +104,9 @@ def _variants(page: Page) -> None:
     page.click("role=tab[name=Plots]")
     page.click("button:has-text('Keep as variant A')")
     for path, value in ((["joint_defaults", "friction"], "0.15"), (["dimensions", "L"], "210 mm")):
-        page.evaluate("given => import('/studio/actions.js').then(a => a.setValue(...given))", [path, value])
+        page.evaluate(
+            "given => import('/modules.js').then(m => m.module_studio_actions.setValue(...given))", [path, value]
+        )
         page.wait_for_timeout(2000)
 
 

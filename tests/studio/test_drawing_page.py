@@ -84,6 +84,25 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.idle()
         assert np.abs(effort(user) - torque).max() <= PEAK * np.abs(torque).max()
 
+    @pytest.mark.slow
+    def test_a_pin_clicked_after_its_link_slides_along_it(user):
+        user.new_sheet()
+        draw(user, ("l", (330, 240, 1), (403, 185)), ("l", (330, 350, 1), (440, 110)))
+        user.page.click(".tool:has-text('Slide')")
+        user.click(360, 285)
+        user.click(403, 185)
+        user.until("s.missing.value[0] === 'It can move in 1 way: drive a joint.'")
+        user.page.click(".tool:has-text('Drive')")
+        user.click(330, 240)
+        user.until("s.solved.value")
+        user.page.click(".tool:has-text('Select')")
+        user.page.keyboard.press("Space")  # plays: the button of the tool does not hold the key
+        user.until("s.index.value > 0")
+        user.page.keyboard.press("Space")
+        joints = entries_of(user.state("s.text.value"))[0]["joints"]
+        assert joints["E"] == {"type": "prismatic", "links": ["link2", "block1"]}
+        assert joints["B"]["links"] == ["link1", "block1"]
+
     def drag(user, name, dx, dy):
         """A joint pulled by so many px, as a hand does."""
         x, y = user.handle(name)

@@ -71,11 +71,8 @@ def answer(request: bytes) -> bytes:
 
 
 def _sentence(finding: Finding) -> str:
-    return " ".join(
-        part
-        for part in (spoken(finding.where), finding.what, f"— {remedied(finding.remedy)}" if finding.remedy else "")
-        if part
-    )
+    remedy = f"— {remedied(finding.remedy)}" if finding.remedy else ""
+    return " ".join(part for part in (spoken(finding.where), finding.what, remedy) if part)
 
 
 def _steps(asked: Asked) -> int:

@@ -1,4 +1,4 @@
-"""A model spoken of as on the sheet: "mass of link crank" where the file has `links.crank.mass`, and remedies likewise."""
+"""A model spoken of as on the sheet: "mass of link crank" for `links.crank.mass`, and remedies likewise."""
 
 from __future__ import annotations
 

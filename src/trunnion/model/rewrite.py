@@ -187,9 +187,9 @@ def _changed(before: Any, after: Any, location: Location = ()) -> Iterator[tuple
         return
     if isinstance(before, Mapping) and isinstance(after, Mapping):
         gone, come = [key for key in before if key not in after], [key for key in after if key not in before]
-        names = dict(zip(come, gone, strict=True)) if len(gone) == len(come) == 1 else {}
+        names: dict[Any, Any] = dict(zip(come, gone, strict=True)) if len(gone) == len(come) == 1 else {}
         for key, value in after.items():
-            old = names.get(key, key)
+            old: Any = names.get(key, key)
             if key in names:
                 yield (*location, old), Renamed(key)
             if old in before:

@@ -28,6 +28,12 @@ ROOT = Path(__file__).resolve().parents[2]
 FOURBAR = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
 MOST_GIF = 3.0  # s
 
+CUT_OFF = """[...document.querySelectorAll("button, select, input:not([type=checkbox]), summary")]
+  .filter((one) => one.offsetParent && !one.closest(".panel .body, .tools"))
+  .map((one) => [one, one.getBoundingClientRect()])
+  .filter(([, box]) => box.right > innerWidth || box.bottom > innerHeight || Math.min(box.width, box.height) < 24)
+  .map(([one]) => one.outerHTML)"""
+
 FOREIGN = """<!doctype html><title>evil</title><iframe src="{address}"></iframe><img src="{home}/modules.js">
 <script>
 const tried = {{}};
@@ -261,6 +267,15 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         animation = Image.open(io.BytesIO(content))
         assert animation.n_frames == 60
         assert took < 2 * MOST_GIF  # the figure is that of a machine that does nothing else
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("size", [(1280, 720), (2560, 1440), (820, 1180), (1180, 820)], ids=str)
+    def test_nothing_is_cut_off_or_small(user, size):
+        user.page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+        user.page.wait_for_timeout(300)
+        assert user.page.evaluate(CUT_OFF) == []
+        sheet = user.page.locator(".sheet").bounding_box()
+        assert min(sheet["width"], sheet["height"]) > 500
 
     # ---- who else -------------------------------------------------------------------------------------------------
 

@@ -159,6 +159,33 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         assert np.hypot(*np.subtract(user.handle("C"), np.add(stays, 30))) < 4
 
     @pytest.mark.slow
+    def test_two_fingers_shift_and_zoom_the_sheet(user):
+        touch = user.page.context.new_cdp_session(user.page)
+        touch.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+        where = "((frame) => [frame.scale, ...frame.to([0, 0])])(m.sheet.view.frame)"
+        scale, *origin = user.of("sheet", where)
+        before, box = user.state("s.text.value"), user.page.locator(".sheet").bounding_box()
+
+        def fingers(kind, *places):
+            points = [{"x": box["x"] + x, "y": box["y"] + y, "id": k} for k, (x, y) in enumerate(places)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        x, y = user.handle("C")
+        held = (x - box["x"], y - box["y"])  # the first finger is on a joint, which stays
+        fingers("touchStart", held)
+        fingers("touchMove", (held[0] - 30, held[1]))
+        fingers("touchStart", (held[0] - 30, held[1]), (held[0] - 130, held[1]))
+        fingers("touchMove", (held[0] + 20, held[1]), (held[0] - 130, held[1]))
+        fingers("touchEnd")
+        user.idle()
+        now, *after = user.of("sheet", where)
+        assert now == pytest.approx(1.5 * scale, rel=1e-4)
+        middle = np.array([held[0] - 80, held[1]])
+        np.testing.assert_allclose(after, middle + [25, 0] + 1.5 * (np.array(origin) - middle), atol=1e-3)
+        assert user.state("s.text.value") == before
+        assert user.state("s.live.value") is None
+
+    @pytest.mark.slow
     def test_a_joint_dropped_on_its_neighbour_is_refused_in_a_sentence(user):
         user.new_sheet()
         user.draw_four_bar()

@@ -20,7 +20,7 @@ const VECTORS = [["velocity", "v", "m/s"], ["acceleration", "a", "m/s²"]];
 
 /** Where words stand already, [{left, right, y}] px. */
 let taken = [];
-let room = 0; // px, width of the window
+let room = 0; // px, where words end at the right
 
 /** Make room for it: variants under the mechanism, all else over it. */
 export function addOverlay({ root, layers }) {
@@ -37,7 +37,7 @@ export function poseOverlay(view) {
   const wanted = state.layers.peek();
   const told = known && laid.peek()?.scene === scene ? laid.peek() : {};
   const key = []; // lines of the key, from below
-  room = view.frame.width;
+  room = view.frame.width - 6;
   taken = wanted.names ? names(view) : [];
   layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
   layers.overlay.replaceChildren(

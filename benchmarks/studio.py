@@ -7,6 +7,7 @@ pictures a second while it is scrubbed; memory while it plays. Needs Chromium an
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import subprocess
 import sys
@@ -17,10 +18,11 @@ from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 SECONDS = 3.0
+COMPILED = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}  # as installed
 DRAGGED = {"durango-fourbar": "C", "jansen": "K"}
 
 DRAG = """async ([name, seconds]) => {
-  const state = await import("/studio/state.js");
+  const { module_studio_state: state } = await import("/modules.js");
   const handle = document.querySelector(`.handle[data-name="${name}"]`);
   const box = handle.getBoundingClientRect();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
@@ -47,7 +49,7 @@ DRAG = """async ([name, seconds]) => {
 }"""
 
 SCRUB = """async (seconds) => {
-  const { crank } = await import("/studio/motion.js");
+  const { crank } = (await import("/modules.js")).module_studio_motion;
   let [frames, index] = [0, 0];
   const begin = performance.now();
   await new Promise((done) => {
@@ -73,7 +75,7 @@ def main() -> None:
         for name, joint in DRAGGED.items():
             begin = time.perf_counter()
             command = [sys.executable, "-m", "trunnion", "studio", f"examples/{name}.yaml", "--no-open", "--port", "0"]
-            with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+            with subprocess.Popen(command, cwd=ROOT, env=COMPILED, stdout=subprocess.PIPE, text=True) as process:
                 try:
                     assert process.stdout is not None
                     address = process.stdout.readline().split()[-1]
@@ -108,7 +110,7 @@ def _played(page: Page, minutes: int, served: int) -> None:
     """Memory of the page after its rubbish is collected, its nodes and listeners, and memory of the server."""
     watched = page.context.new_cdp_session(page)
     watched.send("Performance.enable")
-    page.evaluate('import("/studio/motion.js").then(({ crank }) => crank.player.playing() || crank.player.toggle())')
+    page.keyboard.press("Space")
     for minute in range(minutes + 1):
         watched.send("HeapProfiler.collectGarbage")
         told = {one["name"]: one["value"] for one in watched.send("Performance.getMetrics")["metrics"]}

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
@@ -16,20 +17,20 @@ SIZE = {"width": 1280, "height": 720}
 
 
 def main() -> None:
-    """Write all pictures, those of the press with layers and a variant last."""
-    four_bar = {"light": _at_rest, "dark": _compared, "drawing": _drawing}
+    """Write all pictures in both themes, those of the press with layers and a variant last."""
+    four_bar = {"start": _at_rest, "plots": _compared, "drawing": _drawing}
     press = {"layers": _layers, "variants": _variants}
     for model, shots in (("durango-fourbar", four_bar), ("drawing-press", press)):
         with _studio(model) as address, sync_playwright() as begun:
             browser = begun.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-            for name, prepare in shots.items():
-                page = browser.new_page(viewport=SIZE, color_scheme="dark" if name == "dark" else "light")
+            for (name, prepare), theme in product(shots.items(), ("light", "dark")):
+                page = browser.new_page(viewport=SIZE, color_scheme=theme)  # type: ignore[arg-type]  # one of its words
                 page.goto(address)
-                page.wait_for_selector(".handle")
+                page.wait_for_selector(".motion .player")
                 page.wait_for_timeout(1500)
                 prepare(page)
                 page.wait_for_timeout(1500)
-                page.screenshot(path=ROOT / "docs" / "images" / f"studio-{name}.png")
+                page.screenshot(path=ROOT / "docs" / "images" / f"studio-{name}-{theme}.png")
             browser.close()
 
 
@@ -46,7 +47,7 @@ def _studio(model: str) -> Iterator[str]:
 
 
 def _go(page: Page, index: int) -> None:
-    page.evaluate(f"import('/studio/motion.js').then(motion => motion.crank.go({index}))")
+    page.evaluate(f"import('/modules.js').then(m => m.module_studio_motion.crank.go({index}))")
 
 
 def _at_rest(page: Page) -> None:
@@ -104,7 +105,9 @@ def _variants(page: Page) -> None:
     page.click("role=tab[name=Plots]")
     page.click("button:has-text('Keep as variant A')")
     for path, value in ((["joint_defaults", "friction"], "0.15"), (["dimensions", "L"], "210 mm")):
-        page.evaluate("given => import('/studio/actions.js').then(a => a.setValue(...given))", [path, value])
+        page.evaluate(
+            "given => import('/modules.js').then(m => m.module_studio_actions.setValue(...given))", [path, value]
+        )
         page.wait_for_timeout(2000)
 
 

@@ -35,13 +35,17 @@ class User:
         self.until("s.about.value.version && s.answer.value")
 
     def state(self, words):
-        return self.page.evaluate(f'import("/studio/state.js").then(s => {words})')
+        return self.of("state", f"(s => {words})(m)")
+
+    def of(self, module, words, given=None):
+        """What is made of a module of the page, `m`, and what is given."""
+        taken = f'given => import("/modules.js").then(({{ module_studio_{module}: m }}) => {words})'
+        return self.page.evaluate(taken, given)
 
     def idle(self):
         self.page.wait_for_timeout(80)
-        idle = 'import("/studio/state.js").then(s => s.connected.value && s.busy.value === 0)'
         for _ in range(200):
-            if self.page.evaluate(idle):
+            if self.state("s.connected.value && s.busy.value === 0"):
                 break
             self.page.wait_for_timeout(50)
         else:

@@ -15,6 +15,7 @@ from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
 from trunnion.studio.message import packed, unpacked
+from trunnion.studio.words import remedied
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = {path.stem: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.yaml")}
@@ -180,7 +181,34 @@ def test_a_name_is_changed_wherever_it_stands():
     assert not {"coupler", "BC"} & set(str(entries_of(text)[0]).replace("'", " ").split())
     after = trunnion.analyse(Mechanism(**entries_of(text)[0]), 36)
     np.testing.assert_allclose(after.drive_effort, before.drive_effort, rtol=1e-12)
-    assert "the paper neglects weight" in text  # comments stay
+    assert len(text.splitlines()) == len(EXAMPLES[FOURBAR].splitlines())  # and what is on each, in its place
+    assert "\n  AB: 2.00 m\n  length: 6.00 m\n  CD: 3.00 m\n" in text
+    assert (
+        "\n  rod: {points: {B: [0, 0], K: [length, 0], E: [BE * cos(gamma), BE * sin(gamma)]},\n            mass"
+        in text
+    )
+
+
+def test_what_is_deleted_leaves_the_other_lines_as_they_are():
+    before = EXAMPLES[FOURBAR].splitlines()
+    text, _ = edited(EXAMPLES[FOURBAR], {}, {"do": "delete", "what": ["links", "rocker"]})
+    gone = [line for line in before if line not in text.splitlines()]
+    assert [line.split(":")[0].strip() for line in gone] == ["ground", "rocker", "C", "D", "brake", "assembly"]
+    assert "  ground:  {points: {A: [0, 0]}}" in text.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("remedy", "words"),
+    [
+        ("state pin: {radius: …} or a fit, or friction: 0", "state pin radius or a fit, or friction 0"),
+        ("state guide: {length: …}, or seat: free", "state guide length, or seat: free"),
+        ("add pin: {radius: 10 mm}", "add pin radius 10 mm"),
+        ("state options: {…} or a model", "state options or a model"),
+        ("add range: [0 mm, 50 mm]", "add range: [0 mm, 50 mm]"),
+    ],
+)
+def test_remedies_are_in_the_words_of_the_sheet(remedy, words):
+    assert remedied(remedy) == words
 
 
 # ---- dragging ------------------------------------------------------------------------------------------------------

@@ -84,6 +84,25 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.idle()
         assert np.abs(effort(user) - torque).max() <= PEAK * np.abs(torque).max()
 
+    @pytest.mark.slow
+    def test_a_pin_clicked_after_its_link_slides_along_it(user):
+        user.new_sheet()
+        draw(user, ("l", (330, 240, 1), (403, 185)), ("l", (330, 350, 1), (440, 110)))
+        user.page.click(".tool:has-text('Slide')")
+        user.click(360, 285)
+        user.click(403, 185)
+        user.until("s.missing.value[0] === 'It can move in 1 way: drive a joint.'")
+        user.page.click(".tool:has-text('Drive')")
+        user.click(330, 240)
+        user.until("s.solved.value")
+        user.page.click(".tool:has-text('Select')")
+        user.page.keyboard.press("Space")  # plays: the button of the tool does not hold the key
+        user.until("s.index.value > 0")
+        user.page.keyboard.press("Space")
+        joints = entries_of(user.state("s.text.value"))[0]["joints"]
+        assert joints["E"] == {"type": "prismatic", "links": ["link2", "block1"]}
+        assert joints["B"]["links"] == ["link1", "block1"]
+
     def drag(user, name, dx, dy):
         """A joint pulled by so many px, as a hand does."""
         x, y = user.handle(name)
@@ -138,6 +157,33 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         assert user.state("s.locked.value") == []
         drag(user, "C", 30, 30)
         assert np.hypot(*np.subtract(user.handle("C"), np.add(stays, 30))) < 4
+
+    @pytest.mark.slow
+    def test_two_fingers_shift_and_zoom_the_sheet(user):
+        touch = user.page.context.new_cdp_session(user.page)
+        touch.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+        where = "((frame) => [frame.scale, ...frame.to([0, 0])])(m.sheet.view.frame)"
+        scale, *origin = user.of("sheet", where)
+        before, box = user.state("s.text.value"), user.page.locator(".sheet").bounding_box()
+
+        def fingers(kind, *places):
+            points = [{"x": box["x"] + x, "y": box["y"] + y, "id": k} for k, (x, y) in enumerate(places)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        x, y = user.handle("C")
+        held = (x - box["x"], y - box["y"])  # the first finger is on a joint, which stays
+        fingers("touchStart", held)
+        fingers("touchMove", (held[0] - 30, held[1]))
+        fingers("touchStart", (held[0] - 30, held[1]), (held[0] - 130, held[1]))
+        fingers("touchMove", (held[0] + 20, held[1]), (held[0] - 130, held[1]))
+        fingers("touchEnd")
+        user.idle()
+        now, *after = user.of("sheet", where)
+        assert now == pytest.approx(1.5 * scale, rel=1e-4)
+        middle = np.array([held[0] - 80, held[1]])
+        np.testing.assert_allclose(after, middle + [25, 0] + 1.5 * (np.array(origin) - middle), atol=1e-3)
+        assert user.state("s.text.value") == before
+        assert user.state("s.live.value") is None
 
     @pytest.mark.slow
     def test_a_joint_dropped_on_its_neighbour_is_refused_in_a_sentence(user):

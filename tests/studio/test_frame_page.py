@@ -28,7 +28,13 @@ ROOT = Path(__file__).resolve().parents[2]
 FOURBAR = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
 MOST_GIF = 3.0  # s
 
-FOREIGN = """<!doctype html><title>evil</title><iframe src="{address}"></iframe><img src="{home}/studio/main.js">
+CUT_OFF = """[...document.querySelectorAll("button, select, input:not([type=checkbox]), summary")]
+  .filter((one) => one.offsetParent && !one.closest(".panel .body, .tools"))
+  .map((one) => [one, one.getBoundingClientRect()])
+  .filter(([, box]) => box.right > innerWidth || box.bottom > innerHeight || Math.min(box.width, box.height) < 24)
+  .map(([one]) => one.outerHTML)"""
+
+FOREIGN = """<!doctype html><title>evil</title><iframe src="{address}"></iframe><img src="{home}/modules.js">
 <script>
 const tried = {{}};
 const fetched = (name, path, asked) => fetch("{home}" + path, asked).then((reply) => reply.text()).then(
@@ -108,7 +114,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert user.page.locator("dialog").count() == 0
         (user.studio.folder / "mine.yaml").write_text("trunnion: 1\n", encoding="utf-8")
-        user.page.evaluate("import('/studio/actions.js').then(a => a.typed('trunnion: 1\\nname: other\\n'))")
+        user.of("actions", "m.typed(given)", "trunnion: 1\nname: other\n")
         user.idle()
         choose(user, "File", "Save as")
         user.page.click("dialog button:has-text('Save')")
@@ -132,9 +138,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
 
     @pytest.mark.slow
     def test_a_link_carries_a_model(user):
-        link = user.page.evaluate(
-            "text => import('/studio/links.js').then(l => l.linkOf(text, location.href))", FOURBAR + "# Ö\n"
-        )
+        link = user.of("links", "m.linkOf(given, location.href)", FOURBAR + "# Ö\n")
         assert len(link) < 2000
         other = User(user.page.context.new_page(), user.studio)
         other.page.goto(link)
@@ -170,9 +174,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     @pytest.mark.slow
     def test_a_long_model_makes_no_link(user):
         noise = "".join(f"# {k * 7919 % 104729:x}{k * 104729 % 7919:x}\n" for k in range(4000))
-        told = user.page.evaluate(
-            "text => import('/studio/links.js').then(l => l.linkOf(text, location.href)).catch(e => e.message)", noise
-        )
+        told = user.of("links", "m.linkOf(given, location.href).catch(e => e.message)", noise)
         assert "16,000 at most" in told
 
     @pytest.mark.slow
@@ -217,7 +219,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.until("s.solved.value && s.photo.value")
         assert user.state("({ ...s.photo.value, image: 0 })") == kept
         assert kept["opacity"] == 0.8
-        user.page.evaluate("import('/studio/actions.js').then(a => a.save('with-picture.yaml'))")
+        user.of("actions", "m.save(given)", "with-picture.yaml")
         user.idle()
         assert (user.studio.folder / "with-picture.yaml").read_text("utf-8") == FOURBAR
         assert user.state("Boolean(s.photo.value)")
@@ -266,6 +268,15 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert animation.n_frames == 60
         assert took < 2 * MOST_GIF  # the figure is that of a machine that does nothing else
 
+    @pytest.mark.slow
+    @pytest.mark.parametrize("size", [(1280, 720), (2560, 1440), (820, 1180), (1180, 820)], ids=str)
+    def test_nothing_is_cut_off_or_small(user, size):
+        user.page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+        user.page.wait_for_timeout(300)
+        assert user.page.evaluate(CUT_OFF) == []
+        sheet = user.page.locator(".sheet").bounding_box()
+        assert min(sheet["width"], sheet["height"]) > 500
+
     # ---- who else -------------------------------------------------------------------------------------------------
 
     @pytest.mark.slow
@@ -313,7 +324,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     )
     def test_a_hostile_model_does_not_freeze_the_page(user, text):
         begin = time.perf_counter()
-        user.page.evaluate("text => import('/studio/actions.js').then(a => a.typed(text))", text)
+        user.of("actions", "m.typed(given)", text)
         user.page.wait_for_timeout(500)
         user.idle()
         assert time.perf_counter() - begin < 20
@@ -321,5 +332,5 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             "new Promise(done => { const from = performance.now(); setTimeout(() => done(performance.now() - from)); })"
         )
         assert waited < 1000  # ms
-        user.page.evaluate("text => import('/studio/actions.js').then(a => a.typed(text))", FOURBAR)
+        user.of("actions", "m.typed(given)", FOURBAR)
         user.until("s.solved.value && s.answer.value.text === s.text.value")

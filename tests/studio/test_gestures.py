@@ -186,6 +186,11 @@ def test_a_half_drawn_linkage_is_no_error():
     ]
     text, _ = edited("", {}, {"do": "link", "from": [0, 0], "to": [1, 0]})
     assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
+    arms = [{"do": "link", "from": {"ground": [x, 0]}, "to": to} for x, to in ((0, [1, 1]), (2, "link1.B"))]
+    still, _ = edited("", {}, *arms)
+    assert ask(ask="model", text=still)["missing"] == [
+        "It stands still: its joints let no link move. Take one away, or let an end slide."
+    ]
     wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
     assert ask(ask="model", text=wrong)["missing"] == []
 

@@ -180,15 +180,14 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
 
     @pytest.mark.slow
     def test_a_file_changed_elsewhere_is_not_overwritten(user):
-        save = "import('/studio/actions.js').then(a => a.save('shared.yaml'))"
         other = user.studio.folder / "shared.yaml"
-        user.page.evaluate(save)
+        user.of("actions", "m.save(given)", "shared.yaml")
         user.idle()
         mine = other.read_text("utf-8")
         other.write_text(mine + "# elsewhere\n", "utf-8")
-        user.page.evaluate("import('/studio/actions.js').then(a => a.typed('trunnion: 1\\n'))")
+        user.of("actions", "m.typed(given)", "trunnion: 1\n")
         user.idle()
-        user.page.evaluate(save)
+        user.of("actions", "m.save(given)", "shared.yaml")
         user.idle()
         assert other.read_text("utf-8") == mine + "# elsewhere\n"
         assert "changed elsewhere" in user.state("s.notice.value.words")
@@ -211,7 +210,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         rows = "".join(f"  l{k}: {{points: {{A: [0, 0], B{k}: [{k}, 0]}}}}\n" for k in range(4000))
         for links, told in ((rows, "400 at most"), (10 * rows, "300,000 at most")):
             content = f"trunnion: 1\nlinks:\n  ground: {{}}\n{links}"
-            user.page.evaluate("content => import('/studio/actions.js').then(a => a.typed(content))", content)
+            user.of("actions", "m.typed(given)", content)
             user.page.wait_for_timeout(1000)
             user.idle()
             user.page.locator("[role=tab]", has_text="Findings").click()
@@ -221,7 +220,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     @pytest.mark.slow
     def test_every_example_opens(user):
         for name in sorted(EXAMPLES):
-            user.page.evaluate("name => import('/studio/actions.js').then(a => a.openExample({ name }))", name)
+            user.of("actions", "m.openExample({ name: given })", name)
             user.idle()
             errors = user.state("s.answer.value.findings.filter(one => one.severity === 'error').map(one => one.code)")
             allowed = {"mobility.redundant", "input.drivers", "input.tables"}

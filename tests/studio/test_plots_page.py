@@ -34,21 +34,21 @@ def number(text):
 if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
 
     def laid(user, words):
-        return user.page.evaluate(f'import("/studio/layers.js").then(l => {words})')
+        return user.of("layers", f"(l => {words})(m)")
 
     def variant(user, words):
-        return user.page.evaluate(f'import("/studio/variants.js").then(v => {words})')
+        return user.of("variants", f"(v => {words})(m)")
 
     def until(user, module, words):
         """Wait for what a module knows."""
         for _ in range(400):
-            if user.page.evaluate(f'import("/studio/{module}.js").then(m => Boolean({words}))'):
+            if user.of(module, f"Boolean({words})"):
                 return user.idle()
             user.page.wait_for_timeout(25)
         return pytest.fail(f"never: {words}")
 
     def written(user, text):
-        user.page.evaluate("content => import('/studio/actions.js').then(a => a.takeText(content, 'Edit'))", text)
+        user.of("actions", "m.takeText(given, 'Edit')", text)
         user.until(f"s.solved.value && s.answer.value.text.length === {len(text)}")
 
     def show(user, *names):
@@ -58,7 +58,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.keys("Escape")
 
     def go(user, index):
-        user.page.evaluate(f"import('/studio/motion.js').then(m => m.crank.go({index}))")
+        user.of("motion", "m.crank.go(given)", index)
 
     def laid_words(user):
         return user.page.locator(".layer.overlay text").all_text_contents()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from served import served as serving
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.message import unpacked
-from trunnion.studio.page import document, modules
+from trunnion.studio.page import document, script
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "src" / "trunnion" / "studio" / "web"
@@ -127,12 +128,15 @@ def test_pictures_of_examples(served):
     assert fetched(served, "GET", "/thumbnail/none")[0] == 404
 
 
-def test_the_page_names_all_its_modules():
-    paths = modules()
-    assert set(paths) == {"/studio/" + one.relative_to(PAGE).as_posix() for one in PAGE.rglob("*.js")} | {
-        path for path in paths if path.startswith("/web/")
-    }
-    assert all(f'<link rel="modulepreload" href="{path}">' in document("n") for path in paths)
+def test_the_page_fetches_few_files():
+    exported = set(re.findall(r"module_studio_\w+", script()[script().rindex("export {") :]))
+    assert exported == {f"module_studio_{one.stem}" for one in PAGE.glob("*.js")}
+    page = document("n", "/first/%22.yaml")
+    files = [f"/studio/vendor/{one.name}" for one in PAGE.glob("vendor/*.js")] + ["/modules.js"]
+    assert all(f'<link rel="modulepreload" href="{file}">' in page for file in files)
+    assert '<link rel="preload" as="fetch" href="/first/%22.yaml" crossorigin>' in page
+    assert page.count("<link") == len(files) + 6
+    assert "{{" not in page
 
 
 @pytest.mark.parametrize(

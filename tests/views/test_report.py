@@ -15,7 +15,7 @@ from stand_in import NASTY, four_bar
 from trunnion.errors import Status
 from trunnion.results.attributes import figure_rows, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
-from trunnion.views.common.bundle import bundle, web_text
+from trunnion.views.common.bundle import bundle, module, web_text
 from trunnion.views.common.page import headline
 from trunnion.views.cycle.report import embedded, report
 
@@ -173,6 +173,18 @@ def test_bundle_puts_modules_in_order_and_each_in_its_own_scope():
     assert script.index("module_c =") < script.index("module_b =") < script.index("module_a =")
     assert script.count("module_c = (()") == 1
     assert "return { two };" in script
+
+
+def test_a_module_of_modules_keeps_its_libraries():
+    sources = {
+        "own/a.js": 'import lib from "lib";\nimport { x as y } from "lib";\nimport * as b from "../web/b.js";\n'
+        "export const one = lib(y) + b.two;\n",
+        "web/b.js": "export const two = 2; // </p>\n",
+    }
+    text = module("own/a.js", sources.__getitem__, ["lib"])
+    assert text.startswith('import * as module_lib from "lib";\nconst module_web_b = (() => {\n')
+    assert "const { default: lib } = module_lib;\nconst { x: y } = module_lib;\nconst b = module_web_b;\n" in text
+    assert text.endswith("export { module_web_b, module_own_a };\n")
 
 
 @pytest.mark.parametrize(

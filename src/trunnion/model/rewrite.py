@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, MutableMapping
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
@@ -25,6 +25,16 @@ __all__ = ["changed_text", "rewrite_mechanism"]
 
 YAMLS = (".yaml", ".yml")
 Location = tuple[str | int, ...]
+
+
+class Renamed(NamedTuple):
+    """The new name of an entry."""
+
+    name: str
+
+
+class Gone(NamedTuple):
+    """Of an entry that is left out."""
 
 
 def rewrite_mechanism(
@@ -102,7 +112,7 @@ def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, 
 
 
 def _edited(text: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> str | None:
-    """The text with values changed where they stand, and entries added; None if there is more to change."""
+    """The text with values changed where they stand, and entries renamed, added and left out; None if there is more."""
     root = composed(text)
     edits = [_edit(text, root, location, value) for location, value in _changed(before, after)]
     for edit in sorted((one for one in edits if one), key=lambda one: one[0])[::-1]:
@@ -120,6 +130,8 @@ def _edit(text: str, root: Node, location: Location, value: Any) -> tuple[int, i
     if not location:
         return None
     node, parent, key = _node(root, location), _node(root, location[:-1]), location[-1]
+    if isinstance(value, Renamed | Gone):
+        return _entry(text, parent, str(key), value) if isinstance(parent, MappingNode) else None
     if isinstance(node, ScalarNode) and isinstance(value, (str, int, float)):
         return node.start_mark.index, node.end_mark.index, _scalar(value, quoted=bool(node.style))
     if node is not None or not isinstance(parent, MappingNode) or not parent.value or value is None:
@@ -139,6 +151,26 @@ def _edit(text: str, root: Node, location: Location, value: Any) -> tuple[int, i
     return end, end, f"\n{' ' * first.start_mark.column}{entry}"
 
 
+def _entry(text: str, parent: MappingNode, name: str, change: Renamed | Gone) -> tuple[int, int, str] | None:
+    """The same for an entry that is renamed or left out; None for one that stands alone."""
+    place = next((place for place, (key, _) in enumerate(parent.value) if key.value == name), None)
+    if place is None:
+        return None
+    key, node = parent.value[place]
+    if isinstance(change, Renamed):
+        return key.start_mark.index, key.end_mark.index, _scalar(change.name, quoted=bool(key.style))
+    if len(parent.value) == 1:
+        return None
+    if parent.flow_style:
+        if place:
+            return parent.value[place - 1][1].end_mark.index, node.end_mark.index, ""
+        return key.start_mark.index, parent.value[1][0].start_mark.index, ""
+    while not (isinstance(node, ScalarNode) or node.flow_style):  # a block ends behind the blank lines after it
+        node = node.value[-1][1] if isinstance(node, MappingNode) else node.value[-1]
+    end = text.find("\n", node.end_mark.index) + 1
+    return text.rfind("\n", 0, key.start_mark.index) + 1, end or len(text), ""
+
+
 def _flow(value: Any) -> str:
     """A value on one line."""
     if isinstance(value, Mapping):
@@ -147,15 +179,24 @@ def _flow(value: Any) -> str:
 
 
 def _changed(before: Any, after: Any, location: Location = ()) -> Iterator[tuple[Location, Any]]:
-    """Where two sets of plain data differ, and what the second has there; the whole group if entries came or went."""
+    """Where two sets of plain data differ, and what the second has there.
+
+    Where one entry of a group goes and another comes, it is renamed.
+    """
     if before == after:
         return
-    if isinstance(before, Mapping) and isinstance(after, Mapping) and before.keys() <= after.keys():
+    if isinstance(before, Mapping) and isinstance(after, Mapping):
+        gone, come = [key for key in before if key not in after], [key for key in after if key not in before]
+        names: dict[Any, Any] = dict(zip(come, gone, strict=True)) if len(gone) == len(come) == 1 else {}
         for key, value in after.items():
-            if key in before:
-                yield from _changed(before[key], value, (*location, key))
+            old: Any = names.get(key, key)
+            if key in names:
+                yield (*location, old), Renamed(key)
+            if old in before:
+                yield from _changed(before[old], value, (*location, old))
             else:
                 yield (*location, key), value
+        yield from (((*location, key), Gone()) for key in gone if key not in names.values())
     elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
         for index, value in enumerate(after):
             yield from _changed(before[index], value, (*location, index))

@@ -38,7 +38,7 @@ from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
 from trunnion.studio.variants import overlaid
-from trunnion.studio.words import spoken
+from trunnion.studio.words import remedied, spoken
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
 
@@ -71,9 +71,8 @@ def answer(request: bytes) -> bytes:
 
 
 def _sentence(finding: Finding) -> str:
-    return " ".join(
-        part for part in (spoken(finding.where), finding.what, f"— {finding.remedy}" if finding.remedy else "") if part
-    )
+    remedy = f"— {remedied(finding.remedy)}" if finding.remedy else ""
+    return " ".join(part for part in (spoken(finding.where), finding.what, remedy) if part)
 
 
 def _steps(asked: Asked) -> int:
@@ -127,7 +126,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         except MechanismError as error:
             found += state.placed(error.findings)
     drawn = Sketch(copy.deepcopy(dict(state.entries or {})))
-    lacks = missing(drawn, found) if result is None else []
+    lacks = missing(drawn, found)
     head = {
         "findings": [_row(one) for one in found],
         "missing": lacks,
@@ -154,8 +153,8 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 
 def _row(one: Finding) -> dict[str, Any]:
-    keys = ("code", "what", "where", "remedy", "line")
-    return {"severity": one.severity.value, "place": spoken(one.where)} | {key: getattr(one, key) for key in keys}
+    own = {"severity": one.severity.value, "place": spoken(one.where), "remedy": remedied(one.remedy)}
+    return own | {key: getattr(one, key) for key in ("code", "what", "where", "line")}
 
 
 def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:

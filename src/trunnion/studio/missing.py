@@ -13,6 +13,8 @@ __all__ = ["missing"]
 def missing(sketch: Sketch, findings: Sequence[Finding]) -> list[str]:
     """The next steps, where nothing but steps of drawing is missing; none where something is wrong."""
     errors = [one for one in findings if one.severity is Severity.ERROR]
+    if not errors and sketch.joints and not sketch.of("drivers"):
+        return ["It stands still: its joints let no link move. Take one away, or let an end slide."]
     if not errors or not all(map(_unfinished, errors)):
         return []
     return _steps(sketch)

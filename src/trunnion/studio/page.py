@@ -1,18 +1,19 @@
-"""The studio's page: its files, and its one document, which names all its modules so that they are fetched at once."""
+"""The studio's page: its one document, its modules as one, and its other files."""
 
 from __future__ import annotations
 
 import json
-import posixpath
 import re
 from functools import lru_cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-__all__ = ["document", "found", "modules"]
+from trunnion.views.common.bundle import module
+
+__all__ = ["document", "found", "script"]
 
 PLACES = {"studio": ("trunnion.studio", "web"), "web": ("trunnion.views", "web")}
-IMPORT = re.compile(r'(?:^|;)(?:import|export)\b[^";]*?\bfrom\s*"([^"]+)"', re.M)
+FETCHED = '<link rel="preload" as="fetch" href="{}" crossorigin>'
 IMPORT_MAP = re.compile(r'<script type="importmap"[^>]*>(.*?)</script>', re.S)
 
 
@@ -29,27 +30,18 @@ def found(place: str, name: str) -> Traversable:
     return one
 
 
-def document(nonce: str) -> str:
-    """The HTML; nonce: of its import map. Modules named beforehand come in one go, not in rounds of their imports."""
-    links = "\n".join(f'<link rel="modulepreload" href="{path}">' for path in modules())
-    return _start().replace("{{modules}}", links).replace("{{nonce}}", nonce)
+def document(nonce: str, opened: str) -> str:
+    """The HTML; nonce: of its import map; opened: address of what is fetched beside the script, or ""."""
+    given = {"nonce": nonce, "fetched": FETCHED.format(opened) if opened else ""}
+    return re.sub(r"{{(\w+)}}", lambda found: given[found[1]], _text("studio/index.html"))
 
 
 @lru_cache(maxsize=1)
-def _start() -> str:
-    return found("studio", "index.html").read_text(encoding="utf-8")
+def script() -> str:
+    """All modules of the page as one; the libraries that the document names stay files of their own."""
+    known = json.loads(IMPORT_MAP.search(_text("studio/index.html"))[1])["imports"]  # type: ignore[index]  # it has one
+    return module("studio/main.js", _text, known)
 
 
-@lru_cache(maxsize=1)
-def modules() -> tuple[str, ...]:
-    """The paths of all modules that the page loads, from its first on, by their imports."""
-    known = json.loads(IMPORT_MAP.search(_start())[1])["imports"]  # type: ignore[index]  # the page has one
-    paths = ["/studio/main.js"]
-    for path in paths:
-        _, place, name = path.split("/", 2)
-        text = found(place, name).read_text(encoding="utf-8")
-        for other in IMPORT.findall(text):
-            whole = known.get(other) or posixpath.normpath(posixpath.join(posixpath.dirname(path), other))
-            if whole not in paths:
-                paths.append(whole)
-    return tuple(paths)
+def _text(path: str) -> str:
+    return found(*path.split("/", 1)).read_text(encoding="utf-8")

@@ -12,11 +12,11 @@ import contextlib
 import json
 import mimetypes
 import secrets
-import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, Lock
+from urllib.parse import quote
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -26,15 +26,15 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from trunnion.files import whole
-from trunnion.studio.page import document, found
+from trunnion.studio.page import document, found, script
 
 __all__ = ["Studio"]
 
 COOKIE = "trunnion_studio"
+FILE_HEADERS = {"X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
 MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
 MOST_FILES = 500
-PACE = 1e-3  # s that loading runs before files of the page are served between; Python's own 5 ms add up over them
 PATIENCE = 1.0  # s that the rest waits for the page
 ANSWERING = Lock()  # one after another: the second about a text finds what was read for the first
 
@@ -58,6 +58,7 @@ class Studio:
         """The web application."""
         routes = [
             Route("/", self._guarded(self._page)),
+            Route("/modules.js", self._guarded(self._modules)),
             Route("/files", self._guarded(self._files)),
             Route("/file/{name:path}", self._guarded(self._read)),
             Route("/first/{name:path}", self._guarded(self._first)),
@@ -71,12 +72,10 @@ class Studio:
     @contextlib.asynccontextmanager
     async def _warmed(self, app: Starlette) -> AsyncIterator[None]:
         """While it runs. What answers is loaded beside, and solves the opened model, while the browser opens."""
-        pace, text = sys.getswitchinterval(), ""
-        sys.setswitchinterval(PACE)
+        text = ""
         with contextlib.suppress(ValueError, OSError):
             text = self._text(self.opened or "")
         warming = asyncio.get_running_loop().run_in_executor(None, _look, text, self.seen)
-        warming.add_done_callback(lambda _: sys.setswitchinterval(pace))
         yield
         self.seen.set()
         await warming
@@ -120,15 +119,18 @@ class Studio:
             "form-action 'none'; frame-ancestors 'none'"
         )
         headers = {"Content-Security-Policy": policy, "Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
-        return Response(document(nonce), media_type="text/html; charset=utf-8", headers=headers)
+        first = "/first/" + quote(self.opened, "!'()*") if self.opened else ""
+        return Response(document(nonce, first), media_type="text/html; charset=utf-8", headers=headers)
+
+    async def _modules(self, request: Request) -> Response:
+        return Response(script(), media_type="text/javascript", headers=FILE_HEADERS)
 
     async def _asset(self, request: Request) -> Response:
         place, name = request.path_params["place"], request.path_params["name"]
         with contextlib.suppress(LookupError, OSError, ValueError):
             content = found(place, name).read_bytes()
             kind = "text/javascript" if name.endswith(".js") else mimetypes.guess_type(name)[0]
-            headers = {"X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
-            return Response(content, media_type=kind or "application/octet-stream", headers=headers)
+            return Response(content, media_type=kind or "application/octet-stream", headers=FILE_HEADERS)
         return PlainTextResponse("There is no such file.", status_code=404)
 
     # ---- models ---------------------------------------------------------------------------------------------------

@@ -1,15 +1,17 @@
-"""Places in a model, spoken of as on the sheet: "mass of link crank" where the file has `links.crank.mass`."""
+"""A model spoken of as on the sheet: "mass of link crank" for `links.crank.mass`, and remedies likewise."""
 
 from __future__ import annotations
 
 import re
 
-__all__ = ["spoken"]
+__all__ = ["remedied", "spoken"]
 
 NOUNS = {
     "links": "link", "joints": "joint", "loads": "load", "springs": "spring", "drivers": "driver", "gears": "gear pair",
     "dimensions": "dimension", "measures": "measure", "tables": "table",
 }  # fmt: skip
+NESTED = re.compile(r"\b([a-z_]+): \{([a-z_]+): ([^{},]*)\}")
+STATED = re.compile(r"\b([a-z_]+): (?=-?\d|…)")
 PATH = re.compile(r"[^\s.,]+(\.[^\s.,]+)+")
 
 
@@ -33,6 +35,12 @@ def spoken(where: str) -> str:
         point, *deeper = inner
         inner, part = [key for key in deeper if key not in ("x", "y", "z", "at")], f"point {point} of {part}"
     return f"{_plain(inner)} of {part}" if inner else part
+
+
+def remedied(remedy: str) -> str:
+    """A remedy without the signs of the file: "state pin radius" where it says `state pin: {radius: …}`."""
+    plain = STATED.sub(r"\1 ", NESTED.sub(r"\1 \2 \3", remedy))
+    return plain.replace(": {…}", "").replace(" …", "")
 
 
 def _plain(keys: list[str]) -> str:

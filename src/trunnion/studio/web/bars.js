@@ -48,10 +48,14 @@ export function TopBar() {
 
 export function ToolBar() {
   if (state.spatial.value) return null;
+  const take = (id) => ({ detail }) => {
+    choose(id);
+    if (detail) sheet.view?.root.focus(); // of a mouse: the next key is for the sheet, not for the button
+  };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
       ({ id, label, key, hint: words }) => html`<button type="button" class="tool" aria-pressed=${state.tool.value === id}
-        title=${`${label} (${key}): ${words[0]}`} onClick=${() => choose(id)}><${Icon} name=${id} /><span>${label}</span></button>`,
+        title=${`${label} (${key}): ${words[0]}`} onClick=${take(id)}><${Icon} name=${id} /><span>${label}</span></button>`,
     )}
   </nav>`; // prettier-ignore
 }

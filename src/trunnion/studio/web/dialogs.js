@@ -52,7 +52,7 @@ function Save() {
   };
   return html`<form onSubmit=${submit}>
     <h2>Save as</h2>
-    <label class="choice">Name <input value=${name} onInput=${(event) => setName(event.target.value)} required autofocus /></label>
+    <label class="choice wide-choice">Name <input value=${name} onInput=${(event) => setName(event.target.value)} required autofocus /></label>
     <p class="calm">In ${state.folder.value.folder}${known ? html` — <b>a file of this name is there and will be replaced</b>` : ""}</p>
     <p class="wrong" role="alert">${wrong}</p>
     <p class="row-of-buttons end"><button type="submit" class="plain strong">Save</button></p>

@@ -11,7 +11,7 @@ import { gridStep, posedAt } from "./geometry.js";
 
 const MANY = 2000; // parts above which each kind is one plain path
 export const KEY = 168; // px, room for the words of the key at the right edge
-const TARGET = 12; // px, radius of what a pointer may hit
+export const TARGET = 12; // px, radius of what a pointer may hit
 
 /** The drawing of a scene in an SVG element; `draw(scene)` builds, `pose(…)` moves, `fit` and `zoom` change the frame. */
 export function drawing(root) {
@@ -345,4 +345,3 @@ function poseNames({ parts, shown }, spot) {
   }
 }
 
-export { TARGET };

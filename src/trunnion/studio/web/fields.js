@@ -26,10 +26,21 @@ export function rowsOf(entries, kind, name) {
   const from = kind === "model" ? [] : [kind, name];
   const there = leaves(part, from).map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const missing = (USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [])
-    .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false }))
+  const usual = USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [];
+  const missing = usual
+    .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))
     .filter(({ path }) => !known(path));
-  return [...there, ...missing].map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)) }));
+  const ways = usual.map(([way]) => [...from, ...way.split(".")]);
+  const order = ({ path }) => ways.findIndex((way) => starts(way, path) || starts(path, way));
+  const rows = [...there, ...missing].sort((a, b) => order(a) - order(b)); // a row stays where it is when it is filled
+  return rows.map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)) }));
+}
+
+/** What all joints have that state nothing of their own; null where that is nothing. */
+function commonTo(entries, [key, inner]) {
+  const there = dictionary(entries?.joint_defaults)[key];
+  const value = typeof there === "object" ? dictionary(there)[inner] : inner === "coefficient" ? there : null;
+  return ["string", "number"].includes(typeof value) ? String(value) : null;
 }
 
 function ownOf(entries) {

@@ -29,7 +29,7 @@ export function Finding({ one, onLine = null }) {
       <span class="severity">${severity[0].toUpperCase() + severity.slice(1)}</span>
       ${where && (part ? html`<button type="button" class="where link" title=${where} onClick=${show}>${place}</button> ` : html`<span class="where" title=${where}>${place}</span> `)}
       ${what} ${remedy && html`<span class="remedy">— ${remedy}</span>`}
-      ${line && (onLine ? html` <button type="button" class="link" onClick=${() => onLine(line)}>line ${line}</button>` : html` <span class="remedy">line ${line}</span>`)}
+      ${line && (onLine ? html` <button type="button" class="link" onClick=${() => onLine(line)}>line ${line}</button>` : html` <span class="remedy">(line ${line})</span>`)}
     </p>
   </div>`; // prettier-ignore
 }

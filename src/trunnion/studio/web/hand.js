@@ -1,4 +1,4 @@
-// The pointer on the sheet: click, drag a joint, pan, zoom. One question to Python at a time while a joint is dragged.
+// The pointer on the sheet: click, drag a joint, pan, zoom, also by two fingers. One question to Python at a time while a joint is dragged.
 
 import { drag, edit, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
@@ -12,6 +12,7 @@ const STILL = 3; // px that a click may move
 /** Listen to the pointer; returns what ends it. */
 export function listenToPointer(root, view) {
   const hand = { held: null };
+  const fingers = new Map(); // where they are, px, by pointer
   const placed = (event) => {
     const box = root.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -26,22 +27,27 @@ export function listenToPointer(root, view) {
     const spot = follow(event);
     const part = partUnder(event.target);
     const panning = event.button === 1 || event.button === 2;
+    if (event.pointerType === "touch") fingers.set(event.pointerId, placed(event));
+    if (fingers.size > 1) return letGo(hand);
     if (event.button > 2 || hand.held) return;
     root.setPointerCapture(event.pointerId);
     hand.held = { start: placed(event), last: placed(event), spot, part, panning, moved: false };
   });
   root.addEventListener("pointermove", (event) => {
+    if (fingers.size > 1 && fingers.has(event.pointerId)) return spread(fingers, event.pointerId, placed(event));
+    if (fingers.has(event.pointerId)) fingers.set(event.pointerId, placed(event));
     follow(event);
     if (hand.held) pull(view, hand.held, placed(event));
   });
   root.addEventListener("pointerup", (event) => {
+    fingers.delete(event.pointerId);
     const { held } = hand;
     hand.held = null;
     if (held) release(held, event.shiftKey);
   });
-  root.addEventListener("pointercancel", () => {
-    hand.held = null;
-    state.live.value = null;
+  root.addEventListener("pointercancel", (event) => {
+    fingers.delete(event.pointerId);
+    letGo(hand);
   });
   root.addEventListener("pointerleave", () => {
     if (!state.pending.value) pointer.value = null;
@@ -53,6 +59,29 @@ export function listenToPointer(root, view) {
   };
   root.addEventListener("wheel", wheel, { passive: false });
   return () => root.removeEventListener("wheel", wheel);
+}
+
+/** Leave off what is held, as if it had never been taken. */
+function letGo(hand) {
+  const { joint } = hand.held ?? {};
+  hand.held = null;
+  state.live.value = null;
+  if (!joint) return;
+  joint.left = true;
+  if (joint.sketched) state.places.value = joint.base.places;
+}
+
+/** Two fingers shift and zoom the sheet with them; one of them, `id`, is at another place now. */
+function spread(fingers, id, at) {
+  const measured = () => {
+    const [[ax, ay], [bx, by]] = [...fingers.values()];
+    return { wide: Math.hypot(bx - ax, by - ay), middle: [(ax + bx) / 2, (ay + by) / 2] };
+  };
+  const before = measured();
+  fingers.set(id, at);
+  const { wide, middle } = measured();
+  sheet.pan(middle[0] - before.middle[0], middle[1] - before.middle[1]);
+  if (before.wide && wide) sheet.zoom(wide / before.wide, middle);
 }
 
 /** What a pointer is over: {kind, name, key}, or null. */

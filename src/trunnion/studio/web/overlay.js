@@ -20,6 +20,7 @@ const VECTORS = [["velocity", "v", "m/s"], ["acceleration", "a", "m/s²"]];
 
 /** Where words stand already, [{left, right, y}] px. */
 let taken = [];
+let room = 0; // px, where words end at the right
 
 /** Make room for it: variants under the mechanism, all else over it. */
 export function addOverlay({ root, layers }) {
@@ -36,6 +37,7 @@ export function poseOverlay(view) {
   const wanted = state.layers.peek();
   const told = known && laid.peek()?.scene === scene ? laid.peek() : {};
   const key = []; // lines of the key, from below
+  room = view.frame.width - 6;
   taken = wanted.names ? names(view) : [];
   layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
   layers.overlay.replaceChildren(
@@ -48,14 +50,14 @@ export function poseOverlay(view) {
   );
 }
 
-/** Words that take no room of others: they step down until they are free. */
+/** Words that take no room of others: they step down until they are free, and aside where the window ends. */
 function words(x, y, text, kind = "") {
   const wide = LETTER * text.length;
-  const left = kind === "to-left" ? x - wide : x;
+  const left = Math.max(Math.min(kind === "to-left" ? x - wide : x, room - wide), 0);
   const meets = (one) => left < one.right && left + wide > one.left && Math.abs(one.y - y) < LINE;
   while (taken.some(meets)) y += LINE;
   taken.push({ left, right: left + wide, y });
-  return svg("text", { class: `laid ${kind}`, x: x.toFixed(1), y: y.toFixed(1) }, text);
+  return svg("text", { class: `laid ${kind}`, x: (kind === "to-left" ? left + wide : left).toFixed(1), y: y.toFixed(1) }, text);
 }
 
 /** Words beyond the tip of an arrow from a spot. */

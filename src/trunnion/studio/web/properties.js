@@ -64,7 +64,7 @@ const units = new Map();
 
 /** A value, or the parts of a list, with what is wrong about it. */
 function Row({ row, findings }) {
-  const { path, label, value, example, fixed } = row;
+  const { path, label, value, example, fixed, common } = row;
   const wrong = findingsOf(findings, path).filter(({ severity }) => severity !== "note");
   const id = `value-${path.join("-")}`;
   const list = Array.isArray(value ?? example);
@@ -79,7 +79,7 @@ function Row({ row, findings }) {
   return html`<div class="row">
     <label class="label" for=${`${id}-0`}>${label}</label>
     <span class="values">
-      ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} placeholder=${example && `e.g. ${list ? example[order] : example}`}
+      ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
         aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${hintOf(units.get(`${id}-${order}`))}
         aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>

@@ -1,12 +1,13 @@
 // What the page knows: the file and its places, the latest answer, what is chosen, and the steps that can be undone.
 
 import { batch, computed, effect, signal } from "@preact/signals";
+/** @import { Signal } from "@preact/signals" */
 
 const STEPS = 100; // that can be undone
 const ROOM = 2e6; // characters of them that are kept over a reload
 
 export const connected = signal(false);
-/** Of the program: {version, examples, laws}. @type {import("@preact/signals").Signal<Record<string, any>>} */
+/** Of the program: {version, examples, laws}. @type {Signal<Record<string, any>>} */
 export const about = signal({ version: "", examples: [], laws: [] });
 /** Of the opened folder: {folder, names}. */
 export const folder = signal({ folder: "", names: [] });

@@ -1,7 +1,7 @@
 // The model file as text: what is typed is solved, and what is drawn stands in it at once.
 
 import { effect } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { typed } from "./actions.js";
 import { Finding } from "./findings.js";
 import * as state from "./state.js";
@@ -10,7 +10,7 @@ import { html } from "./ui.js";
 export function Text() {
   const area = useRef(null);
   const gutter = useRef(null);
-  useEffect(() =>
+  useLayoutEffect(() =>
     effect(() => {
       const content = state.text.value;
       if (area.current.value !== content) area.current.value = content;

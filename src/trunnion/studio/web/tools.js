@@ -20,10 +20,10 @@ export const pointer = signal(null);
  * @type {{ id: string, label: string, key: string, hint: string[], click?: Function, tells?: Function, begins?: RegExp, on?: boolean }[]}
  */
 export const TOOLS = [
-  { id: "select", label: "Select", key: "V", hint: ["Drag a joint: the mechanism follows. Drag the sheet to shift it, turn the wheel to zoom."] },
-  { id: "link", label: "Link", key: "L", hint: ["Click the first end of a link: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
+  { id: "select", label: "Select", key: "V", hint: ["Drag a joint: the mechanism follows. Drag the sheet: it shifts. The wheel zooms."] },
+  { id: "link", label: "Link", key: "L", hint: ["Click the first end: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
   { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link to pin it to the ground."], click: pin },
-  { id: "slide", label: "Slide", key: "G", hint: ["Click what slides: a free end, a pin, or a link itself.", "Click the link it slides along, or the direction of a guide on the ground (or type an angle and press Enter)."], click: slide, tells: tellAngle, begins: /[0-9.,-]/, on: true },
+  { id: "slide", label: "Slide", key: "G", hint: ["Click what slides: a free end, a pin, or a link itself.", "Click the link it slides along, or the direction of a guide on the ground, or type an angle."], click: slide, tells: tellAngle, begins: /[0-9.,-]/, on: true },
   { id: "gear", label: "Gears", key: "E", hint: ["Click the pivot of the first gear, or its link.", "Click the pivot of the second gear. For a ratio type the teeth first, as 20:40."], click: gear, tells: tellRatio, begins: /[0-9.,+]/, on: true },
   { id: "driver", label: "Drive", key: "D", hint: ["Click the joint that is driven."], click: drive },
   { id: "point", label: "Point", key: "C", hint: ["Click the link that the point belongs to.", "Click where on it, or beside it, the point is."], click: addPoint, on: true },
@@ -141,12 +141,18 @@ function addPoint(spot) {
 
 // ---- guides, slots, gears
 
-function slide(spot) {
-  const from = pending.value;
-  if (!from) {
-    if (!spot.kind && !spot.on) return say("Click a joint, the free end of a link, or a link: it will slide.", true);
-    return begin(spot);
+/** What slides, and where: a pin that is clicked after a link slides along that link. */
+function slidden(from, spot) {
+  const other = from.on && spot.kind ? linkOf(spot, from.on) : null;
+  return other && other !== from.on ? [{ ...spot, written: endOf(spot) }, from] : [from, spot];
+}
+
+function slide(clicked) {
+  if (!pending.value) {
+    if (!clicked.kind && !clicked.on) return say("Click a joint, the free end of a link, or a link: it will slide.", true);
+    return begin(clicked);
   }
+  const [from, spot] = slidden(pending.value, clicked);
   const own = from.on ?? linkOf(from);
   const along = spot.on ?? linkOf(spot, own);
   const apart = Math.hypot(spot.at[0] - from.at[0], spot.at[1] - from.at[1]) > 0;
@@ -168,10 +174,11 @@ function guideTyped() {
   return true;
 }
 
-function tellAngle(a, b) {
+function tellAngle(first, second) {
+  const [a, b] = slidden(first, second);
   const along = b.on ?? linkOf(b, a.on ?? linkOf(a));
   if (typed.value) return `${typed.value}° ⏎`;
-  if (along && along !== (a.on ?? linkOf(a))) return `along ${along}`;
+  if (along && along !== (a.on ?? linkOf(a))) return a === first ? `along ${along}` : `${a.name.split(".").pop()} along ${along}`;
   return `guide at ${Math.round((level(turnTo(b.at)) * 180) / Math.PI)}°`;
 }
 

@@ -153,7 +153,7 @@ def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[SensorEr
 def _stated(block: Block, kind: str) -> float:
     """What is stated of an error that a channel has in all conditions."""
     accuracy = block.course.accuracy
-    return shared_zero(accuracy) if kind == "zero" else float(accuracy.gain)
+    return float(np.hypot(shared_zero(accuracy), accuracy.cut)) if kind == "zero" else float(accuracy.gain)
 
 
 @dataclass

@@ -24,7 +24,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "dataset", "zeros_of_files"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset", "zeros_of_files"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -46,7 +46,8 @@ class Accuracy:
     zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
-    of `zero` is the same in all files. stated: of a value of one start, by itself.
+    of `zero` is the same in all files. stated: of a value of one start, by itself. cut: of what all readings are off by
+    alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`.
     """
 
     zero: float = 0.0
@@ -54,6 +55,7 @@ class Accuracy:
     resolution: float = 0.0
     own: float = 0.0
     stated: float = 0.0
+    cut: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,7 @@ class Signal:
     @cached_property
     def scatter(self) -> Array:
         """Standard deviation between turns, (position,); NaN with fewer than two."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)
-            return np.asarray(np.nanstd(self.turns, axis=0, ddof=1))
+        return between_turns(self.turns)
 
     @cached_property
     def unresolved(self) -> float:
@@ -117,7 +117,7 @@ class Signal:
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
         repeated = np.where((self.count == 1) & (self.accuracy.stated > 0), 0.0, repeated)
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
-            known = np.square(self.accuracy.zero) + np.square(self.unresolved)
+            known = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
             return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2))
 
 
@@ -151,6 +151,13 @@ class Condition:
     zero: float = float("nan")
     own_zero: bool = False
     of_start: bool = False
+
+
+def between_turns(turns: Array) -> Array:
+    """Standard deviation between turns, (position,) of (turn, position); NaN with fewer than two."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.asarray(np.nanstd(turns, axis=0, ddof=1))
 
 
 def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:

@@ -26,7 +26,7 @@ from trunnion.rig.reading.channels import (
     shown,
     zeroed,
 )
-from trunnion.rig.reading.columns import DataTable
+from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
 from trunnion.rig.reading.log import Account, counted, few_digits, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
@@ -437,11 +437,15 @@ def _table(path: Path, mapping: DataMapping, entry: File) -> DataTable:
     own = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may tell its time by itself
     wanted = [column for where, column in named.items() if where != own]
     try:
-        return read_table(path, wanted, [named[own]] if own in named else [])
+        table = read_table(path, wanted, [named[own]] if own in named else [])
     except MechanismError as error:
         told = error.findings[0].what.partition(";")[0] if "there is no column" in error.findings[0].what else ""
         where = ", ".join(key for key, column in named.items() if f"'{column}'" in told)
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+    told = [of_text(where, table, column) for where, column in named.items() if where != "time.column"]
+    if findings := [one for one in told if one is not None]:
+        raise MechanismError(findings)
+    return table
 
 
 def _columns(mapping: DataMapping, entry: File) -> dict[str, str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +45,9 @@ def rocker(crank: Array, cd: float = 0.085) -> Array:
     return np.pi + np.arctan2(y, x) - np.arccos((diagonal**2 + cd**2 - 0.1**2) / (2 * diagonal * cd))
 
 
-def recorded(folder: Path, values: Array, decimals: int, **channel: Any) -> Measurement:
+def recorded(
+    folder: Path, values: Array, decimals: int, changes: Mapping[str, Any] | None = None, **channel: Any
+) -> Measurement:
     """`values`, deg, of a turn that all twelve repeat, or (turn, sample), at 60 rpm."""
     count, turns, rpm = values.shape[-1], 12, 60.0
     rows = np.resize(np.broadcast_to(values, (turns, count)).ravel(), (turns + 1) * count)
@@ -57,6 +61,7 @@ def recorded(folder: Path, values: Array, decimals: int, **channel: Any) -> Meas
         "angle": {"from": "column", "column": "Winkel", "unit": "deg"},
         "channels": {"psi": {"column": "psi", "measures": "rotation:D", "unit": "deg", **channel}},
         "set": {"A.speed": f"{rpm} rpm"},
+        **(changes or {}),
     }
     return read_measured(mapping, [folder / "a.csv"])
 
@@ -108,3 +113,29 @@ def test_an_angle_that_is_cut_off_does_not_speak_against_the_model(tmp_path: Pat
     assert result.attrs["all_within"]
     assert float(result["bias_expanded"].squeeze()) == pytest.approx(2 * np.radians(0.1) / np.sqrt(12), rel=0.05)
     assert abs(float(result["bias"].squeeze())) == pytest.approx(np.radians(0.05), rel=0.05)
+
+
+def test_the_speed_may_be_that_of_the_angle(tmp_path: Path) -> None:
+    data = recorded(tmp_path, np.degrees(rocker(TURN)), 3, {"set": {"A.speed": {"mean": "angle"}}})
+    assert data.conditions[0].values["A.speed"] == pytest.approx(2 * np.pi, rel=1e-6)
+    with pytest.raises(MechanismError, match="there is no channel 'angel'"):
+        recorded(tmp_path, np.degrees(rocker(TURN)), 3, {"set": {"A.speed": {"mean": "angel"}}})
+
+
+@pytest.mark.parametrize("stated", ["60 rpm", {"mean": "angle"}])
+def test_an_angle_that_counts_backwards_is_named_once(tmp_path: Path, stated: Any) -> None:
+    """Whether the speed is set or known from the model alone; no sign of a torque is advised on top."""
+    torque = {"M": {"column": "psi", "measures": "effort:A", "unit": "N m"}}
+    angle = {"from": "column", "column": "Winkel", "unit": "deg", "sign": -1}
+    changes = {"channels": torque, "angle": angle, "set": {"A.speed": stated}}
+    data = recorded(tmp_path, np.degrees(rocker(TURN)), 3, changes)
+    known = stated == "60 rpm"
+    assert [one.code for one in data.findings if "data.turns" not in one.code] == [
+        "data.angle.backwards" if known else "data.power.sign"
+    ]
+    if not known:
+        data = replace(data, conditions=tuple(replace(one, values={}) for one in data.conditions))
+    model = trunnion.Mechanism.model_validate(FOUR_BAR)
+    for run in (trunnion.rig.compare, lambda *given: trunnion.rig.identify(*given, ["CD"])):
+        with pytest.raises(MechanismError, match="the angle runs backwards: -60 rpm measured, 60 rpm stated of A"):
+            run(model, data)

@@ -122,9 +122,8 @@ COMPARE = {
     "compare.efficiency_unknown": Sentence(WARNING, "not known {cases}: {reason}", "{remedy}"),
     "compare.speed": Sentence(
         WARNING,
-        "the measured speed of the driver differs from that of the model {cases}: {measured_told} measured, "
-        "{model_told} in the model",
-        "state set: {{{key}: {{mean: …}}}} in the mapping, with a channel that measures rate:{driver}",
+        "the measured speed of the driver differs from that of the model {cases}: {told}",
+        "state set: {{{key}: {{mean: {mean}}}}} in the mapping: the model then runs at the measured speed",
     ),
     "compare.no_answer": Sentence(
         ERROR,

@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
-from trunnion.rig.comparison.findings import other_speed, speed_unit
+from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
@@ -40,7 +40,7 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 def sentences(judged: Assessment) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_search, _fit, _speeds, _groups, _near, _limits, _sensors, _exact, _data, _held)
+    parts = (_speeds, _search, _fit, _groups, _near, _limits, _sensors, _exact, _data, _held)
     found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
@@ -89,6 +89,8 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
             "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
         )
         yield from _causes(judged)
+    if any(one.severity is Severity.ERROR for one in _speeds(judged)):
+        return  # which is mended first
     odd = outstanding(judged) if test.misfit else None
     if odd is not None:
         yield _stands_out(odd)
@@ -248,9 +250,7 @@ def _speeds(judged: Assessment) -> Iterator[Finding]:
     driver = next(iter(model.run.system.mechanism.drivers), "")
     conditions = judged.found.measurement.conditions
     fitted = dict.fromkeys(block.condition for block in judged.problem.blocks if block.fitted)
-    rows = [(conditions[k].name, conditions[k].speed, model.driven(k, judged.told)[2]) for k in fitted]
-    rows = [row for row in rows if np.isfinite(row[2])]
-    yield from other_speed(driver, rows, len(fitted), speed_unit(driver, conditions))
+    yield from other_speed(driver, [(conditions[k], model.driven(k, judged.told)[2]) for k in fitted])
 
 
 # ---- what is not identifiable ---------------------------------------------------------------------------------

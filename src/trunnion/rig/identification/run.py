@@ -23,7 +23,7 @@ from trunnion.rig.identification.signals import Model, SeatedModel
 from trunnion.rig.identification.start_signals import StartModel, check_starts
 from trunnion.rig.identification.uncertainty import left_over, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import check_settings, told_at
+from trunnion.rig.modelled import apart, check_settings, refuse_backwards, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -95,6 +95,9 @@ def identify(
         model = StartModel.of(model, measurement.conditions)
     if channels is None:
         model, blocks = _telling(model, blocks)
+    at = np.array([one.start for one in model.unknowns])
+    speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(measurement.conditions)]
+    refuse_backwards(next(iter(stated.drivers), ""), speeds)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     lags = {one.name: one.lag for one in measurement.conditions}
     problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard, progress=progress)
@@ -110,7 +113,9 @@ def _solved(mechanism: Mechanism, measurement: Measurement, problem: FitProblem,
         found = replace(found, fit=fit(problem, found.fit.x))
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
-    causes = explanations(problem, found, spread.test) if spread.test.misfit else []
+    speeds = (problem.model.driven(k, found.fit.x[: problem.count])[2] for k in range(len(measurement.conditions)))
+    other = any(apart(one.speed, speed) for one, speed in zip(measurement.conditions, speeds, strict=True))
+    causes = explanations(problem, found, spread.test) if spread.test.misfit and not other else []
     return Identified(mechanism, measurement, problem.model.run, problem, found, spread, groups, causes)
 
 

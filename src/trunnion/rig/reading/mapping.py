@@ -35,7 +35,8 @@ Sign = Literal[1, -1]
 
 
 class FromData(Part):
-    """A value that the data tell: the mean of a channel over the turns, or a column that states it."""
+    """A value that the data tell: the mean of a channel over the turns, of the speed by the angle with `mean: angle`
+    where no channel has that name, or a column that states it."""
 
     mean: str | None = None
     column: str | None = None

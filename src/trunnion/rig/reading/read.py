@@ -32,8 +32,9 @@ from trunnion.rig.reading.log import Account, counted, few_digits, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
 from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
+from trunnion.rig.reading.sensor_quantity import dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
-from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
+from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
 from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
@@ -198,9 +199,10 @@ class _File:
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
-            told = signs(mapping.channels, whole, turning, account)
-            units = {name: shown(own) for name, own in self.own.items()}
-            speeds(mapping.channels, whole, units, turning, told, account)
+            if not backwards(mapping.channels, [part.setting.values for part in parts], turning, account):
+                told = signs(mapping.channels, whole, turning, account)
+                units = {name: shown(own) for name, own in self.own.items()}
+                speeds(mapping.channels, whole, units, turning, told, account)
         found = [self._condition(part, zeros, drifts, way) for part in parts]
         self._check_steps(found)
         return found
@@ -395,7 +397,11 @@ class _File:
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
+        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         for path, channel_name in part.setting.means.items():
+            if channel_name not in courses:  # of the angle
+                values[path], known_as[path] = speed, dimension_of(dimensions("rad/s")[1], "rad/s")
+                continue
             turns = courses[channel_name].turns
             if not np.isfinite(turns).any():
                 what = f"the channel '{channel_name}', whose mean it is, has no value in any turn"
@@ -405,7 +411,6 @@ class _File:
             values[path] = time_mean(part.turns, turns)
             known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions
-        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
@@ -442,8 +447,8 @@ def _table(path: Path, mapping: DataMapping, entry: File) -> DataTable:
         told = error.findings[0].what.partition(";")[0] if "there is no column" in error.findings[0].what else ""
         where = ", ".join(key for key, column in named.items() if f"'{column}'" in told)
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
-    told = [of_text(where, table, column) for where, column in named.items() if where != "time.column"]
-    if findings := [one for one in told if one is not None]:
+    texts = (of_text(where, table, column) for where, column in named.items() if where != "time.column")
+    if findings := [one for one in texts if one is not None]:
         raise MechanismError(findings)
     return table
 

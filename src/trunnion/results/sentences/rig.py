@@ -105,7 +105,7 @@ COMPARE = {
     ),
     "compare.angle_shifted": Sentence(
         ERROR,
-        "{channels} do not agree within U {cases}; an error of {range} in the crank angle explains "
+        "{channels} do not agree within U {cases}; an error {range} explains "
         "{explains_percent:.0f} % of the mean square of the residuals",
         "{remedy}",
     ),

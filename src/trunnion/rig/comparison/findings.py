@@ -19,7 +19,7 @@ from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
-from trunnion.rig.comparison.explanations import explained, hides_friction
+from trunnion.rig.comparison.explanations import AGREE, explained, hides_friction
 from trunnion.rig.comparison.wording import extent, in_which, said
 from trunnion.rig.modelled import apart
 from trunnion.rig.reading.measurement import zeros_of_files
@@ -33,7 +33,6 @@ __all__ = ["findings_of", "gathered", "other_speed", "units_set"]
 
 SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
-AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
 
 
 def findings_of(
@@ -210,31 +209,53 @@ def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:
     ]
 
 
-def _agreed(found: Sequence[Compared]) -> bool:
-    """Whether all courses that a shift explains are shifted alike, and there are two of them."""
-    cases = _shifted(found)
-    angles = [cause.size * one.model.span for _, one, cause in cases]
-    if len(angles) < 2:
-        return False
-    return bool(max(angles) - min(angles) <= max(AGREE, 0.2 * max(abs(angle) for angle in angles)))
+def _agreed(found: Sequence[Compared]) -> dict[int, float]:
+    """By how much the angle of each condition is ahead, rad, by its place; empty where it is no error of the angle.
+
+    It is one if two courses or more are shifted, and those of each condition alike.
+    """
+    sizes: dict[int, list[float]] = {}
+    for _, one, cause in sorted(_shifted(found), key=lambda row: -row[2].explains):
+        sizes.setdefault(found.index(one), []).append(cause.size * one.model.span)
+    if sum(map(len, sizes.values())) < 2 or not all(map(_alike, sizes.values())):
+        return {}
+    every = [row[0] for row in sizes.values()]  # by the channel that it explains best
+    if max(map(len, sizes.values())) == 1 and not _alike(every):  # of one channel, which may lag
+        return {}
+    return dict(sorted(zip(sizes, every, strict=True)))
+
+
+def _alike(angles: Sequence[float]) -> bool:
+    return bool(max(angles) - min(angles) <= max(AGREE, 0.2 * max(map(abs, angles))))
 
 
 def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
-    """A shift that the courses have in common is one of the angle."""
-    if not _agreed(found):
+    """A shift that the courses have in common is one of the angle: of all files, or of each its own."""
+    ahead = _agreed(found)
+    if not ahead:
         return
     cases = _shifted(found)
-    ahead = [cause.size * one.model.span for _, one, cause in cases]
-    unit, mean = cases[0][1].model.unit, float(np.mean(ahead))
-    names = ", ".join(dict.fromkeys(name for name, _, _ in cases))
-    where = in_which(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
+    unit, every, mean = cases[0][1].model.unit, list(ahead.values()), float(np.mean(list(ahead.values())))
+    conditions, alike = [one.condition for one in found], _alike(every)
+    off = [conditions[k] for k in ahead]
+    told = f"of {extent(every, unit)} in the crank angle"
+    remedy = f"add {said(mean, unit, True)} to angle: zero: in the mapping"
+    own = all(one.own_zero for one in off)
+    if not alike:
+        rows = (f"{one.name}: {said(size, unit, True)}" for one, size in zip(off, every, strict=True))
+        told = f"of the crank angle ({'; '.join(rows)})"
+    if not alike or own:
+        entries = zeros_of_files(conditions, [mean if alike else ahead.get(k, 0.0) for k in range(len(found))])
+        remedy = f"correct the zero of each file: files: [{entries}]" if entries else "correct the zero of each file"
+    phrases = {
+        "channels": ", ".join(dict.fromkeys(name for name, _, _ in cases)), "range": told, "remedy": remedy,
+        "cases": in_which([one.name for one in off], len(found)),
+    }  # fmt: skip
     least = min(cause.explains for _, _, cause in cases)
-    remedy = f"add {said(mean, unit, True)} to the zero of the angle in the mapping"
-    conditions = [one.condition for one in {id(one): one for _, one, _ in cases}.values()]
-    if all(one.own_zero for one in conditions) and (entries := zeros_of_files(conditions, [mean] * len(conditions))):
-        remedy = f"correct the zeros that the files state: files: [{entries}]"
-    phrases = {"cases": where, "channels": names, "range": extent(ahead, unit), "remedy": remedy}
-    yield finding_for("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
+    sizes = {one.name: size for one, size in zip(off, every, strict=True)}
+    yield finding_for(
+        "compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean, sizes=sizes
+    )
 
 
 # ---- efficiency, the model, the sensors -----------------------------------------------------------------------

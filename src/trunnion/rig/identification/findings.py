@@ -170,8 +170,8 @@ def _zeros(judged: Assessment, one: MisfitCause) -> str:
     if one.kind != "shift":
         return ""
     if one.own:
-        odd = _apart(one)[0]
-        return zeros_of_files([conditions[own.condition] for own in odd], [own.size for own in odd])
+        odd = {own.condition: own.size for own in one.own if abs(own.size) > own.expanded}
+        return zeros_of_files(conditions, [odd.get(k, 0.0) for k in range(len(conditions))])
     stated = [condition for condition in conditions if condition.own_zero]
     return zeros_of_files(stated, [one.size] * len(stated)) if len(stated) == len(conditions) else ""
 

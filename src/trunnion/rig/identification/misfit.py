@@ -257,14 +257,15 @@ def _seen(problem: FitProblem, start: Array, spans: Array, condition: int | None
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
         own = (k for k, one in enumerate(problem.blocks) if one.channel == channel and one.fitted)
         k = next((k for k in own if condition in (None, problem.blocks[k].condition)), None)
-        if k is None or problem.model.measures[channel].turning(problem.model.run.system):
+        if k is None:
             continue
         measured, theirs = problem.blocks[k].mean, problem.said(start, k)[0]
         if np.size(theirs) != len(problem.model.phases[problem.blocks[k].condition]):
             continue
         phase, span = problem.model.phases[problem.blocks[k].condition], spans[problem.blocks[k].condition]
         there = np.isfinite(measured) & np.isfinite(theirs)
-        found = causes(measured[there], theirs[there], phase[there], closed=True)
+        turning = problem.model.measures[channel].turning(problem.model.run.system)
+        found = causes(measured[there], theirs[there], phase[there], closed=True, turning=turning)
         seen += [one._replace(size=one.size * span) for one in found if one.kind == "shift"]
     most = max(seen, key=lambda one: one.explains, default=None)
     return most.size if most is not None and abs(most.size) > FAR else 0.0

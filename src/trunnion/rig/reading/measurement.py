@@ -5,13 +5,15 @@ Everything is SI. A measurement has conditions, a condition has courses, a cours
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +134,7 @@ class Condition:
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
-    known; own_zero: whether its file states it, in place of the zero that all share.
+    known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
     of_start: whether it is no cycle but a motion from its start, of which `duration` is what is followed, s, NaN for
     what the model states; its turns are repetitions, its phases shares of that duration.
     """
@@ -150,6 +152,7 @@ class Condition:
     duration: float = float("nan")
     zero: float = float("nan")
     own_zero: bool = False
+    entry: Mapping[str, Any] = field(default_factory=dict)
     of_start: bool = False
 
 
@@ -161,19 +164,34 @@ def between_turns(turns: Array) -> Array:
 
 
 def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:
-    """Entries of a mapping that correct the zero of the angle file by file; empty where it is not known of each.
+    """`files` of a mapping, each entry whole, with the zeros of the angle corrected; empty where one is not known.
 
     ahead: rad, to be added to the zero of each condition.
     """
-    rows = {one.files[0]: one.zero + size for one, size in zip(conditions, ahead, strict=True) if one.files}
-    if len(rows) != len(conditions) or not all(math.isfinite(one) for one in rows.values()):
+    rows = {one.files[0]: (one, one.zero + size) for one, size in zip(conditions, ahead, strict=True) if one.files}
+    if len(rows) != len(conditions) or not all(math.isfinite(zero) for _, zero in rows.values()):
         return ""
-    told = [f"{{file: {Path(name).name}, angle: {{zero: {round(math.degrees(zero), 2) + 0.0:.6g} deg}}}}"
-            for name, zero in rows.items()]  # fmt: skip
+    told = []
+    for name, (one, zero) in rows.items():
+        own = {**one.entry, "angle": {"zero": f"{round(math.degrees(zero), 2) + 0.0:.6g} deg"}}
+        order = {"file": own.get("file", Path(name).name), "angle": own.pop("angle"), **own}
+        told.append(flow(order))
     return ", ".join(told[:MOST_FILES]) + (", …" if len(told) > MOST_FILES else "")
 
 
-MOST_FILES = 3  # named in a remedy
+def flow(value: object) -> str:
+    """A part of a mapping in one line, as it is written there."""
+    if isinstance(value, Mapping):
+        if "source" in value:  # a number with its unit
+            return str(value["source"])
+        return f"{{{', '.join(f'{key}: {flow(one)}' for key, one in value.items())}}}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(flow, value))}]"
+    text = str(value)
+    return json.dumps(text, ensure_ascii=False) if re.search(r"[,:#{}\[\]\"']", text) else text
+
+
+MOST_FILES = 20  # named in a remedy
 
 
 @dataclass(frozen=True)

@@ -420,7 +420,7 @@ class _File:
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, dimensions=known_as, duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
-            own_zero=self.entry.angle is not None,
+            own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip
         return with_values(found, self.entry) if isinstance(self.entry, Start) else found
 

@@ -1,0 +1,69 @@
+"""Zeros of the crank angle that are off file by file: named with what the mapping has to state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import trunnion
+from measured_data.four_bar import FOUR_BAR, rocker
+from trunnion.rig.reading.read import read_measured
+
+CHANNELS = {
+    "psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"},
+    "x": {"column": "x", "measures": "coupler.C.x", "unit": "mm"},
+}
+MODEL = trunnion.Mechanism.model_validate(FOUR_BAR).with_values({"CD": "85 mm"})
+
+
+def mapping(folder: Path, zeros: dict[str, float]) -> dict[str, Any]:
+    """Twelve turns of each file with some noise, whose angle reads 0 where the crank is at its zero, deg."""
+    random = np.random.default_rng(3)
+    (folder / "runs").mkdir()
+    for name, zero in zeros.items():
+        rows = np.arange(12 * 500)
+        crank = 2 * np.pi * rows / 500 + 0.3
+        psi = rocker(crank)
+        columns = [rows / 500, np.degrees(crank) - zero, np.degrees(psi) + random.normal(0, 0.05, rows.size),
+                   120 + 85 * np.cos(psi) + random.normal(0, 0.05, rows.size)]  # fmt: skip
+        np.savetxt(
+            folder / "runs" / f"{name}.csv", np.column_stack(columns), "%.5f", ",", header="t,a,psi,x", comments=""
+        )
+    return {
+        "trunnion-data": 1,
+        "files": [
+            {"file": f"runs/{name}.csv", "set": {"A.speed": "60 rpm"}, "over": ["0 s", "11 s"]} for name in zeros
+        ],
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg"},
+        "channels": CHANNELS,
+    }
+
+
+def findings(folder: Path, stated: dict[str, Any], channel: str | None = None) -> list[Any]:
+    (folder / "mapping.yaml").write_text(yaml.safe_dump(stated))
+    result = trunnion.rig.compare(MODEL, read_measured(folder / "mapping.yaml"), [channel] if channel else None)
+    return [one for one in result.trunnion.findings if one.severity == "error"]
+
+
+def test_each_file_has_its_own_zero_and_the_entries_can_be_pasted(tmp_path: Path) -> None:
+    zeros = {"a": 12.35, "b": -47.55, "c": 103.95}
+    stated = mapping(tmp_path, zeros)
+    (found,) = findings(tmp_path, stated)
+    assert found.code == "compare.angle_shifted"
+    sizes = np.degrees(list(found.figures["sizes"].values()))
+    assert sizes == pytest.approx(list(zeros.values()), abs=0.02)
+    entries = yaml.safe_load(found.remedy.partition("files: ")[2])
+    assert [{**one, "angle": None} for one in entries] == [{**one, "angle": None} for one in stated["files"]]
+    assert not findings(tmp_path, {**stated, "files": entries})
+
+
+def test_a_shift_is_looked_for_in_an_angle_too(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, mapping(tmp_path, {"a": 30.0}), "psi")
+    assert (found.code, found.figures["cause"]) == ("compare.not_within", "shift")
+    assert "+30 deg in the crank angle" in found.what
+    assert found.figures["explains"] > 0.999

@@ -67,3 +67,47 @@ def test_a_shift_is_looked_for_in_an_angle_too(tmp_path: Path) -> None:
     assert (found.code, found.figures["cause"]) == ("compare.not_within", "shift")
     assert "+30 deg in the crank angle" in found.what
     assert found.figures["explains"] > 0.999
+
+
+LOADED = {**FOUR_BAR, "loads": {"brake": {"joint": "D", "resisting_torque": "20 N m", "useful": True}}}
+RATES = {"M": {"column": "M", "measures": "effort:A", "unit": "N m"}, "psi": CHANNELS["psi"]}
+
+
+def braked(folder: Path, zero: float) -> Any:
+    """Torque of the crank against 20 N m at the rocker, by virtual work, and the rocker's angle; 85 mm long."""
+    random = np.random.default_rng(5)
+    rows = np.arange(13 * 500)
+    crank = 2 * np.pi * rows / 500
+    slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
+    columns = [rows / 500, np.degrees(crank) - zero, 20 * np.abs(slope) + random.normal(0, 0.05, rows.size),
+               np.degrees(rocker(crank)) + random.normal(0, 0.1, rows.size)]  # fmt: skip
+    np.savetxt(folder / "a.csv", np.column_stack(columns), "%.5f", ",", header="t,a,M,psi", comments="")
+    stated = {
+        "trunnion-data": 1,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg"},
+        "channels": RATES,
+        "set": {"A.speed": "60 rpm"},
+    }
+    return read_measured(stated, [folder / "a.csv"])
+
+
+@pytest.mark.parametrize(("length", "zero"), [("85 mm", 0.0), ("85 mm", 2.0), ("86 mm", 0.0)])
+def test_a_channel_that_is_not_used_speaks_for_or_against_a_cause(tmp_path: Path, length: str, zero: float) -> None:
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": length})
+    result = trunnion.rig.identify(model, braked(tmp_path, zero), ["brake.resisting_torque"])
+    told = {one.code: one for one in result.trunnion.findings}
+    if length == "86 mm":  # which a shift of the angle seems to explain
+        missed = told["fit.unused_missed"]
+        true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.086)))
+        assert np.degrees(missed.figures["rms"]) == pytest.approx(true, rel=0.05)
+        assert "fit.cause" not in told
+    elif zero:
+        assert told["fit.cause"].figures["kind"] == "shift"
+        assert np.degrees(told["fit.cause"].figures["size"]) == pytest.approx(2.0, abs=0.1)
+    else:
+        assert told["fit.unused"].figures["channels"] == ["psi"]
+        assert "fit.misfit" not in told
+
+
+TURN = 2 * np.pi * np.arange(360) / 360

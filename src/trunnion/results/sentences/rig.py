@@ -212,6 +212,13 @@ IDENTIFY = {
             }
         )[kind],
     ),
+    "fit.unused": Sentence(NOTE, "no parameter acts on {channels}: not used in the fit"),
+    "fit.unused_missed": Sentence(
+        WARNING,
+        "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} about the mean, where its "
+        "standard uncertainty is {known_told}",
+        "check the lengths of the model and the zero of the angle, or identify a length that acts on it",
+    ),
     "fit.conditions_disagree": Sentence(
         NOTE,
         "the conditions disagree: the estimates from single conditions vary {times_told} times as much as expected "

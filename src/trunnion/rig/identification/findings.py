@@ -40,7 +40,7 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 def sentences(judged: Assessment) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_speeds, _search, _fit, _groups, _near, _limits, _sensors, _exact, _data, _held)
+    parts = (_speeds, _search, _fit, _unused, _groups, _near, _limits, _sensors, _exact, _data, _held)
     found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
@@ -117,6 +117,21 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
     if follows > 2 / np.sqrt(max(pairs, 1)):
         yield finding_for("fit.turns_alike", "data", correlation=follows)
+
+
+def _unused(judged: Assessment) -> Iterator[Finding]:
+    """Channels that are not fitted, a warning of those that the model misses all the same."""
+    unused = judged.found.unused
+    if unused is None or not unused.blocks:
+        return
+    missing = unused.missing(judged.told) if not judged.found.causes else {}  # which hold for it too
+    fine = [name for name in dict.fromkeys(block.channel for block in unused.blocks) if name not in missing]
+    if fine:
+        yield finding_for("fit.unused", "channels", channels=fine)
+    units = {block.channel: block.course.unit for block in unused.blocks}
+    for name, (rms, known) in missing.items():
+        phrases = {"rms_told": said(rms, units[name]), "known_told": said(known, units[name])}
+        yield finding_for("fit.unused_missed", f"channels.{name}", phrases=phrases, rms=rms, expected=known)
 
 
 def _stands_out(odd: Outstanding) -> Finding:

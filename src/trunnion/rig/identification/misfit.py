@@ -19,6 +19,7 @@ from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, SensorError
 from trunnion.rig.identification.search import Search, inside, refined
 from trunnion.rig.identification.uncertainty import Test, lack_of_fit, quantile, spread_of
+from trunnion.rig.identification.unused import UnusedChannels
 
 __all__ = ["MisfitCause", "OwnSize", "explanations"]
 
@@ -92,11 +93,13 @@ class _Refit:
         return any(one.stated and bool(one.group) and abs(x) > BEYOND for one, x in told)
 
 
-def explanations(problem: FitProblem, search: Search, test: Test) -> list[MisfitCause]:
+def explanations(
+    problem: FitProblem, search: Search, test: Test, unused: UnusedChannels | None = None
+) -> list[MisfitCause]:
     """The simplest error that explains most of a misfit, and others that explain as much; empty if none does.
 
     One whose size is 0 within its uncertainty explains nothing; what each condition has by itself is named only where
-    nothing that they share explains as much.
+    nothing that they share explains as much. unused: channels that are not fitted; they may speak against a shift.
     """
     tried = [
         one for one in _candidates(problem, search) if np.isfinite(one.fit.cost) and not one.strange and not one.bounded
@@ -108,7 +111,17 @@ def explanations(problem: FitProblem, search: Search, test: Test) -> list[Misfit
     rows = zip(tried, left, explained, strict=True)
     found = [_cause(one, share) for one, rest, share in rows if share >= ENOUGH and rest <= chance * max(least, 1.0)]
     found = [one for one in found if one.kind == "sign" or abs(one.size) > one.expanded]
+    if unused is not None:
+        found = [one for one in found if one.kind != "shift" or not unused.refute(one.estimates, _ahead(problem, one))]
     return [one for one in found if not one.own] or found
+
+
+def _ahead(problem: FitProblem, one: MisfitCause) -> Array:
+    """By how much a shift says that the angle of each condition is ahead, rad."""
+    found = np.full(len(problem.model.phases), 0.0 if one.own else one.size)
+    for own in one.own:
+        found[own.condition] = own.size
+    return found
 
 
 def _cause(one: _Refit, explains: float) -> MisfitCause:

@@ -110,4 +110,36 @@ def test_a_channel_that_is_not_used_speaks_for_or_against_a_cause(tmp_path: Path
         assert "fit.misfit" not in told
 
 
+def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:
+    """Half a step of 0.1° is √3 of its standard uncertainty: one error, which three files tell better than one."""
+    files = []
+    for name, rpm in (("a", 61.3), ("b", 122.7), ("c", 203.9)):
+        random = np.random.default_rng(round(rpm))
+        time = np.arange(int(12.5 * 60 / rpm * 1000)) / 1000
+        crank = 2 * np.pi * rpm / 60 * time
+        slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
+        read = np.floor(10 * np.degrees(crank)) / 10
+        columns = np.column_stack([time, read, 20 * np.abs(slope) + random.normal(0, 0.05, time.size)])
+        np.savetxt(tmp_path / f"{name}.csv", columns, "%.5f", ",", header="t,a,M", comments="")
+        files.append({"file": f"{name}.csv", "set": {"A.speed": f"{rpm} rpm"}})
+    stated = {
+        "trunnion-data": 1,
+        "files": files,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg", "resolution": "0.1 deg"},
+        "channels": {"M": RATES["M"]},
+    }
+    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(stated))
+    data = read_measured(tmp_path / "mapping.yaml")
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
+    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    names = [str(one) for one in result["sensor"].values]
+    assert names.count("angle in steps of 0.1 deg") == 1
+    at = names.index("angle in steps of 0.1 deg")
+    error, known = float(result["sensor_error"][at]), float(result["sensor_uncertainty"][at])
+    assert known < 0.3
+    assert abs(error) == pytest.approx(np.sqrt(3), abs=3 * known)
+    assert float(result["lower"][0]) < 20 < float(result["upper"][0])
+
+
 TURN = 2 * np.pi * np.arange(360) / 360

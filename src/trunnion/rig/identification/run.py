@@ -102,7 +102,8 @@ def identify(
     refuse_backwards(next(iter(stated.drivers), ""), speeds)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     lags = {one.name: one.lag for one in measurement.conditions}
-    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard, progress=progress)
+    cuts = [(one.cut, one.speed) for one in measurement.conditions]
+    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags, cuts), guard, progress=progress)
     return dataset(_solved(stated, measurement, problem, starts, unused))
 
 

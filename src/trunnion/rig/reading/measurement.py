@@ -131,7 +131,8 @@ class Condition:
     phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
     speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
-    lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses.
+    lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses;
+    cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
     known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
@@ -148,6 +149,7 @@ class Condition:
     start: float = float("nan")
     cycle: float = float("nan")
     lag: float = 0.0
+    cut: float = 0.0
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
     duration: float = float("nan")
     zero: float = float("nan")

@@ -154,7 +154,7 @@ class _File:
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
-        self.lag, self.step = 0.0, 0.0
+        self.lag, self.step, self.cut = 0.0, 0.0, 0.0
         self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
@@ -239,7 +239,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.step, self.angle = found.lag, found.step, found.values
+        self.lag, self.step, self.cut, self.angle = found.lag, found.step, found.cut, found.values
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"
@@ -418,7 +418,7 @@ class _File:
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
         found = Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
-            lag=self.lag, dimensions=known_as, duration=duration,
+            lag=self.lag, cut=self.cut, dimensions=known_as, duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
             own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip

@@ -261,3 +261,20 @@ def test_fewer_texts_than_numbers_are_dropouts(tmp_path: Path) -> None:
     columns = recorded(turns=6)
     columns["T2"] = ["---" if k % 3 == 0 else one for k, one in enumerate(columns["T2"])]
     assert "data.readings.missing" in {one.code for one in read(columns, tmp_path).findings}
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("0,0;211,9;0,839\n0,1;212,6;0,873\n", "has no header: its first line is 0,0, 211,9, 0,839"),
+        (
+            "Report of rig 3;;\nDay: 1;;\n0,1;1;2\n",
+            "no line has the columns 'T1', 't'; the first lines are: Report of rig",
+        ),
+    ],
+)
+def test_a_file_without_its_header_is_told_as_such(tmp_path: Path, text: str, what: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(MechanismError) as caught:
+        read_table(tmp_path / "a.csv", ["t", "T1"])
+    assert caught.value.findings[0].what.startswith(what)

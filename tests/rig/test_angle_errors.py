@@ -12,6 +12,7 @@ import yaml
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
 from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.units_taken import read_as
 
 CHANNELS = {
     "psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"},
@@ -143,3 +144,8 @@ def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> 
 
 
 TURN = 2 * np.pi * np.arange(360) / 360
+
+
+@pytest.mark.parametrize(("gain", "told"), [(1270.0, "near 1000, as of N m read as kN m"), (1.27, "")])
+def test_a_gain_near_a_power_of_ten_is_a_unit_though_friction_is_off(gain: float, told: str) -> None:
+    assert read_as([gain], "kN m", 1e3) == told

@@ -183,7 +183,7 @@ IDENTIFY = {
     "fit.misfit": Sentence(
         WARNING,
         "the model does not fit: reduced χ² {reduced_told} (1 is expected from the scatter between turns), p-value "
-        "{chance_told}; the intervals are widened accordingly",
+        "{chance_told}; {worth}",
         "see the residuals; identify another parameter as well, or use another friction law",
     ),
     "fit.cause": Sentence(

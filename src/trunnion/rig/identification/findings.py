@@ -83,7 +83,8 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     test, problem = judged.found.spread.test, judged.problem
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
-        phrases = {"chance_told": chance, "reduced_told": _times(test.reduced)}
+        worth = "the estimates mean nothing" if test.gross else "the intervals are widened accordingly"
+        phrases = {"chance_told": chance, "reduced_told": _times(test.reduced), "worth": worth}
         severity = Severity.ERROR if test.gross else None
         yield finding_for(
             "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
@@ -110,7 +111,7 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
         phrases = {"one": "start" if judged.found.measurement.of_starts else "turn"}
         yield finding_for("fit.not_repeated", "data", phrases=phrases)
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
-    if freedom.size and np.min(freedom) < FEW:
+    if freedom.size and np.min(freedom) < FEW and not test.gross:
         least = round(float(np.min(freedom)))
         yield finding_for("fit.freedom", "data", phrases={"told": _count(least, "degree")}, degrees=least)
     follows = judged.found.spread.follows

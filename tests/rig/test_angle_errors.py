@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,10 @@ import yaml
 
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
+from trunnion.rig.reading.measurement import Accuracy
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.units_taken import read_as
+from trunnion.views.identify.tables import sensors
 
 CHANNELS = {
     "psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"},
@@ -141,6 +145,24 @@ def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> 
     assert known < 0.3
     assert abs(error) == pytest.approx(np.sqrt(3), abs=3 * known)
     assert float(result["lower"][0]) < 20 < float(result["upper"][0])
+    assert np.isnan(float(result["sensor_size"][at]))  # in seconds it is another one at each speed
+
+
+def test_the_zero_of_a_sensor_is_told_in_its_unit(tmp_path: Path) -> None:
+    data = braked(tmp_path, 0.0)
+    (one,) = data.conditions
+    torque = one.courses["M"]
+    off = replace(torque, turns=torque.turns + 0.2, accuracy=Accuracy(zero=0.3))
+    data = replace(data, conditions=(replace(one, courses={**one.courses, "M": off}),))
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
+    table = sensors(trunnion.rig.identify(model, data, ["brake.resisting_torque"]))
+    assert table is not None
+    ((name, told, _),) = table.rows
+    found = re.fullmatch(r"(\S+) ± (\S+) N m", told)
+    assert name == "zero of M"
+    assert found
+    assert float(found[1]) == pytest.approx(0.2, abs=1.5 * float(found[2]))
+    assert float(found[2]) < 0.02
 
 
 TURN = 2 * np.pi * np.arange(360) / 360

@@ -158,7 +158,8 @@ def _clipped(where: str, part: Array, time: Array, limit: float, unit: str, acco
     mask = np.abs(part) >= CLIP * limit
     count, finite = int(np.count_nonzero(mask)), int(np.count_nonzero(np.isfinite(part)))
     if count > MOST * finite:  # what is left says nothing of the channel
-        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of the range of {limit:.6g} {unit}"
+        end = f"the end of the range of {limit:.6g} {unit}"
+        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond {end}"
         figures = {"count": count, "readings": finite}
         remedy = "check unit, gain and range of the channel in the mapping; else use a larger range"
         raise MechanismError(

@@ -105,7 +105,7 @@ def test_an_angle_in_steps_is_smoothed_to_what_the_shaft_does(tmp_path: Path) ->
     def off() -> float:
         found = read_measured(mapping, [tmp_path / "lauf.csv"])
         stated = "resolution" in mapping["angle"]
-        assert (found.conditions[0].lag > 0) == stated
+        assert (found.conditions[0].cut > 0) == stated
         assert ("data.angle.steps" in {one.code for one in found.findings}) != stated
         return float(np.max(np.abs(found.conditions[0].courses["M"].mean - true)))
 
@@ -165,7 +165,7 @@ def test_fine_steps_are_told_where_half_of_one_moves_a_channel(
         assert "resolution: 0.1 deg" in rows[0].remedy
         mapping["angle"]["resolution"] = "0.1 deg"
         found = read_measured(mapping, [file])
-        assert found.conditions[0].lag > 0
+        assert found.conditions[0].cut == pytest.approx(np.radians(0.1) / np.sqrt(12))
         assert "data.angle.steps" not in {one.code for one in found.findings}
 
 

@@ -239,3 +239,45 @@ def test_a_comma_in_another_column_is_no_sign_of_decimals(tmp_path: Path) -> Non
     path = tmp_path / "run.csv"
     path.write_text("t;T1;remark\n" + "".join(f"{k}.5;{k}.25;1,5\n" for k in range(20)))
     assert read_table(path, ["t", "T1"]).columns["T1"].values[3] == 3.25
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "where", "remedy"),
+    [
+        ("T2", "{:.3f} Nm", "channels.brake.column", "remove the unit from the cells; state channels.brake.unit: Nm"),
+        ("T2", "overflow", "channels.brake.column", "name a column of numbers"),
+        ("encoder", "{:.0f} Imp", "angle.column", "remove the unit from the cells"),
+    ],
+)
+def test_a_column_of_text_is_an_error(tmp_path: Path, column: str, cell: str, where: str, remedy: str) -> None:
+    columns = recorded(turns=6)
+    columns[column] = [cell.format(one) for one in columns[column]]
+    with pytest.raises(MechanismError) as caught:
+        read(columns, tmp_path)
+    (found,) = caught.value.findings
+    assert (found.code, found.where) == ("data.readings.text", where)
+    assert remedy in found.remedy
+    assert found.figures == {"texts": len(columns[column]), "numbers": 0}
+
+
+def test_fewer_texts_than_numbers_are_dropouts(tmp_path: Path) -> None:
+    columns = recorded(turns=6)
+    columns["T2"] = ["---" if k % 3 == 0 else one for k, one in enumerate(columns["T2"])]
+    assert "data.readings.missing" in {one.code for one in read(columns, tmp_path).findings}
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("0,0;211,9;0,839\n0,1;212,6;0,873\n", "has no header: its first line is 0,0, 211,9, 0,839"),
+        (
+            "Report of rig 3;;\nDay: 1;;\n0,1;1;2\n",
+            "no line has the columns 'T1', 't'; the first lines are: Report of rig",
+        ),
+    ],
+)
+def test_a_file_without_its_header_is_told_as_such(tmp_path: Path, text: str, what: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(MechanismError) as caught:
+        read_table(tmp_path / "a.csv", ["t", "T1"])
+    assert caught.value.findings[0].what.startswith(what)

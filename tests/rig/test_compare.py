@@ -253,8 +253,8 @@ def test_a_driver_at_another_speed_is_named():
     conditions = tuple(replace(one, values={}, speed=6.0) for one in other.conditions)
     result = compare(replace(other, conditions=conditions))
     assert said(result, "channels.speed", "another speed of the driver, measured 6 rad/s", "A.speed: {mean: speed}")
-    assert said(result, "drivers.A", "6 rad/s measured, 4 rad/s in the model")
     rpm = np.pi / 30
+    assert said(result, "drivers.A", f"{6 / rpm:.4g} rpm measured, {4 / rpm:.4g} rpm in the model")
     told = [
         replace(one, courses={name: replace(row, read_in=("U/min", rpm)) if name == "speed" else row
                               for name, row in one.courses.items()})
@@ -263,8 +263,21 @@ def test_a_driver_at_another_speed_is_named():
     result = compare(replace(other, conditions=tuple(told)))
     (found,) = (one for one in result.trunnion.findings if one.code == "compare.speed")
     assert found.figures["measured"] == pytest.approx(6.0)
-    assert f"{6 / rpm:.3g} U/min measured" in found.what
+    assert found.severity is Severity.ERROR
+    assert f"{6 / rpm:.4g} U/min measured" in found.what
     assert said(result, "channels.speed", f"measured {6 / rpm:.3g} U/min")
+    near = replace(other, conditions=tuple(replace(one, speed=6.1) for one in other.conditions))
+    (found,) = (one for one in compare(near).trunnion.findings if one.code == "compare.speed")
+    assert found.severity is Severity.WARNING
+
+
+def test_an_angle_that_runs_backwards_is_refused():
+    data = measured(channels=("speed", "out"))
+    back = replace(data, conditions=tuple(replace(one, speed=-4.0) for one in data.conditions))
+    with pytest.raises(MechanismError) as caught:
+        compare(back)
+    assert {one.code for one in caught.value.findings} == {"data.angle.backwards"}
+    assert caught.value.findings[0].figures["measured"] == -4.0
 
 
 # ---- no answer ------------------------------------------------------------------------------------------------

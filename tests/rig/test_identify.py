@@ -446,8 +446,11 @@ def test_a_driver_at_another_speed_and_sensors_taken_as_exact_are_warned_of(
 ) -> None:
     data = torque.measured(1, 1, Sensors(zero=0.0, gain=0.0))
     fast = replace(data, conditions=tuple(replace(one, speed=3.0) for one in data.conditions))
-    text = said(identify(four_bar, fast, [FRICTION]), "warning")
-    assert "the driver differs from that of the model in every condition: 3 rad/s measured, 2 rad/s" in text
+    found = identify(four_bar, fast, [FRICTION])
+    rpm = np.pi / 30
+    assert "the driver differs from that of the model in every condition" in said(found, "error")
+    assert f"{3 / rpm:.4g} rpm measured, {2 / rpm:.4g} rpm in the model" in said(found, "error")
+    text = said(identify(four_bar, data, [FRICTION]), "warning")
     assert "no accuracy is stated for torque: zero and gain count as exact" in text
     assert "no turn is repeated" in text
     assert "the measured speed of the driver differs" not in said(identify(four_bar, data, [FRICTION]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -16,12 +16,14 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
 from trunnion.model.units import Kind, dimension_text
 from trunnion.rig.reading.measurement import Condition, Measurement
+from trunnion.rig.reading.signal_checks import backward_finding
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Modelled", "check_settings", "measure_of", "modelled", "prepared", "told_at"]
+__all__ = ["Modelled", "apart", "check_settings", "measure_of", "modelled", "prepared", "refuse_backwards", "told_at"]
 
 Array = NDArray[np.float64]
+FAR = 0.05  # of a speed: an error of the settings
 SLOWER = 0.01  # of the duration of a cycle: a machine that keeps time runs no farther off
 
 
@@ -40,6 +42,11 @@ class Modelled:
     status: NDArray[np.int8]
     courses: Mapping[str, Array]
     measures: Mapping[str, Measure]
+
+    @property
+    def speed(self) -> float:
+        """Mean speed of the first driver, rad/s; NaN where it names no position."""
+        return self.span / self.run.cycle.duration if self.unit == "rad" else float("nan")
 
     @property
     def sound(self) -> NDArray[np.bool_]:
@@ -160,7 +167,10 @@ def _same_cycle(run: Run, condition: Condition, unit: str, span: float) -> None:
         what = f"the cycle of the data is {condition.duration:g} s, that of the model {run.cycle.duration:g} s"
         remedy = f"state cycle: {run.cycle.duration:g} s in the mapping, or set: the number of the model that makes it"
         raise MechanismError(Finding(what, "cycle", remedy))
-    if unit != "rad" or not np.isfinite([condition.start, condition.cycle]).all():
+    if unit != "rad":
+        return
+    refuse_backwards(next(iter(run.system.mechanism.drivers)), [(condition, span / run.cycle.duration)])
+    if not np.isfinite([condition.start, condition.cycle]).all():
         return
     findings: list[Finding] = []
     if abs(condition.cycle - abs(span)) > 1e-6 * abs(span):
@@ -176,6 +186,19 @@ def _same_cycle(run: Run, condition: Condition, unit: str, span: float) -> None:
         findings.append(Finding(what, "start", f"state start: {_degrees(begin)} in the mapping"))
     if findings:
         raise MechanismError(findings)
+
+
+def apart(measured: float, stated: float, share: float = FAR) -> bool:
+    """Whether a measured speed is off that of the model by more than a share of it; not where one is unknown."""
+    return bool(abs(measured - stated) > share * abs(stated))
+
+
+def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> None:
+    """MechanismError where a condition turns the other way than the model, whose speeds are in rad/s."""
+    found = [backward_finding(driver, one.speed, speed, next(iter(one.files), "")) for one, speed in rows
+             if one.speed * speed < 0]  # fmt: skip
+    if found:
+        raise MechanismError(found)
 
 
 def _degrees(angle: float) -> str:

@@ -105,7 +105,7 @@ COMPARE = {
     ),
     "compare.angle_shifted": Sentence(
         ERROR,
-        "{channels} do not agree within U {cases}; an error of {range} in the crank angle explains "
+        "{channels} do not agree within U {cases}; an error {range} explains "
         "{explains_percent:.0f} % of the mean square of the residuals",
         "{remedy}",
     ),
@@ -122,9 +122,8 @@ COMPARE = {
     "compare.efficiency_unknown": Sentence(WARNING, "not known {cases}: {reason}", "{remedy}"),
     "compare.speed": Sentence(
         WARNING,
-        "the measured speed of the driver differs from that of the model {cases}: {measured_told} measured, "
-        "{model_told} in the model",
-        "state set: {{{key}: {{mean: …}}}} in the mapping, with a channel that measures rate:{driver}",
+        "the measured speed of the driver differs from that of the model {cases}: {told}",
+        "state set: {{{key}: {{mean: {mean}}}}} in the mapping: the model then runs at the measured speed",
     ),
     "compare.no_answer": Sentence(
         ERROR,
@@ -184,7 +183,7 @@ IDENTIFY = {
     "fit.misfit": Sentence(
         WARNING,
         "the model does not fit: reduced χ² {reduced_told} (1 is expected from the scatter between turns), p-value "
-        "{chance_told}; the intervals are widened accordingly",
+        "{chance_told}; {worth}",
         "see the residuals; identify another parameter as well, or use another friction law",
     ),
     "fit.cause": Sentence(
@@ -212,6 +211,13 @@ IDENTIFY = {
                 "with accuracy: {gain: …} in the mapping a gain is estimated too",
             }
         )[kind],
+    ),
+    "fit.unused": Sentence(NOTE, "no parameter acts on {channels}: not used in the fit"),
+    "fit.unused_missed": Sentence(
+        WARNING,
+        "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} about the mean, where its "
+        "standard uncertainty is {known_told}",
+        "check the lengths of the model and the zero of the angle, or identify a length that acts on it",
     ),
     "fit.conditions_disagree": Sentence(
         NOTE,

@@ -83,8 +83,8 @@ def causes(
 ) -> list[Cause]:
     """Every explanation that can be fitted, in the order of KINDS; finite values only.
 
-    closed: the cycle ends where it starts; turning: the course is an angle, of which a sign or a shift says nothing
-    that a zero does not; without: the model without its friction, if that is to be among them.
+    closed: the cycle ends where it starts; turning: the course is an angle, of which neither sign nor gain is tried,
+    nor a shift if it turns right round; without: the model without its friction, if that is to be among them.
     """
     pair, found = _Pair(measured, model), []
     square = float(np.sum(model**2))
@@ -95,13 +95,15 @@ def causes(
         found.append(Cause("sign", -1.0, pair.explained(-model)))
     zero = float(np.mean(measured - model))
     found.append(Cause("zero", zero, pair.explained(model + zero)))
-    if turning or square == 0:
+    if square == 0:
         return found
     gain = float(np.sum(measured * model)) / square
-    if gain > 0:
+    if gain > 0 and not turning:
         found.append(Cause("gain", gain - 1.0, pair.explained(gain * model)))
     if closed and len(phase) >= FEWEST:
         found += [*_shift(pair, phase, 1), *_shift(pair, phase, -1)]
+    if turning:
+        return found
     found += _friction(pair, without)
     around = model - np.mean(model)
     if float(np.sum(around**2)) > 1e-6 * square:  # of a flat course the two cannot be told apart

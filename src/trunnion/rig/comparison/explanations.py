@@ -19,11 +19,12 @@ from trunnion.rig.reading.units_taken import read_as
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
 
-__all__ = ["explained", "hides_friction"]
+__all__ = ["AGREE", "explained", "hides_friction"]
 
 Members = Sequence[tuple["Compared", "ChannelComparison"]]
 STANDS_OUT = 2.0  # times the median of the conditions
 MUCH = 0.5  # of a mean square, that an offset would explain, to be spoken of
+AGREE = np.radians(1.0)  # shifts that differ by less are one
 FAR = 0.5  # of a gain: told as a factor from here on
 
 
@@ -217,6 +218,11 @@ def _percent(values: Sequence[float]) -> str:
 
 def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
     spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
+    if max(spans) - min(spans) > AGREE:
+        told = [
+            f"{one.condition.name}: {said(span, one.model.unit, True)}" for one, span in zip(found, spans, strict=True)
+        ]
+        return f"an error of the crank angle ({'; '.join(told)})"
     late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
     angle, delay = extent(spans, found[0].model.unit), extent(late, "ms", False)
     return f"an error of {angle} in the crank angle, or a delay of {delay},"

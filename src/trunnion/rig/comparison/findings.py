@@ -19,8 +19,9 @@ from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
-from trunnion.rig.comparison.explanations import explained, hides_friction
+from trunnion.rig.comparison.explanations import AGREE, explained, hides_friction
 from trunnion.rig.comparison.wording import extent, in_which, said
+from trunnion.rig.modelled import apart
 from trunnion.rig.reading.measurement import zeros_of_files
 
 if TYPE_CHECKING:
@@ -28,11 +29,10 @@ if TYPE_CHECKING:
     from trunnion.rig.comparison.error_sources import Cause
     from trunnion.rig.reading.measurement import Condition
 
-__all__ = ["findings_of", "gathered", "other_speed", "speed_unit", "units_set"]
+__all__ = ["findings_of", "gathered", "other_speed", "units_set"]
 
 SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
-AGREE = np.radians(1.0)  # shifts that differ by less, or by less than a fifth, are one
 
 
 def findings_of(
@@ -41,10 +41,10 @@ def findings_of(
     """Everything there is to say, errors of the comparison first."""
     rows = [
         *_answers(found),
+        *_speeds(found),
         *_shifts(found),
         *(finding for name in channels for finding in _of_channel(name, channels[name], found)),
         *_efficiencies(found),
-        *_speeds(found),
         *_of_the_model(found),
         *_left_out(found),
         *_going_on(channels, found),
@@ -209,31 +209,53 @@ def _shifted(found: Sequence[Compared]) -> list[tuple[str, Compared, Cause]]:
     ]
 
 
-def _agreed(found: Sequence[Compared]) -> bool:
-    """Whether all courses that a shift explains are shifted alike, and there are two of them."""
-    cases = _shifted(found)
-    angles = [cause.size * one.model.span for _, one, cause in cases]
-    if len(angles) < 2:
-        return False
-    return bool(max(angles) - min(angles) <= max(AGREE, 0.2 * max(abs(angle) for angle in angles)))
+def _agreed(found: Sequence[Compared]) -> dict[int, float]:
+    """By how much the angle of each condition is ahead, rad, by its place; empty where it is no error of the angle.
+
+    It is one if two courses or more are shifted, and those of each condition alike.
+    """
+    sizes: dict[int, list[float]] = {}
+    for _, one, cause in sorted(_shifted(found), key=lambda row: -row[2].explains):
+        sizes.setdefault(found.index(one), []).append(cause.size * one.model.span)
+    if sum(map(len, sizes.values())) < 2 or not all(map(_alike, sizes.values())):
+        return {}
+    every = [row[0] for row in sizes.values()]  # by the channel that it explains best
+    if max(map(len, sizes.values())) == 1 and not _alike(every):  # of one channel, which may lag
+        return {}
+    return dict(sorted(zip(sizes, every, strict=True)))
+
+
+def _alike(angles: Sequence[float]) -> bool:
+    return bool(max(angles) - min(angles) <= max(AGREE, 0.2 * max(map(abs, angles))))
 
 
 def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
-    """A shift that the courses have in common is one of the angle."""
-    if not _agreed(found):
+    """A shift that the courses have in common is one of the angle: of all files, or of each its own."""
+    ahead = _agreed(found)
+    if not ahead:
         return
     cases = _shifted(found)
-    ahead = [cause.size * one.model.span for _, one, cause in cases]
-    unit, mean = cases[0][1].model.unit, float(np.mean(ahead))
-    names = ", ".join(dict.fromkeys(name for name, _, _ in cases))
-    where = in_which(list(dict.fromkeys(one.condition.name for _, one, _ in cases)), len(found))
+    unit, every, mean = cases[0][1].model.unit, list(ahead.values()), float(np.mean(list(ahead.values())))
+    conditions, alike = [one.condition for one in found], _alike(every)
+    off = [conditions[k] for k in ahead]
+    told = f"of {extent(every, unit)} in the crank angle"
+    remedy = f"add {said(mean, unit, True)} to angle: zero: in the mapping"
+    own = all(one.own_zero for one in off)
+    if not alike:
+        rows = (f"{one.name}: {said(size, unit, True)}" for one, size in zip(off, every, strict=True))
+        told = f"of the crank angle ({'; '.join(rows)})"
+    if not alike or own:
+        entries = zeros_of_files(conditions, [mean if alike else ahead.get(k, 0.0) for k in range(len(found))])
+        remedy = f"correct the zero of each file: files: [{entries}]" if entries else "correct the zero of each file"
+    phrases = {
+        "channels": ", ".join(dict.fromkeys(name for name, _, _ in cases)), "range": told, "remedy": remedy,
+        "cases": in_which([one.name for one in off], len(found)),
+    }  # fmt: skip
     least = min(cause.explains for _, _, cause in cases)
-    remedy = f"add {said(mean, unit, True)} to the zero of the angle in the mapping"
-    conditions = [one.condition for one in {id(one): one for _, one, _ in cases}.values()]
-    if all(one.own_zero for one in conditions) and (entries := zeros_of_files(conditions, [mean] * len(conditions))):
-        remedy = f"correct the zeros that the files state: files: [{entries}]"
-    phrases = {"cases": where, "channels": names, "range": extent(ahead, unit), "remedy": remedy}
-    yield finding_for("compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean)
+    sizes = {one.name: size for one, size in zip(off, every, strict=True)}
+    yield finding_for(
+        "compare.angle_shifted", "angle.zero", phrases=phrases, explains_percent=100 * least, mean=mean, sizes=sizes
+    )
 
 
 # ---- efficiency, the model, the sensors -----------------------------------------------------------------------
@@ -261,37 +283,31 @@ def _efficiencies(found: Sequence[Compared]) -> Iterator[Finding]:
 
 def _speeds(found: Sequence[Compared]) -> Iterator[Finding]:
     """A driver that turned at another speed than the model's."""
-    rows = []
-    for one in found:
-        first = next(iter(one.model.run.system.mechanism.drivers), "")
-        if first and one.model.unit == "rad":
-            rows.append((one.condition.name, one.condition.speed, one.model.span / one.model.run.cycle.duration))
-            driver = first
-    if rows:
-        yield from other_speed(driver, rows, len(found), speed_unit(driver, [one.condition for one in found]))
+    rows = [(one.condition, one.model.speed) for one in found]
+    yield from other_speed(next(iter(found[0].model.run.system.mechanism.drivers), "") if found else "", rows)
 
 
-def speed_unit(driver: str, conditions: Iterable[Condition]) -> tuple[str, float]:
-    """Unit in which the speed of a driver is read, such as U/min, and its size in rad/s; rad/s where it is not read."""
-    courses = [one for condition in conditions for one in condition.courses.values()]
-    return next((one.shown for one in courses if one.measures == f"rate:{driver}"), ("rad/s", 1.0))
+def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
+    """Of a driver whose speed, rad/s, in the model differs from that of the conditions; an error if by much."""
+    off = [(one, speed) for one, speed in rows if apart(one.speed, speed, SLOWER)]
+    if not off:
+        return
+    channels = {course.measures: course for one, _ in rows for course in one.courses.values()}
+    reads = channels.get(f"rate:{driver}")
+    unit, size = reads.shown if reads is not None and reads.read_in[0] else ("rpm", np.pi / 30)
+    told = [f"{one.name}: {one.speed / size:.4g} {unit} measured, {speed / size:.4g} {unit} in the model"
+            for one, speed in off]  # fmt: skip
+    phrases = {
+        "cases": in_which([one.name for one, _ in off], len(rows)).partition(" (")[0], "key": as_key(f"{driver}.speed"),
+        "told": "; ".join(told[:MOST_TOLD]) + ("; …" if len(told) > MOST_TOLD else ""),
+        "mean": reads.channel if reads is not None else "angle",
+    }  # fmt: skip
+    severity = Severity.ERROR if any(apart(one.speed, speed) for one, speed in off) else None
+    figures = {"measured": off[0][0].speed, "model": off[0][1], "driver": driver}
+    yield finding_for("compare.speed", f"drivers.{driver}", severity=severity, phrases=phrases, **figures)
 
 
-def other_speed(
-    driver: str, rows: Sequence[tuple[str, float, float]], of: int, shown: tuple[str, float]
-) -> Iterator[Finding]:
-    """Of a driver whose speed, by condition as measured and in the model, rad/s, differs; of: conditions in all; shown:
-    unit in which it is told, and its size in rad/s."""
-    unit, size = shown
-    off = [row for row in rows if np.isfinite(row[1]) and abs(row[1] - row[2]) > SLOWER * abs(row[2])]
-    if off:
-        _, measured, theirs = off[0]
-        phrases = {
-            "cases": in_which([row[0] for row in off], of), "key": as_key(f"{driver}.speed"),
-            "measured_told": said(measured / size, unit), "model_told": said(theirs / size, unit),
-        }  # fmt: skip
-        figures = {"measured": measured, "model": theirs, "driver": driver}
-        yield finding_for("compare.speed", f"drivers.{driver}", severity=None, phrases=phrases, **figures)
+MOST_TOLD = 4
 
 
 def _answers(found: Sequence[Compared]) -> Iterator[Finding]:

@@ -22,7 +22,7 @@ from trunnion.rig.comparison.assessment import Verdict, judge, uncertainty_of
 from trunnion.rig.comparison.comparison import ChannelComparison, Compared, Efficient, unmeasured
 from trunnion.rig.comparison.error_sources import STATED, best, beyond_stated, causes
 from trunnion.rig.comparison.result import dataset
-from trunnion.rig.modelled import Modelled, check_settings, modelled
+from trunnion.rig.modelled import Modelled, apart, check_settings, modelled
 from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -147,6 +147,8 @@ def _pair(
         course.mean[where], theirs[where], np.asarray(condition.phase)[where], closed=model.run.cycle.periodic,
         turning=model.measures[channel].turning(model.run.system), without=None if free is None else free[where],
     )  # fmt: skip
+    if apart(condition.speed, model.speed):  # forces of another speed are no error of the angle
+        found = [one for one in found if one.kind not in ("shift", "mirror")]
     stated = course.accuracy.zero, course.accuracy.gain
     found.sort(key=lambda one: beyond_stated(one, *stated) > STATED)  # such a sensor only where nothing else explains
     random = uncertainty_of(course).random[where]

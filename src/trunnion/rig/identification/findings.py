@@ -10,7 +10,7 @@ import numpy as np
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
-from trunnion.rig.comparison.findings import other_speed, speed_unit
+from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
@@ -40,7 +40,7 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 def sentences(judged: Assessment) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_search, _fit, _speeds, _groups, _near, _limits, _sensors, _exact, _data, _held)
+    parts = (_speeds, _search, _fit, _unused, _groups, _near, _limits, _sensors, _exact, _data, _held)
     found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
@@ -83,12 +83,15 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
     test, problem = judged.found.spread.test, judged.problem
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
-        phrases = {"chance_told": chance, "reduced_told": _times(test.reduced)}
+        worth = "the estimates mean nothing" if test.gross else "the intervals are widened accordingly"
+        phrases = {"chance_told": chance, "reduced_told": _times(test.reduced), "worth": worth}
         severity = Severity.ERROR if test.gross else None
         yield finding_for(
             "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
         )
         yield from _causes(judged)
+    if any(one.severity is Severity.ERROR for one in _speeds(judged)):
+        return  # which is mended first
     odd = outstanding(judged) if test.misfit else None
     if odd is not None:
         yield _stands_out(odd)
@@ -108,13 +111,28 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
         phrases = {"one": "start" if judged.found.measurement.of_starts else "turn"}
         yield finding_for("fit.not_repeated", "data", phrases=phrases)
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
-    if freedom.size and np.min(freedom) < FEW:
+    if freedom.size and np.min(freedom) < FEW and not test.gross:
         least = round(float(np.min(freedom)))
         yield finding_for("fit.freedom", "data", phrases={"told": _count(least, "degree")}, degrees=least)
     follows = judged.found.spread.follows
     pairs = sum(len(block.turns) - 1 for block in problem.blocks if block.fitted)
     if follows > 2 / np.sqrt(max(pairs, 1)):
         yield finding_for("fit.turns_alike", "data", correlation=follows)
+
+
+def _unused(judged: Assessment) -> Iterator[Finding]:
+    """Channels that are not fitted, a warning of those that the model misses all the same."""
+    unused = judged.found.unused
+    if unused is None or not unused.blocks:
+        return
+    missing = unused.missing(judged.told) if not judged.found.causes else {}  # which hold for it too
+    fine = [name for name in dict.fromkeys(block.channel for block in unused.blocks) if name not in missing]
+    if fine:
+        yield finding_for("fit.unused", "channels", channels=fine)
+    units = {block.channel: block.course.unit for block in unused.blocks}
+    for name, (rms, known) in missing.items():
+        phrases = {"rms_told": said(rms, units[name]), "known_told": said(known, units[name])}
+        yield finding_for("fit.unused_missed", f"channels.{name}", phrases=phrases, rms=rms, expected=known)
 
 
 def _stands_out(odd: Outstanding) -> Finding:
@@ -168,8 +186,8 @@ def _zeros(judged: Assessment, one: MisfitCause) -> str:
     if one.kind != "shift":
         return ""
     if one.own:
-        odd = _apart(one)[0]
-        return zeros_of_files([conditions[own.condition] for own in odd], [own.size for own in odd])
+        odd = {own.condition: own.size for own in one.own if abs(own.size) > own.expanded}
+        return zeros_of_files(conditions, [odd.get(k, 0.0) for k in range(len(conditions))])
     stated = [condition for condition in conditions if condition.own_zero]
     return zeros_of_files(stated, [one.size] * len(stated)) if len(stated) == len(conditions) else ""
 
@@ -248,9 +266,7 @@ def _speeds(judged: Assessment) -> Iterator[Finding]:
     driver = next(iter(model.run.system.mechanism.drivers), "")
     conditions = judged.found.measurement.conditions
     fitted = dict.fromkeys(block.condition for block in judged.problem.blocks if block.fitted)
-    rows = [(conditions[k].name, conditions[k].speed, model.driven(k, judged.told)[2]) for k in fitted]
-    rows = [row for row in rows if np.isfinite(row[2])]
-    yield from other_speed(driver, rows, len(fitted), speed_unit(driver, conditions))
+    yield from other_speed(driver, [(conditions[k], model.driven(k, judged.told)[2]) for k in fitted])
 
 
 # ---- what is not identifiable ---------------------------------------------------------------------------------

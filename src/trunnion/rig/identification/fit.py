@@ -60,12 +60,14 @@ def sensors_of(
     own: Sequence[str] | None = None,
     delay: float | None = None,
     lags: Mapping[str, float] | None = None,
+    cuts: Sequence[tuple[float, float]] = (),
 ) -> list[SensorError]:
     """Errors of the sensors of all blocks: one for each channel, or of each condition if these have names.
 
     An infinite standard uncertainty says that nothing is known of it. delay: by which a channel may lag behind the
     angle, standard uncertainty, s; none if not given. lags: the same of all channels of each condition together, by
-    its name in the order of the conditions.
+    its name in the order of the conditions. cuts: of each condition that of its angle by readings that may be cut off,
+    rad, and its speed, rad/s; those of one resolution are off alike.
     """
     found: list[SensorError] = []
     for kind in ("zero", "gain"):
@@ -91,6 +93,7 @@ def sensors_of(
         *_of_files(blocks),
         *_late(blocks, delay),
         *_sampled(blocks, lags or {}),
+        *_cut(blocks, cuts),
         *_behind(blocks, own),
     ]
 
@@ -136,6 +139,17 @@ def _sampled(blocks: Sequence[Block], lags: Mapping[str, float]) -> list[SensorE
     return found
 
 
+def _cut(blocks: Sequence[Block], cuts: Sequence[tuple[float, float]]) -> list[SensorError]:
+    """By how much all channels lag since readings of the angle may be cut off: half a step in all files alike."""
+    found = []
+    for size in dict.fromkeys(abs(cut) for cut, _ in cuts if cut):
+        late = [cut / speed if abs(cut) == size and speed else 0.0 for cut, speed in cuts]
+        sizes = tuple(late[one.condition] * (one.turns.shape[1] > 2) for one in blocks)
+        step = np.degrees(size * np.sqrt(12.0))
+        found.append(SensorError(f"angle in steps of {step:.4g} deg", "", "delay", sizes, stated=True))
+    return [one for one in found if any(one.sizes)]
+
+
 def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[SensorError]:
     """Errors of the sensors behind courses that are computed."""
     effects: dict[tuple[str, str, str], list[float]] = {}
@@ -153,7 +167,7 @@ def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[SensorEr
 def _stated(block: Block, kind: str) -> float:
     """What is stated of an error that a channel has in all conditions."""
     accuracy = block.course.accuracy
-    return shared_zero(accuracy) if kind == "zero" else float(accuracy.gain)
+    return float(np.hypot(shared_zero(accuracy), accuracy.cut)) if kind == "zero" else float(accuracy.gain)
 
 
 @dataclass

@@ -14,6 +14,7 @@ from trunnion.rig.identification.identifiability import InseparableUnknowns
 from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.search import Search
 from trunnion.rig.identification.uncertainty import Covariances
+from trunnion.rig.identification.unused import UnusedChannels
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.run import Run
 
@@ -35,6 +36,7 @@ class Identified:
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
     causes: Sequence[MisfitCause] = ()
+    unused: UnusedChannels | None = None
 
     @property
     def x(self) -> Array:

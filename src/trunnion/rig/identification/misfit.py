@@ -19,6 +19,7 @@ from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, SensorError
 from trunnion.rig.identification.search import Search, inside, refined
 from trunnion.rig.identification.uncertainty import Test, lack_of_fit, quantile, spread_of
+from trunnion.rig.identification.unused import UnusedChannels
 
 __all__ = ["MisfitCause", "OwnSize", "explanations"]
 
@@ -92,11 +93,13 @@ class _Refit:
         return any(one.stated and bool(one.group) and abs(x) > BEYOND for one, x in told)
 
 
-def explanations(problem: FitProblem, search: Search, test: Test) -> list[MisfitCause]:
+def explanations(
+    problem: FitProblem, search: Search, test: Test, unused: UnusedChannels | None = None
+) -> list[MisfitCause]:
     """The simplest error that explains most of a misfit, and others that explain as much; empty if none does.
 
     One whose size is 0 within its uncertainty explains nothing; what each condition has by itself is named only where
-    nothing that they share explains as much.
+    nothing that they share explains as much. unused: channels that are not fitted; they may speak against a shift.
     """
     tried = [
         one for one in _candidates(problem, search) if np.isfinite(one.fit.cost) and not one.strange and not one.bounded
@@ -108,7 +111,17 @@ def explanations(problem: FitProblem, search: Search, test: Test) -> list[Misfit
     rows = zip(tried, left, explained, strict=True)
     found = [_cause(one, share) for one, rest, share in rows if share >= ENOUGH and rest <= chance * max(least, 1.0)]
     found = [one for one in found if one.kind == "sign" or abs(one.size) > one.expanded]
+    if unused is not None:
+        found = [one for one in found if one.kind != "shift" or not unused.refute(one.estimates, _ahead(problem, one))]
     return [one for one in found if not one.own] or found
+
+
+def _ahead(problem: FitProblem, one: MisfitCause) -> Array:
+    """By how much a shift says that the angle of each condition is ahead, rad."""
+    found = np.full(len(problem.model.phases), 0.0 if one.own else one.size)
+    for own in one.own:
+        found[own.condition] = own.size
+    return found
 
 
 def _cause(one: _Refit, explains: float) -> MisfitCause:
@@ -257,14 +270,15 @@ def _seen(problem: FitProblem, start: Array, spans: Array, condition: int | None
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
         own = (k for k, one in enumerate(problem.blocks) if one.channel == channel and one.fitted)
         k = next((k for k in own if condition in (None, problem.blocks[k].condition)), None)
-        if k is None or problem.model.measures[channel].turning(problem.model.run.system):
+        if k is None:
             continue
         measured, theirs = problem.blocks[k].mean, problem.said(start, k)[0]
         if np.size(theirs) != len(problem.model.phases[problem.blocks[k].condition]):
             continue
         phase, span = problem.model.phases[problem.blocks[k].condition], spans[problem.blocks[k].condition]
         there = np.isfinite(measured) & np.isfinite(theirs)
-        found = causes(measured[there], theirs[there], phase[there], closed=True)
+        turning = problem.model.measures[channel].turning(problem.model.run.system)
+        found = causes(measured[there], theirs[there], phase[there], closed=True, turning=turning)
         seen += [one._replace(size=one.size * span) for one in found if one.kind == "shift"]
     most = max(seen, key=lambda one: one.explains, default=None)
     return most.size if most is not None and abs(most.size) > FAR else 0.0

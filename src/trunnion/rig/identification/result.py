@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,6 +106,7 @@ VARIABLES = {
         ("parameter",), "1", "singular value of the derivatives with columns scaled to 1, the largest first"
     ),
     "sensor_error": Variable(("sensor",), "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_size": Variable(("sensor",), "of the sensor", "its standard uncertainty as stated; NaN if it differs"),
     "sensor_uncertainty": Variable(("sensor",), "1", "standard uncertainty of that, in those stated"),
     "rms_before": Variable(("channel", "condition"), "of the channel", "root mean square of the residual at the start"),
     "rms_after": Variable(
@@ -178,7 +180,14 @@ def _sensors(judged: Assessment) -> dict[str, Array]:
     return {
         "sensor_error": np.where(lost, np.nan, judged.found.x[n:]),
         "sensor_uncertainty": judged.deviation[n:],
+        "sensor_size": np.array([_size(one.sizes) for one in judged.problem.sensors]),
     }
+
+
+def _size(sizes: Sequence[float]) -> float:
+    """The standard uncertainty of an error where it is one in all blocks that have it."""
+    known = {one for one in sizes if one}
+    return known.pop() if len(known) == 1 else float("nan")
 
 
 def _blocks(judged: Assessment) -> dict[str, Array]:

@@ -23,7 +23,8 @@ from trunnion.rig.identification.signals import Model, SeatedModel
 from trunnion.rig.identification.start_signals import StartModel, check_starts
 from trunnion.rig.identification.uncertainty import left_over, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import check_settings, told_at
+from trunnion.rig.identification.unused import UnusedChannels
+from trunnion.rig.modelled import apart, check_settings, refuse_backwards, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -93,15 +94,22 @@ def identify(
                  friction_method or FrictionMethod())  # fmt: skip
     if measurement.of_starts:
         model = StartModel.of(model, measurement.conditions)
+    unused = UnusedChannels(model, [])
     if channels is None:
-        model, blocks = _telling(model, blocks)
+        model, blocks, unused = _telling(model, blocks)
+    at = np.array([one.start for one in model.unknowns])
+    speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(measurement.conditions)]
+    refuse_backwards(next(iter(stated.drivers), ""), speeds)
     names = [one.name for one in measurement.conditions] if sensors == "condition" else None
     lags = {one.name: one.lag for one in measurement.conditions}
-    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags), guard, progress=progress)
-    return dataset(_solved(stated, measurement, problem, starts))
+    cuts = [(one.cut, one.speed) for one in measurement.conditions]
+    problem = FitProblem(model, blocks, sensors_of(blocks, names, delay, lags, cuts), guard, progress=progress)
+    return dataset(_solved(stated, measurement, problem, starts, unused))
 
 
-def _solved(mechanism: Mechanism, measurement: Measurement, problem: FitProblem, starts: int | None) -> Identified:
+def _solved(
+    mechanism: Mechanism, measurement: Measurement, problem: FitProblem, starts: int | None, unused: UnusedChannels
+) -> Identified:
     """The estimates, what they are worth, and what would explain a misfit."""
     found = search(problem, starts)
     spread = spread_of(problem, found.fit.x)
@@ -110,8 +118,10 @@ def _solved(mechanism: Mechanism, measurement: Measurement, problem: FitProblem,
         found = replace(found, fit=fit(problem, found.fit.x))
         spread = spread_of(problem, found.fit.x)
     groups = inseparable(problem, found.fit.x, spread)
-    causes = explanations(problem, found, spread.test) if spread.test.misfit else []
-    return Identified(mechanism, measurement, problem.model.run, problem, found, spread, groups, causes)
+    speeds = (problem.model.driven(k, found.fit.x[: problem.count])[2] for k in range(len(measurement.conditions)))
+    other = any(apart(one.speed, speed) for one, speed in zip(measurement.conditions, speeds, strict=True))
+    causes = explanations(problem, found, spread.test, unused) if spread.test.misfit and not other else []
+    return Identified(mechanism, measurement, problem.model.run, problem, found, spread, groups, causes, unused)
 
 
 def _check(sensors: str, delay: float | None, guard: int | None, starts: int | None) -> None:
@@ -127,8 +137,8 @@ def _check(sensors: str, delay: float | None, guard: int | None, starts: int | N
         raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
 
 
-def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:
-    """Only the channels that an unknown acts on, as far as the start tells; all if there are none."""
+def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block], UnusedChannels]:
+    """Only the channels that an unknown acts on, as far as the start tells, all if there are none; then the others."""
     courses = model.courses(np.array([one.start for one in model.unknowns]))
     sizes = np.array([one.size or 1.0 for one in model.unknowns])
     moved = dict.fromkeys(model.measures, 0.0)
@@ -138,7 +148,9 @@ def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block]]:
             change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
             moved[name] = max(moved[name], change / most if most else change)
     kept = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
-    return replace(model, measures=kept), [block for block in blocks if block.channel in kept]
+    others = {name: measure for name, measure in model.measures.items() if name not in kept}
+    unused = UnusedChannels(replace(model, measures=others), [one for one in blocks if one.channel in others])
+    return replace(model, measures=kept), [block for block in blocks if block.channel in kept], unused
 
 
 NOTHING = 1e-9  # of a course: what an unknown does to it

@@ -37,7 +37,7 @@ RANDOM = ("scatter", "conditions", "misfit")
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
 UNLIKELY = 0.001  # a chance below which the model is said not to fit
 RARE = 0.01  # one below which conditions are said to disagree
-GROSS = 25.0  # reduced χ² of residuals of five times the scatter
+GROSS = 9.0  # reduced χ² of residuals of three times the scatter
 WORTH = 1.05  # reduced χ² up to which it is not
 
 

@@ -44,13 +44,15 @@ class Coordinate:
     """Coordinate of the driver by row, rad, NaN where it is not known.
 
     spoilt: stretches of time, (stretch, 2), in which it is wrong; lag: standard uncertainty, s, of the time at which it
-    passes a value, in the mean over many pulses; step: of the readings, rad, where it is neither stated nor told of.
+    passes a value, in the mean over many pulses; step: of the readings, rad, where it is neither stated nor told of;
+    cut: standard uncertainty, rad with the sign of the readings, of what all are off by if they are cut off.
     """
 
     values: Array
     spoilt: Array
     lag: float = 0.0
     step: float = 0.0
+    cut: float = 0.0
 
 
 def coordinate(
@@ -74,24 +76,24 @@ def coordinate(
         assert speed is not None
         values = _integrated(speed, line, account)
     step = _unstated(source, values, account)
-    values, lag = _refined(source, values, line, account)
+    values, lag, cut = _refined(source, values, line, account)
     values = source.sign * values
     if index.size > 1 and source.from_ in ("time", "speed"):
         values, spoilt = _tied(values, index, line, account)
     else:
         spoilt = np.empty((0, 2))
         _check_index(values, index, line, account)
-    return Coordinate(values + zero, spoilt, lag, step)
+    return Coordinate(values + zero, spoilt, lag, step, source.sign * cut)
 
 
-def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float]:
+def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float, float]:
     """An angle that is read in steps, between them as the shaft turns; standard uncertainty, s, of what is left.
 
-    Whether a reading is rounded or cut off is not known: all may be off by up to half a step, rectangular.
+    And that, rad, of what all readings may be off by: rounded or cut off, up to half a step, rectangular.
     """
     known = np.flatnonzero(np.isfinite(values))
     if source.resolution is None or known.size < FEWEST:
-        return values, 0.0
+        return values, 0.0, 0.0
     step = float(source.resolution.evaluate())
     raw, seconds = values[known], line.seconds[known]
     speeds = np.abs(np.diff(raw)) / np.diff(seconds)
@@ -103,7 +105,7 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     usual = float(np.median(spans))
     even = f"; it is smoothed over {_turns(usual)}, with which all readings agree" if usual > 0 else ""
     account.say(f"the angle is read in steps of {np.degrees(step):.4g} deg{even}")
-    return refined, math.hypot(unresolved((raw - smooth)[spans > 0], step), step / math.sqrt(12.0)) / rate
+    return refined, unresolved((raw - smooth)[spans > 0], step) / rate, step / math.sqrt(12.0)
 
 
 def _unstated(source: AngleSource, values: Array, account: Account) -> float:

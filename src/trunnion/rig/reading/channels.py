@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ __all__ = [
     "Zeroed",
     "filtered",
     "mean_uncertainty",
+    "noise_of",
     "read_in",
     "reading",
     "resolution",
@@ -33,7 +35,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LOOKED_AT = 50_000  # readings of which the step is told
 MOST = 1e100  # SI units that a reading of 1 may mean
-LEVELS = 8  # of readings, from which they tell a step
+FEWEST_LEVELS = 5  # of readings, from which they tell the step of a converter
+LEVELS = 8  # from which they tell it though some are left out, or the last decimal
+DECIMALS = 10  # looked for
+EXACT = 1e9  # below which a float tells whole numbers from others to 1e-6
 BRIDGED = 0.1  # of the period of the cut-off: gaps up to this are bridged for the filter
 
 
@@ -52,13 +57,14 @@ class Zeroed:
 
 @dataclass(frozen=True)
 class ChannelReading:
-    """A channel's scale, and its limits in readings."""
+    """A channel's scale, and its limits in readings. resolution: step that is stated, in readings, 0 if none is."""
 
     scale: SensorScale
     unit: str
     limit: float | None
     accuracy_zero: float
     accuracy_gain: float
+    resolution: float = 0.0
 
     def quantity(self, readings: Array, zero: Zeroed, sign: int, seconds: Array) -> Array:
         """What the readings measure, SI."""
@@ -90,7 +96,8 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Ch
             raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain", file=account.file))
         limit = found.reading(channel.range, "range") if channel.range else None
         zero = abs(found.factor) * found.reading(channel.accuracy.zero, "accuracy.zero")
-        return ChannelReading(found, unit, limit, zero, float(channel.accuracy.gain.evaluate()))
+        step = found.reading(channel.resolution, "resolution") if channel.resolution else 0.0
+        return ChannelReading(found, unit, limit, zero, float(channel.accuracy.gain.evaluate()), step)
     except UnitError as error:
         remedy = error.remedy
         if not channel.unit and column.unit:  # a file of a logger is not written anew
@@ -260,18 +267,36 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
 
 
 def resolution(readings: Array) -> float:
-    """Step from one reading to the next, in readings; 0 where there is none, or noise carries the readings over it.
+    """Step of which all readings are multiples, in readings; 0 where there is none.
 
-    Of readings that are all multiples of a step apart, of which noise from sample to sample is less than half a step.
-    A few levels are a signal that is switched, not the steps of a converter: of these many are one step apart.
+    The least distance between two levels, if it is one, else the last decimal. Of few levels, of which not most are one
+    step apart, it is none: a signal that is switched has no steps.
     """
-    part = readings[np.isfinite(readings)][:LOOKED_AT]
-    levels = np.unique(part)
-    if levels.size < LEVELS or levels.size > part.size / 4:
+    levels = np.unique(readings[np.isfinite(readings)][:LOOKED_AT])
+    if levels.size < FEWEST_LEVELS:
         return 0.0
     apart = np.diff(levels)
-    step = float(apart[apart > 1e-9 * float(np.ptp(levels))].min())
-    whole = apart / step
-    noise = float(np.mean(np.abs(np.diff(part)))) / 1.128  # of normal deviates |a − b| is 2σ/√π in the mean
-    adjacent = np.mean(np.rint(whole) == 1) > 0.5
-    return step if adjacent and np.all(np.abs(whole - np.rint(whole)) < 0.01) and noise < step / 2 else 0.0
+    apart = apart[apart > 1e-9 * float(np.ptp(levels))]
+    step = float(apart.min())
+    whole = np.rint(apart / step)
+    few = levels.size < LEVELS
+    if np.all(np.abs(apart / step - whole) < 0.01) and not (few and np.mean(whole == 1) <= 0.5):
+        return step
+    if few:
+        return 0.0
+    for k in range(DECIMALS):
+        scaled = levels * 10.0**k
+        if np.max(np.abs(scaled)) < EXACT and np.all(np.abs(scaled - np.rint(scaled)) < 1e-6):
+            return float(10.0**-k)
+    return 0.0
+
+
+def noise_of(readings: Array) -> float:
+    """Standard deviation of what is white in readings: the least that differences of first to third order tell.
+
+    The mean of |Δᵏ| of normal deviates is σ √(2/π) √C(2k, k). A course makes the lower orders larger, noise none.
+    """
+    part = readings[np.isfinite(readings)][:LOOKED_AT]
+    if part.size <= 3:
+        return 0.0
+    return float(min(np.mean(np.abs(np.diff(part, k))) / np.sqrt(2 / np.pi * comb(2 * k, k)) for k in (1, 2, 3)))

@@ -15,7 +15,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
 from trunnion.rig.reading.clock import Clock, is_time
 
-__all__ = ["NOTHING", "SHOWN", "Column", "DataTable", "choose", "clock_of", "failed", "number", "numbers"]
+__all__ = ["NOTHING", "SHOWN", "Column", "DataTable", "choose", "clock_of", "failed", "number", "numbers", "of_text"]
 
 
 Array = NDArray[np.float64]
@@ -109,6 +109,27 @@ def numbers(cells: Any, decimal: str = ".") -> tuple[Array, int, str]:
         if np.isnan(values[place]) and isinstance(text, str) and text.casefold() not in NOTHING:
             texts, example = texts + 1, example or str(cell).strip()[:40]
     return values, texts, example
+
+
+def of_text(where: str, table: DataTable, name: str) -> Finding | None:
+    """An error of a column most of whose cells are text, and no times; where: the entry that names it."""
+    column = table.columns[name]
+    numbers = int(np.count_nonzero(~np.isnan(column.values)))
+    if column.clock is not None or column.texts <= numbers:
+        return None
+    what = (
+        f"'{name}' has text in {column.texts:,} cells and a number in {numbers:,}; the first text is '{column.example}'"
+    )
+    unit = _WITH_UNIT.fullmatch(column.example)
+    remedy = "name a column of numbers"
+    if unit:
+        key = f"{where.removesuffix('column')}unit"
+        remedy = f"remove the unit from the cells; state {key}: {unit[1]} if the heading has none"
+    figures = {"texts": column.texts, "numbers": numbers}
+    return Finding(what, where, remedy, file=table.file, code="data.readings.text", figures=figures)
+
+
+_WITH_UNIT = re.compile(r"[-+−]?\d[\d.,'’ ]*(?:[eE][-+]?\d+)?\s*([^\d\s.,;:][^\d;:]*)")
 
 
 GROUPED = {  # thousands with a sign between them; of a point or a comma only where decimals tell which of them it is

@@ -112,7 +112,7 @@ def signal(
         return
     wide = max(high - low, 1e-300)
     if limit is not None:
-        _clipped(where, part, time, limit, account)
+        _clipped(where, part, time, limit, span.unit or "in the unit of the readings", account)
     _zeros(where, part, time, wide, span, account)
     _stuck(where, part, time, span, account)
     _plateaus(where, part, time, wide, span, limit, account)
@@ -154,14 +154,14 @@ def _recurring(phase: Array) -> Mask:
     return own
 
 
-def _clipped(where: str, part: Array, time: Array, limit: float, account: Account) -> None:
+def _clipped(where: str, part: Array, time: Array, limit: float, unit: str, account: Account) -> None:
     mask = np.abs(part) >= CLIP * limit
     count, finite = int(np.count_nonzero(mask)), int(np.count_nonzero(np.isfinite(part)))
     if count > MOST * finite:  # what is left says nothing of the channel
-        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of the range of {limit:.6g}"
+        end = f"the end of the range of {limit:.6g} {unit}"
+        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond {end}"
         figures = {"count": count, "readings": finite}
         remedy = "check unit, gain and range of the channel in the mapping; else use a larger range"
-        what = f"{what} in the unit of the readings"
         raise MechanismError(
             Finding(what, where, remedy, file=account.file, code="data.readings.clipped", figures=figures)
         )

@@ -35,7 +35,8 @@ Sign = Literal[1, -1]
 
 
 class FromData(Part):
-    """A value that the data tell: the mean of a channel over the turns, or a column that states it."""
+    """A value that the data tell: the mean of a channel over the turns, of the speed by the angle with `mean: angle`
+    where no channel has that name, or a column that states it."""
 
     mean: str | None = None
     column: str | None = None
@@ -203,12 +204,15 @@ class Channel(Part):
     sign: Sign = 1
     zero: ChannelZero = Amount(0.0, 0.0, "", {})
     range: Number | None = None
+    resolution: Number | None = None
     accuracy: Accuracies = Accuracies()
 
     @model_validator(mode="after")
     def _fitting(self) -> Channel:
         if self.range is not None and self.range.value <= 0:
             raise problem("the range is not above zero", "write the full scale, such as 100 N m")
+        if self.resolution is not None and self.resolution.value <= 0:
+            raise problem("the resolution is not above zero", "write the step of the readings, such as 0.1 deg")
         if self.unit is not None:
             self.scale(self.unit)
         return self
@@ -217,7 +221,8 @@ class Channel(Part):
         """How readings in a unit become the quantity; an error of pydantic if they cannot."""
         try:
             found = scale(self.measures, unit, self.gain)
-            for key, amount in (("zero", self.zero), ("range", self.range), ("accuracy.zero", self.accuracy.zero)):
+            stated = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
+            for key, amount in {**stated, "accuracy.zero": self.accuracy.zero}.items():
                 if isinstance(amount, Amount):
                     found.reading(amount, key)
         except UnitError as error:
@@ -232,6 +237,7 @@ class FileChannel(Part):
     gain: Number | None = None
     zero: ChannelZero | None = None
     range: Number | None = None
+    resolution: Number | None = None
     accuracy: Accuracies | None = None
 
     def of(self, channel: Channel) -> Channel:

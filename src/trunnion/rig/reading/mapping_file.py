@@ -76,8 +76,9 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
     for key, file in _entries(mapping):
         settings |= {f"{key}.set.{name}": value for name, value in file.set.items()}
     for where, value in settings.items():
-        if isinstance(value, FromData) and value.mean is not None and value.mean not in channels:
-            yield Finding(f"there is no channel '{value.mean}'", f"{where}.mean", nearest(value.mean, channels))
+        known = [*channels, *(["angle"] if mapping.angle else [])]  # the mean speed by the angle
+        if isinstance(value, FromData) and value.mean is not None and value.mean not in known:
+            yield Finding(f"there is no channel '{value.mean}'", f"{where}.mean", nearest(value.mean, known))
     yield from _check_cycle(mapping)
     for key, file in _entries(mapping):
         if file.angle is not None and mapping.angle is None:

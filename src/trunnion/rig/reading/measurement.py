@@ -5,13 +5,15 @@ Everything is SI. A measurement has conditions, a condition has courses, a cours
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ from trunnion.results.dataset import Variable, dataset_of, described
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "dataset", "zeros_of_files"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset", "zeros_of_files"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -46,7 +48,8 @@ class Accuracy:
     zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
-    of `zero` is the same in all files. stated: of a value of one start, by itself.
+    of `zero` is the same in all files. stated: of a value of one start, by itself. cut: of what all readings are off by
+    alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`.
     """
 
     zero: float = 0.0
@@ -54,6 +57,7 @@ class Accuracy:
     resolution: float = 0.0
     own: float = 0.0
     stated: float = 0.0
+    cut: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -92,9 +96,7 @@ class Signal:
     @cached_property
     def scatter(self) -> Array:
         """Standard deviation between turns, (position,); NaN with fewer than two."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)
-            return np.asarray(np.nanstd(self.turns, axis=0, ddof=1))
+        return between_turns(self.turns)
 
     @cached_property
     def unresolved(self) -> float:
@@ -117,7 +119,7 @@ class Signal:
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
         repeated = np.where((self.count == 1) & (self.accuracy.stated > 0), 0.0, repeated)
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
-            known = np.square(self.accuracy.zero) + np.square(self.unresolved)
+            known = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
             return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2))
 
 
@@ -129,10 +131,11 @@ class Condition:
     phase: (position,), share of the cycle from the start of the model's, in [0, 1); files: where it comes from;
     speed: of the driver, mean over the turns, rad/s, below zero where its coordinate falls; NaN if the cycle is a time.
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
-    lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses.
+    lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses;
+    cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
     duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
-    known; own_zero: whether its file states it, in place of the zero that all share.
+    known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
     of_start: whether it is no cycle but a motion from its start, of which `duration` is what is followed, s, NaN for
     what the model states; its turns are repetitions, its phases shares of that duration.
     """
@@ -146,27 +149,51 @@ class Condition:
     start: float = float("nan")
     cycle: float = float("nan")
     lag: float = 0.0
+    cut: float = 0.0
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
     duration: float = float("nan")
     zero: float = float("nan")
     own_zero: bool = False
+    entry: Mapping[str, Any] = field(default_factory=dict)
     of_start: bool = False
 
 
+def between_turns(turns: Array) -> Array:
+    """Standard deviation between turns, (position,) of (turn, position); NaN with fewer than two."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.asarray(np.nanstd(turns, axis=0, ddof=1))
+
+
 def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:
-    """Entries of a mapping that correct the zero of the angle file by file; empty where it is not known of each.
+    """`files` of a mapping, each entry whole, with the zeros of the angle corrected; empty where one is not known.
 
     ahead: rad, to be added to the zero of each condition.
     """
-    rows = {one.files[0]: one.zero + size for one, size in zip(conditions, ahead, strict=True) if one.files}
-    if len(rows) != len(conditions) or not all(math.isfinite(one) for one in rows.values()):
+    rows = {one.files[0]: (one, one.zero + size) for one, size in zip(conditions, ahead, strict=True) if one.files}
+    if len(rows) != len(conditions) or not all(math.isfinite(zero) for _, zero in rows.values()):
         return ""
-    told = [f"{{file: {Path(name).name}, angle: {{zero: {round(math.degrees(zero), 2) + 0.0:.6g} deg}}}}"
-            for name, zero in rows.items()]  # fmt: skip
+    told = []
+    for name, (one, zero) in rows.items():
+        own = {**one.entry, "angle": {"zero": f"{round(math.degrees(zero), 2) + 0.0:.6g} deg"}}
+        order = {"file": own.get("file", Path(name).name), "angle": own.pop("angle"), **own}
+        told.append(flow(order))
     return ", ".join(told[:MOST_FILES]) + (", …" if len(told) > MOST_FILES else "")
 
 
-MOST_FILES = 3  # named in a remedy
+def flow(value: object) -> str:
+    """A part of a mapping in one line, as it is written there."""
+    if isinstance(value, Mapping):
+        if "source" in value:  # a number with its unit
+            return str(value["source"])
+        return f"{{{', '.join(f'{key}: {flow(one)}' for key, one in value.items())}}}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(flow, value))}]"
+    text = str(value)
+    return json.dumps(text, ensure_ascii=False) if re.search(r"[,:#{}\[\]\"']", text) else text
+
+
+MOST_FILES = 20  # named in a remedy
 
 
 @dataclass(frozen=True)

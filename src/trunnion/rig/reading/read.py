@@ -15,14 +15,26 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
 from trunnion.rig.reading.angle_steps import tell_slopes
-from trunnion.rig.reading.channels import ChannelReading, Zeroed, filtered, read_in, reading, resolution, shown, zeroed
-from trunnion.rig.reading.columns import DataTable
-from trunnion.rig.reading.log import Account, counted, told
+from trunnion.rig.reading.channels import (
+    ChannelReading,
+    Zeroed,
+    filtered,
+    noise_of,
+    read_in,
+    reading,
+    resolution,
+    shown,
+    zeroed,
+)
+from trunnion.rig.reading.columns import DataTable, of_text
+from trunnion.rig.reading.files_named import files_of, unused_zero
+from trunnion.rig.reading.log import Account, counted, few_digits, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
-from trunnion.rig.reading.mapping_file import Mapped, read_mapping
-from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
+from trunnion.rig.reading.mapping_file import read_mapping
+from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
+from trunnion.rig.reading.sensor_quantity import dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
-from trunnion.rig.reading.signal_checks import Drift, drift, signs, speeds, steady
+from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
 from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
@@ -34,6 +46,8 @@ __all__ = ["read_measured"]
 Array = NDArray[np.float64]
 FEW_HARMONICS = 5.0
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
+SAME = 1e-3  # of a step: turns that scatter less read the same
+PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
 
 
@@ -50,7 +64,7 @@ def read_measured(
     findings: list[Finding] = []
     accounts: list[Account] = []
     failed = False
-    entries, notes = _files(mapped, files)
+    entries, notes = files_of(mapped, files)
     for path, entry in entries:
         account = Account(str(path))
         try:
@@ -63,7 +77,7 @@ def read_measured(
         accounts.append(account)
     starts = [(k, one) for k, one in enumerate(mapped.mapping.starts) if not one.file]
     conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
-    findings = mapped.placed([*findings, *notes, *_unused_zero(mapped, [entry for _, entry in entries])])
+    findings = mapped.placed([*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])])
     if failed or not conditions:
         raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
     name = mapped.mapping.name or Path(mapped.file).stem
@@ -97,77 +111,6 @@ def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> s
     elif lost:
         where += f", {lost:,} more left out as the findings say"
     return f"{each} whole turns{where}; rows before, between and after them are not used"
-
-
-def _files(
-    mapped: Mapped, files: Iterable[str | os.PathLike[str]] | None
-) -> tuple[list[tuple[Path, File]], list[Finding]]:
-    """Data files with what the mapping says of them; notes of what is kept of it, or lost, where it names other files.
-
-    Files of the command line keep the entry of the same file; what was set also that of the same name, where one entry
-    alone has it. A stretch of time is that of one recording.
-    """
-    entries = mapped.mapping.files
-    named = [Path(one) for one in files or ()]
-    if mapped.mapping.starts and named:
-        what = "the mapping states starts, each with the file that it was recorded in"
-        raise MechanismError(mapped.placed([Finding(what, "starts", "name the files there")]))
-    if mapped.mapping.starts:
-        return [(mapped.folder / one.file, one) for one in mapped.mapping.starts if one.file], []
-    if not named and not entries:
-        finding = Finding(
-            "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"
-        )
-        raise MechanismError(mapped.placed([finding]))
-    if not named:
-        return [(mapped.folder / entry.file, entry) for entry in entries], []
-    stated = {(mapped.folder / one.file).resolve(): one for one in entries}
-    own, other = [one.name for one in named], [Path(one.file).name for one in entries]
-    found: list[tuple[Path, File]] = []
-    kept: list[Path] = []
-    lost: dict[str, list[Path]] = {}
-    for path in named:
-        entry = stated.get(path.resolve())
-        if entry is None:
-            alike = own.count(path.name) == 1 == other.count(path.name)
-            like = entries[other.index(path.name)] if alike else None
-            entry = File(file=path.name or ".", set=like.set if like else {})
-            kept += [path] if entry.set else []
-            missing = _says(*([like.model_copy(update={"set": {}})] if like else entries))
-            lost.setdefault(missing, []).append(path)
-        found.append((path, entry))
-    notes = []
-    if kept:
-        what = f"{_some(kept)} read with the `set` of the file of that name in the mapping"
-        notes.append(
-            Finding(what, "files", "rename the file if something else was set", Severity.NOTE, code="data.files.set")
-        )
-    for missing, paths in lost.items():
-        what = f"{_some(paths)} read without {missing}, which the mapping states for other files"
-        remedy = f"add {{file: {paths[0].name}, {missing.split('`')[1]}: …}} to `files`" if missing else ""
-        notes += [Finding(what, "files", remedy, Severity.NOTE, code="data.files.less")] if missing else []
-    return found, notes
-
-
-def _unused_zero(mapped: Mapped, entries: Sequence[File]) -> list[Finding]:
-    """A note of a zero of the angle that nothing takes, as every file states its own."""
-    angle = mapped.mapping.angle
-    if angle is None or "zero" not in angle.model_fields_set or not all(entry.angle for entry in entries):
-        return []
-    what = "is not used: every file states a zero of its own, in place of it"
-    remedy = "remove it, or add it to each zero in files: angle: {zero: …}"
-    return [Finding(what, "angle.zero", remedy, Severity.NOTE, code="data.angle.zero_unused")]
-
-
-def _says(*entries: File) -> str:
-    """What entries state of their files."""
-    keys = ("set", "over", "angle", "channels")
-    return " and ".join(f"`{key}`" for key in keys if any(getattr(one, key) for one in entries))
-
-
-def _some(paths: Sequence[Path]) -> str:
-    told = ", ".join(str(one) for one in paths[:4]) + (f" and {len(paths) - 4} more" if len(paths) > 4 else "")
-    return f"{told} {'is' if len(paths) == 1 else 'are'}"
 
 
 def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
@@ -211,7 +154,7 @@ class _File:
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
-        self.lag, self.step = 0.0, 0.0
+        self.lag, self.step, self.cut = 0.0, 0.0, 0.0
         self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.steps: dict[str, float] = {}
@@ -256,9 +199,10 @@ class _File:
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
-            told = signs(mapping.channels, whole, turning, account)
-            units = {name: shown(own) for name, own in self.own.items()}
-            speeds(mapping.channels, whole, units, turning, told, account)
+            if not backwards(mapping.channels, [part.setting.values for part in parts], turning, account):
+                told = signs(mapping.channels, whole, turning, account)
+                units = {name: shown(own) for name, own in self.own.items()}
+                speeds(mapping.channels, whole, units, turning, told, account)
         found = [self._condition(part, zeros, drifts, way) for part in parts]
         self._check_steps(found)
         return found
@@ -295,7 +239,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.step, self.angle = found.lag, found.step, found.values
+        self.lag, self.step, self.cut, self.angle = found.lag, found.step, found.cut, found.values
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"
@@ -391,7 +335,7 @@ class _File:
         start, cycle = float(mapping.start.evaluate()), float(mapping.cycle.evaluate())
         span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit)
         readings = self.readings.pop(name)
-        self.steps[name] = abs(own.scale.factor) * resolution(readings[low:high])
+        step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
         speed = channel.measures.startswith("rate:")
         faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
         values = own.quantity(readings, zero, channel.sign, line.seconds)
@@ -399,6 +343,18 @@ class _File:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
             part.courses[name] = resampled(part.turns, values)
+        scatters = [float(np.median(between_turns(part.courses[name]))) / abs(own.scale.factor) for part in parts]
+        if mapping.filter is None:
+            rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
+            noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
+        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over the steps
+        if step and max(scatters) < SAME * step:
+            unit, size = shown(own)
+            told = f"{few_digits(abs(own.scale.factor) * step / size)} {unit}".replace(" °", "°")
+            what = (
+                f"reads the same in every turn, in steps of {told}: its uncertainty is that of the step, not of scatter"
+            )
+            account.note("data.turns.same", where, what, "sample at a rate that is no multiple of the turns")
         if speed:  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
@@ -437,9 +393,15 @@ class _File:
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            courses[name] = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
+            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
+            cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
+            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
+        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         for path, channel_name in part.setting.means.items():
+            if channel_name not in courses:  # of the angle
+                values[path], known_as[path] = speed, dimension_of(dimensions("rad/s")[1], "rad/s")
+                continue
             turns = courses[channel_name].turns
             if not np.isfinite(turns).any():
                 what = f"the channel '{channel_name}', whose mean it is, has no value in any turn"
@@ -449,7 +411,6 @@ class _File:
             values[path] = time_mean(part.turns, turns)
             known_as[path] = dimension_of(self.own[channel_name].scale.of_quantity, courses[channel_name].unit)
         positions = self.mapping.positions
-        speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         name = self._named(part.setting)
         timed = self.mapping.timed
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
@@ -457,9 +418,9 @@ class _File:
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
         found = Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
-            lag=self.lag, dimensions=known_as, duration=duration,
+            lag=self.lag, cut=self.cut, dimensions=known_as, duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
-            own_zero=self.entry.angle is not None,
+            own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip
         return with_values(found, self.entry) if isinstance(self.entry, Start) else found
 
@@ -481,11 +442,15 @@ def _table(path: Path, mapping: DataMapping, entry: File) -> DataTable:
     own = "time.column" if path.suffix.lower() == ".tdms" else ""  # which may tell its time by itself
     wanted = [column for where, column in named.items() if where != own]
     try:
-        return read_table(path, wanted, [named[own]] if own in named else [])
+        table = read_table(path, wanted, [named[own]] if own in named else [])
     except MechanismError as error:
         told = error.findings[0].what.partition(";")[0] if "there is no column" in error.findings[0].what else ""
         where = ", ".join(key for key, column in named.items() if f"'{column}'" in told)
         raise MechanismError([replace(one, where=where) for one in error.findings]) from None
+    texts = (of_text(where, table, column) for where, column in named.items() if where != "time.column")
+    if findings := [one for one in texts if one is not None]:
+        raise MechanismError(findings)
+    return table
 
 
 def _columns(mapping: DataMapping, entry: File) -> dict[str, str]:

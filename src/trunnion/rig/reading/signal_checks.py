@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.errors import Finding
+from trunnion.model.names import as_key
 from trunnion.rig.reading.log import Account, counted
 from trunnion.rig.reading.mapping import Channel
 from trunnion.rig.reading.turns import Turns, turn_means
 
-__all__ = ["Drift", "drift", "signs", "speeds", "steady"]
+__all__ = ["Drift", "backward_finding", "backwards", "drift", "signs", "speeds", "steady"]
 
 Array = NDArray[np.float64]
+RPM = np.pi / 30
 STEADY = 0.03  # of the mean speed, between the slowest and the fastest turn
 CERTAIN = 6.0  # standard errors from which a slope is one
 PLAIN = 3.0  # times what turns scatter about the line, that a drift amounts to
@@ -138,6 +141,29 @@ def signs(
             account.warn("data.power.sign", f"channels.{key}", what, remedy)
             suspects.append(key)
     return suspects
+
+
+def backwards(
+    channels: Mapping[str, Channel], values: Sequence[Mapping[str, float]], turning: float, account: Account
+) -> bool:
+    """Tell where the angle turns the other way than a driver whose speed is set; turning: by the angle, rad/s."""
+    drivers = {name for one in channels.values() for kind, _, name in [one.measures.partition(":")] if kind == "effort"}
+    stated = {name: row[f"{name}.speed"] for row in values for name in drivers if f"{name}.speed" in row}
+    for name, speed in stated.items():
+        if len(drivers) == 1 and speed * turning < 0:
+            account.findings.append(backward_finding(name, turning, speed, account.file))
+            return True
+    return False
+
+
+def backward_finding(driver: str, measured: float, stated: float, file: str = "") -> Finding:
+    """An error of an angle that runs against the driver; speeds in rad/s."""
+    what = f"the angle runs backwards: {measured / RPM:.4g} rpm measured, {stated / RPM:.4g} rpm stated of {driver}"
+    remedy = (
+        f"add sign: -1 to angle:, or remove it there; set {as_key(f'{driver}.speed')} below zero if it does turn so"
+    )
+    figures = {"measured": measured, "stated": stated, "driver": driver}
+    return Finding(what, "angle", remedy, file=file, code="data.angle.backwards", figures=figures)
 
 
 def speeds(

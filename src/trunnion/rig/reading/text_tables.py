@@ -24,7 +24,17 @@ import numpy as np
 from trunnion.model.names import unguarded
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.clock import Clock, is_time
-from trunnion.rig.reading.columns import NOTHING, Column, DataTable, choose, clock_of, failed, number, numbers
+from trunnion.rig.reading.columns import (
+    NOTHING,
+    Column,
+    DataTable,
+    choose,
+    clock_of,
+    failed,
+    number,
+    numbers,
+    ungrouped,
+)
 from trunnion.rig.reading.sensor_quantity import dimensions
 
 __all__ = ["read_csv"]
@@ -195,7 +205,11 @@ def _layout(path: Path, wanted: set[str]) -> _Layout:
         if hits > max(best, 0) or best < 0:
             best, header, cells, separator = hits, order, found, sign
     named = [_named(cell, wanted) for cell in cells]
-    if all(not np.isnan(number(name)) for name, _ in named if name):
+    if best == 0 and sum(bool(name) for name, _ in named) < len(wanted):
+        first = " / ".join(line.strip()[:60] for _, line in stated[:3])
+        what = f"no line has the columns {', '.join(map(repr, sorted(wanted)))}; the first lines are: {first}"
+        raise failed(path, what, "write the names of the columns above the numbers, or name another file", 1)
+    if all(not np.isnan(number(ungrouped(name, ","))) for name, _ in named if name):
         first = ", ".join(cells[:4])
         remedy = "write the names of the columns in the first line, such as t [s],T1 [V]"
         raise failed(path, f"has no header: its first line is {first}", remedy, stated[header][0] + 1)

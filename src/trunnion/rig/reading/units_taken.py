@@ -14,6 +14,7 @@ USUAL = (
     "rad/s", "deg/s", "m/s", "mm/s", "km/h", "ft/s", "in/s", "deg", "rad", "mm", "cm", "m", "in", "ft",
 )  # fmt: skip
 NEAR = 0.03  # of a ratio: the model beside the data need not be right
+WIDE, THOUSAND = 0.5, 100.0  # the same of a ratio from which on friction or a load explains none
 APART = 0.1  # from 1: nearer, a gain is that of a sensor
 
 
@@ -30,6 +31,7 @@ def read_as(gains: Sequence[float], unit: str, size: float) -> str:
         factor, own = dimensions(other)
         if alike(own, taken) and abs(size / factor - 1) > APART:
             ratio = size / factor
-            if all(abs(gain / ratio - 1) <= NEAR for gain in gains):
+            near = WIDE if not 1 / THOUSAND < ratio < THOUSAND else NEAR
+            if all(abs(gain / ratio - 1) <= near for gain in gains):
                 return f"near {ratio:.4g}, as of {other} read as {unit}"
     return ""

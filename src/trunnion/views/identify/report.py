@@ -82,11 +82,14 @@ def _facts(result: xr.Dataset) -> list[tuple[str, str]]:
 
 def _summary(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """The first estimates, and whether the model fits."""
-    rows = [(one.short, [_told(one)]) for one in estimates(result)[:3]]
+    rows = [(one.short, [_told(one)]) for one in estimates(result)[:MOST_TILES]]
     chi = float(result["reduced_chi_squared"])
     if np.isfinite(chi):
         rows.append(("reduced χ²", [(number(chi, 3), "near 1 if the model fits")]))
     return rows
+
+
+MOST_TILES = 8
 
 
 def _told(one: Any) -> tuple[str, str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.quantities import prefixed
+from trunnion.rig.identification.number_text import amount
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
 from trunnion.views.identify.identification import Estimate, channels, conditions, estimates, percent
@@ -21,7 +22,7 @@ __all__ = ["budget", "correlations", "estimated", "fits", "held_out", "sensors",
 
 def tables(result: xr.Dataset) -> list[TextTable]:
     """What was found, how it hangs together, how the model fits, and what was held out."""
-    found = [estimated(result), correlations(result), fits(result), held_out(result)]
+    found = [estimated(result), correlations(result), fits(result), held_out(result), sensors(result)]
     return [one for one in found if one is not None]
 
 
@@ -127,18 +128,23 @@ def held_out(result: xr.Dataset) -> TextTable | None:
 
 def sensors(result: xr.Dataset) -> TextTable | None:
     """Estimated errors of the sensors, in what is stated of them."""
-    rows = [
-        [name, f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not identifiable"]
-        for name, error, u in zip(
-            names(result, "sensor"), result["sensor_error"].values, result["sensor_uncertainty"].values, strict=True
-        )
-        if not name.startswith("zero of each file")  # as many as there are files
-    ]
-    return (
-        TextTable("errors of the sensors", ["", "in units of its stated standard uncertainty, ± 2 u"], rows)
-        if rows
-        else None
-    )
+    units = {name: unit for _, name, unit in channels(result)}
+    columns = (result[key].values for key in ("sensor_error", "sensor_uncertainty", "sensor_size"))
+    rows = []
+    for name, error, u, size in zip(names(result, "sensor"), *columns, strict=True):
+        if name.startswith(("zero of each file", "angle of each condition")):  # as many as there are files
+            continue
+        kind, _, channel = name.partition(" of ")
+        unit = {"zero": units.get(channel.partition(" in ")[0], "")}.get(kind, "%" if kind == "gain" else "")
+        factor = size * (100.0 if unit == "%" else 1.0)
+        known = math.isfinite(error) and math.isfinite(factor) and bool(unit)
+        rows.append([
+            name,
+            amount(error * factor, 2 * u * factor, unit).replace("-", "−") if known else "—",
+            f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not identifiable",
+        ])  # fmt: skip
+    head = ["", "estimate ± 2 u", "in units of its stated standard uncertainty"]
+    return TextTable("errors of the sensors", head, rows) if rows else None
 
 
 def budget(result: xr.Dataset) -> TextTable | None:

@@ -1,0 +1,116 @@
+"""Readings in steps, sampled in step with the turn: every turn reads the same, and no scatter tells the uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import trunnion
+from measured_data.four_bar import FOUR_BAR, rocker
+from trunnion.errors import MechanismError
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.reading.read import read_measured
+
+Array = NDArray[np.float64]
+
+
+def recorded(
+    folder: Path, values: Array, decimals: int, changes: Mapping[str, Any] | None = None, **channel: Any
+) -> Measurement:
+    """`values`, deg, of a turn that all twelve repeat, or (turn, sample), at 60 rpm."""
+    count, turns, rpm = values.shape[-1], 12, 60.0
+    rows = np.resize(np.broadcast_to(values, (turns, count)).ravel(), (turns + 1) * count)
+    time = np.arange(rows.size) / count * 60 / rpm
+    angle = 360 * (np.arange(rows.size) % count) / count
+    lines = [f"{t:.6f};{a:.6f};{row:.{decimals}f}" for t, a, row in zip(time, angle, rows, strict=True)]
+    (folder / "a.csv").write_text("\n".join(["t;Winkel;psi", *lines]))
+    mapping = {
+        "trunnion-data": 1,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "Winkel", "unit": "deg"},
+        "channels": {"psi": {"column": "psi", "measures": "rotation:D", "unit": "deg", **channel}},
+        "set": {"A.speed": f"{rpm} rpm"},
+        **(changes or {}),
+    }
+    return read_measured(mapping, [folder / "a.csv"])
+
+
+TURN = np.radians(360 * np.arange(1000) / 1000)
+
+
+@pytest.mark.parametrize("samples", [20, 200, 1000, 4000])
+@pytest.mark.parametrize("step", [0.001, 0.1, 0.5, 2.0, 20 / 2**7])
+def test_steps_count_where_turns_repeat(tmp_path: Path, step: float, samples: int) -> None:
+    """Each reading is off by what is rounded, all by what may be cut off: step/√12 each (GUM F.2.2.1)."""
+    true = np.degrees(rocker(TURN[:: 1000 // samples] if samples <= 1000 else np.arange(4000) * np.pi / 2000))
+    found = recorded(tmp_path, np.floor(true / step) * step, 6)
+    course = found.conditions[0].courses["psi"]
+    levels = np.unique(np.floor(true / step)).size  # of few that lie apart, the last decimal is known alone
+    told = course.accuracy.resolution / np.radians(step)
+    assert told == pytest.approx(1.0, rel=1e-3) or (samples == 20 and told <= 1.001 and levels < 30)
+    if samples > 20:
+        assert np.median(course.scatter) < 1e-3 * np.radians(step)
+        assert np.median(course.uncertainty) == pytest.approx(np.radians(step) / np.sqrt(6.0), rel=1e-3)
+        assert [one.where for one in found.findings if one.code == "data.turns.same"] == ["channels.psi"]
+
+
+def test_noise_that_carries_readings_over_the_steps_is_what_counts(tmp_path: Path) -> None:
+    random = np.random.default_rng(1)
+    noisy = np.degrees(rocker(TURN)) + random.normal(0, 0.1, (12, 1000))
+    course = recorded(tmp_path, np.rint(10 * noisy) / 10, 1).conditions[0].courses["psi"]
+    assert course.accuracy.resolution == course.accuracy.cut == 0
+    assert np.median(course.uncertainty) == pytest.approx(np.radians(0.1) / np.sqrt(12), rel=0.3)
+
+
+def test_a_resolution_that_is_stated_is_taken(tmp_path: Path) -> None:
+    values = np.degrees(rocker(TURN))
+    course = recorded(tmp_path, values, 6, resolution="0.2 deg").conditions[0].courses["psi"]
+    assert course.uncertainty == pytest.approx(np.radians(0.2) / np.sqrt(6.0), rel=1e-3)
+    with pytest.raises(MechanismError, match="the resolution is not above zero"):
+        recorded(tmp_path, values, 6, resolution=0)
+
+
+def test_an_angle_that_is_cut_off_does_not_speak_against_the_model(tmp_path: Path) -> None:
+    """The rocker is 85 mm, the model says 86: its length is found, and the model with it agrees."""
+    data = recorded(tmp_path, np.floor(10 * np.degrees(rocker(TURN[::2]))) / 10, 1)
+    model = trunnion.Mechanism.model_validate(FOUR_BAR)
+    found = trunnion.rig.identify(model, data, ["CD"])
+    assert float(found["lower"][0]) < 0.085 < float(found["upper"][0])
+    assert 1e-6 < float(found["standard_uncertainty"][0]) < 2e-5
+    assert float(found["reduced_chi_squared"]) < 1.5
+    result = trunnion.rig.compare(model.with_values({"CD": "85 mm"}), data)
+    assert result.attrs["all_within"]
+    assert float(result["bias_expanded"].squeeze()) == pytest.approx(2 * np.radians(0.1) / np.sqrt(12), rel=0.05)
+    assert abs(float(result["bias"].squeeze())) == pytest.approx(np.radians(0.05), rel=0.05)
+
+
+def test_the_speed_may_be_that_of_the_angle(tmp_path: Path) -> None:
+    data = recorded(tmp_path, np.degrees(rocker(TURN)), 3, {"set": {"A.speed": {"mean": "angle"}}})
+    assert data.conditions[0].values["A.speed"] == pytest.approx(2 * np.pi, rel=1e-6)
+    with pytest.raises(MechanismError, match="there is no channel 'angel'"):
+        recorded(tmp_path, np.degrees(rocker(TURN)), 3, {"set": {"A.speed": {"mean": "angel"}}})
+
+
+@pytest.mark.parametrize("stated", ["60 rpm", {"mean": "angle"}])
+def test_an_angle_that_counts_backwards_is_named_once(tmp_path: Path, stated: Any) -> None:
+    """Whether the speed is set or known from the model alone; no sign of a torque is advised on top."""
+    torque = {"M": {"column": "psi", "measures": "effort:A", "unit": "N m"}}
+    angle = {"from": "column", "column": "Winkel", "unit": "deg", "sign": -1}
+    changes = {"channels": torque, "angle": angle, "set": {"A.speed": stated}}
+    data = recorded(tmp_path, np.degrees(rocker(TURN)), 3, changes)
+    known = stated == "60 rpm"
+    assert [one.code for one in data.findings if "data.turns" not in one.code] == [
+        "data.angle.backwards" if known else "data.power.sign"
+    ]
+    if not known:
+        data = replace(data, conditions=tuple(replace(one, values={}) for one in data.conditions))
+    model = trunnion.Mechanism.model_validate(FOUR_BAR)
+    for run in (trunnion.rig.compare, lambda *given: trunnion.rig.identify(*given, ["CD"])):
+        with pytest.raises(MechanismError, match="the angle runs backwards: -60 rpm measured, 60 rpm stated of A"):
+            run(model, data)

@@ -1,0 +1,173 @@
+"""Zeros of the crank angle that are off file by file: named with what the mapping has to state."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import trunnion
+from measured_data.four_bar import FOUR_BAR, rocker
+from trunnion.rig.reading.measurement import Accuracy
+from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.units_taken import read_as
+from trunnion.views.identify.tables import sensors
+
+CHANNELS = {
+    "psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"},
+    "x": {"column": "x", "measures": "coupler.C.x", "unit": "mm"},
+}
+MODEL = trunnion.Mechanism.model_validate(FOUR_BAR).with_values({"CD": "85 mm"})
+
+
+def mapping(folder: Path, zeros: dict[str, float]) -> dict[str, Any]:
+    """Twelve turns of each file with some noise, whose angle reads 0 where the crank is at its zero, deg."""
+    random = np.random.default_rng(3)
+    (folder / "runs").mkdir()
+    for name, zero in zeros.items():
+        rows = np.arange(12 * 500)
+        crank = 2 * np.pi * rows / 500 + 0.3
+        psi = rocker(crank)
+        columns = [rows / 500, np.degrees(crank) - zero, np.degrees(psi) + random.normal(0, 0.05, rows.size),
+                   120 + 85 * np.cos(psi) + random.normal(0, 0.05, rows.size)]  # fmt: skip
+        np.savetxt(
+            folder / "runs" / f"{name}.csv", np.column_stack(columns), "%.5f", ",", header="t,a,psi,x", comments=""
+        )
+    return {
+        "trunnion-data": 1,
+        "files": [
+            {"file": f"runs/{name}.csv", "set": {"A.speed": "60 rpm"}, "over": ["0 s", "11 s"]} for name in zeros
+        ],
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg"},
+        "channels": CHANNELS,
+    }
+
+
+def findings(folder: Path, stated: dict[str, Any], channel: str | None = None) -> list[Any]:
+    (folder / "mapping.yaml").write_text(yaml.safe_dump(stated))
+    result = trunnion.rig.compare(MODEL, read_measured(folder / "mapping.yaml"), [channel] if channel else None)
+    return [one for one in result.trunnion.findings if one.severity == "error"]
+
+
+def test_each_file_has_its_own_zero_and_the_entries_can_be_pasted(tmp_path: Path) -> None:
+    zeros = {"a": 12.35, "b": -47.55, "c": 103.95}
+    stated = mapping(tmp_path, zeros)
+    (found,) = findings(tmp_path, stated)
+    assert found.code == "compare.angle_shifted"
+    sizes = np.degrees(list(found.figures["sizes"].values()))
+    assert sizes == pytest.approx(list(zeros.values()), abs=0.02)
+    entries = yaml.safe_load(found.remedy.partition("files: ")[2])
+    assert [{**one, "angle": None} for one in entries] == [{**one, "angle": None} for one in stated["files"]]
+    assert not findings(tmp_path, {**stated, "files": entries})
+
+
+def test_a_shift_is_looked_for_in_an_angle_too(tmp_path: Path) -> None:
+    (found,) = findings(tmp_path, mapping(tmp_path, {"a": 30.0}), "psi")
+    assert (found.code, found.figures["cause"]) == ("compare.not_within", "shift")
+    assert "+30 deg in the crank angle" in found.what
+    assert found.figures["explains"] > 0.999
+
+
+LOADED = {**FOUR_BAR, "loads": {"brake": {"joint": "D", "resisting_torque": "20 N m", "useful": True}}}
+RATES = {"M": {"column": "M", "measures": "effort:A", "unit": "N m"}, "psi": CHANNELS["psi"]}
+
+
+def braked(folder: Path, zero: float) -> Any:
+    """Torque of the crank against 20 N m at the rocker, by virtual work, and the rocker's angle; 85 mm long."""
+    random = np.random.default_rng(5)
+    rows = np.arange(13 * 500)
+    crank = 2 * np.pi * rows / 500
+    slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
+    columns = [rows / 500, np.degrees(crank) - zero, 20 * np.abs(slope) + random.normal(0, 0.05, rows.size),
+               np.degrees(rocker(crank)) + random.normal(0, 0.1, rows.size)]  # fmt: skip
+    np.savetxt(folder / "a.csv", np.column_stack(columns), "%.5f", ",", header="t,a,M,psi", comments="")
+    stated = {
+        "trunnion-data": 1,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg"},
+        "channels": RATES,
+        "set": {"A.speed": "60 rpm"},
+    }
+    return read_measured(stated, [folder / "a.csv"])
+
+
+@pytest.mark.parametrize(("length", "zero"), [("85 mm", 0.0), ("85 mm", 2.0), ("86 mm", 0.0)])
+def test_a_channel_that_is_not_used_speaks_for_or_against_a_cause(tmp_path: Path, length: str, zero: float) -> None:
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": length})
+    result = trunnion.rig.identify(model, braked(tmp_path, zero), ["brake.resisting_torque"])
+    told = {one.code: one for one in result.trunnion.findings}
+    if length == "86 mm":  # which a shift of the angle seems to explain
+        missed = told["fit.unused_missed"]
+        true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.086)))
+        assert np.degrees(missed.figures["rms"]) == pytest.approx(true, rel=0.05)
+        assert "fit.cause" not in told
+    elif zero:
+        assert told["fit.cause"].figures["kind"] == "shift"
+        assert np.degrees(told["fit.cause"].figures["size"]) == pytest.approx(2.0, abs=0.1)
+    else:
+        assert told["fit.unused"].figures["channels"] == ["psi"]
+        assert "fit.misfit" not in told
+
+
+def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:
+    """Half a step of 0.1° is √3 of its standard uncertainty: one error, which three files tell better than one."""
+    files = []
+    for name, rpm in (("a", 61.3), ("b", 122.7), ("c", 203.9)):
+        random = np.random.default_rng(round(rpm))
+        time = np.arange(int(12.5 * 60 / rpm * 1000)) / 1000
+        crank = 2 * np.pi * rpm / 60 * time
+        slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
+        read = np.floor(10 * np.degrees(crank)) / 10
+        columns = np.column_stack([time, read, 20 * np.abs(slope) + random.normal(0, 0.05, time.size)])
+        np.savetxt(tmp_path / f"{name}.csv", columns, "%.5f", ",", header="t,a,M", comments="")
+        files.append({"file": f"{name}.csv", "set": {"A.speed": f"{rpm} rpm"}})
+    stated = {
+        "trunnion-data": 1,
+        "files": files,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg", "resolution": "0.1 deg"},
+        "channels": {"M": RATES["M"]},
+    }
+    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(stated))
+    data = read_measured(tmp_path / "mapping.yaml")
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
+    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    names = [str(one) for one in result["sensor"].values]
+    assert names.count("angle in steps of 0.1 deg") == 1
+    at = names.index("angle in steps of 0.1 deg")
+    error, known = float(result["sensor_error"][at]), float(result["sensor_uncertainty"][at])
+    assert known < 0.3
+    assert abs(error) == pytest.approx(np.sqrt(3), abs=3 * known)
+    assert float(result["lower"][0]) < 20 < float(result["upper"][0])
+    assert np.isnan(float(result["sensor_size"][at]))  # in seconds it is another one at each speed
+
+
+def test_the_zero_of_a_sensor_is_told_in_its_unit(tmp_path: Path) -> None:
+    data = braked(tmp_path, 0.0)
+    (one,) = data.conditions
+    torque = one.courses["M"]
+    off = replace(torque, turns=torque.turns + 0.2, accuracy=Accuracy(zero=0.3))
+    data = replace(data, conditions=(replace(one, courses={**one.courses, "M": off}),))
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
+    table = sensors(trunnion.rig.identify(model, data, ["brake.resisting_torque"]))
+    assert table is not None
+    ((name, told, _),) = table.rows
+    found = re.fullmatch(r"(\S+) ± (\S+) N m", told)
+    assert name == "zero of M"
+    assert found
+    assert float(found[1]) == pytest.approx(0.2, abs=1.5 * float(found[2]))
+    assert float(found[2]) < 0.02
+
+
+TURN = 2 * np.pi * np.arange(360) / 360
+
+
+@pytest.mark.parametrize(("gain", "told"), [(1270.0, "near 1000, as of N m read as kN m"), (1.27, "")])
+def test_a_gain_near_a_power_of_ten_is_a_unit_though_friction_is_off(gain: float, told: str) -> None:
+    assert read_as([gain], "kN m", 1e3) == told

@@ -38,7 +38,19 @@ ENERGIES = (
 
 NOISE = 1e-12  # of the largest reaction times 1 m, or of the largest energy: below is rounding
 # findings that tell where a motion ends early
-ENDS = {f"simulate.{code}" for code in ("range", "no_acceleration", "not_assembled", "step", "events", "stopped")}
+ENDS = {
+    f"simulate.{code}"
+    for code in (
+        "range",
+        "no_acceleration",
+        "unsolved",
+        "not_assembled",
+        "step",
+        "events",
+        "stopped",
+        "no_contact_force",
+    )
+}
 
 
 class Happening(NamedTuple):

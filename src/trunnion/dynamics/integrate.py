@@ -25,7 +25,7 @@ from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout
 from trunnion.dynamics.rest import Rest
-from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
+from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
@@ -40,7 +40,6 @@ SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one 
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
-SECANTS = 8  # rounds to the place of a time in a step along another number
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
 
 
@@ -222,7 +221,7 @@ class Integration:
             self._follow(float(solver.t), np.array(solver.y), sense, now)
             self._compare(before, row, sense, now)
             if found := dead_centre.reached(solver, float(solver.t) - before):
-                self.end("not_assembled", *found)
+                self._turns_round(*found)
                 break
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
@@ -346,7 +345,7 @@ class Integration:
                 return self._failed(float(held[k]), before, sense, now, failed)[:2]
             if solver.y[k] > until:
                 return self._plain(float(held[k]), before, until, sense, now, rate)
-            along = _by_time(solver.dense_output(), last, float(solver.t), k)
+            along = by_time(solver.dense_output(), last, float(solver.t), k)
             self._add(Stretch(float(held[k]), float(solver.y[k]), along, sense, False, now, self.snapshot))
         found = np.array(solver.y)
         end, found[k] = float(found[k]), to.value
@@ -412,9 +411,19 @@ class Integration:
         later[:n] += soon * row[n : 2 * n]
         states = ((time, row), (time, ahead), (time + soon, later))
         causes = [self._cause(when, one, sense, now) for when, one in states]
-        if not self._locked(time, row, sense, now, causes):
-            self._stop(next((one for one in causes if one), "step"), time, row)
+        if self._locked(time, row, sense, now, causes):
+            return time, row, None
+        code = next((one for one in causes if one), "step")
+        if code == "not_assembled" and not causes[0] and len(self.motion.names) == 1:  # it can be assembled until then
+            self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
+        else:
+            self._stop(code, time, row)
         return time, row, None
+
+    def _turns_round(self, time: float, figures: dict[str, float]) -> None:
+        """End at the dead centre of the driven joint."""
+        self._note(time, "dead-centre")
+        self.end("dead_centre", time, figures)
 
     def _locked(self, time: float, row: Array, sense: float, now: float, causes: Sequence[str]) -> bool:
         """Let the one free coordinate stop at once, as friction holds it: it has no solution, or it grows faster with
@@ -475,25 +484,3 @@ class Integration:
     def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
         at = self.moment(time, row, sense, now)
         return float(np.ravel(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))[0])
-
-
-def _by_time(dense: Callable[[Array], Array], low: float, high: float, k: int) -> Callable[[Array], Array]:
-    """The state at times, of a step along its k-th number: by the secant to where the time is that."""
-    begin, end = float(dense(np.array([low]))[k, 0]), float(dense(np.array([high]))[k, 0])
-
-    def state(time: Array) -> Array:
-        """Rising or falling, the time is nearly even along a step: a few rounds get it to rounding."""
-        time = np.clip(time, begin, end)
-        before, after = np.full(np.shape(time), low), low + (high - low) * (time - begin) / (end - begin)
-        at_before = begin - time
-        for _ in range(SECANTS):
-            at_after = dense(after)[k] - time
-            with np.errstate(all="ignore"):
-                step = at_after * (after - before) / (at_after - at_before)
-            before, at_before = after, at_after
-            after = np.clip(after - np.where(np.isfinite(step), step, 0.0), min(low, high), max(low, high))
-        rows = np.array(dense(after))
-        rows[k] = after
-        return rows
-
-    return state

@@ -259,6 +259,8 @@ def _undefined(books: Books) -> Iterator[Finding]:
         yield finding_for("simulate.undefined", "loads", count=len(rows), time=float(books.time[rows[0]]))
 
 
+OF_DRIVER = ("simulate.range", "simulate.dead_centre")  # ends that tell a place of the driver
+
 # ---- findings -------------------------------------------------------------------------------------------------
 
 
@@ -279,9 +281,7 @@ def motion_findings(
     yield from _rests(motion, solution, name, effort)
     if solution.ended is not None:
         ended = solution.ended
-        unit: dict[str, Any] = (
-            {"unit": "rad" if turns else "m", "driver": name} if ended.code == "simulate.range" else {}
-        )
+        unit: dict[str, Any] = {"unit": "rad" if turns else "m", "driver": name} if ended.code in OF_DRIVER else {}
         yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
 
 

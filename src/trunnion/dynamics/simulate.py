@@ -43,6 +43,7 @@ Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
 ACCOUNT, MISSED = 1e-8, 10.0  # what the energy account may miss, of the energy turned over; times the tolerance
+HELPS = 0.3  # of what the account missed: a finer motion that misses more is the last
 FINER = 2  # motions with a tenth of the tolerance of the last, at most, that are tried where it misses more
 
 
@@ -121,7 +122,9 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
         other = find(tolerance)
         if _stopped(other) or not other.share < best.share:
             break
-        best = other
+        helps, best = other.share < HELPS * best.share, other
+        if not helps:
+            break
     return best
 
 

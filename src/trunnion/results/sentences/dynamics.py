@@ -45,6 +45,12 @@ DYNAMICS: dict[str, Sentence] = {
         "the accelerations are not found at {time:~s} (coordinate {coordinate:.6g}, rate {rate:.6g})",
         "check the forces there: one of them has no value, jumps, or grows without bound",
     ),
+    "simulate.dead_centre": Sentence(
+        ERROR,
+        "{driver} reaches its dead centre, {coordinate:.6g} {unit}, at {time:~s}: the links cannot be assembled beyond "
+        "it, and go on while {driver} turns round; the motion ends there",
+        "drive a joint that has no dead centre there, or limit the motion by a stop or a load",
+    ),
     "simulate.not_assembled": Sentence(
         ERROR,
         "the links cannot be assembled beyond {time:~s} (coordinate {coordinate:.6g}): the motion ends there",

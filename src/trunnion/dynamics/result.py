@@ -379,9 +379,10 @@ def _summary(
         last = np.flatnonzero(np.isfinite(rate))[-1]
         found.append(Figure(f"{name}.speed_end", f"{what} of {name}", rate[last], unit, "at the end", _at(books, last)))
         efforts = books.arrays["drive_effort"][names.index(name)]
-        most = int(np.nanargmax(np.abs(efforts)))
         noun = "drive torque" if turns else "drive force"
-        if motion.system.mechanism.drivers[name].motor is not None:  # of others it is rounding
+        # of others it is rounding; where nothing has inertia at a dead centre there is none
+        if motion.system.mechanism.drivers[name].motor is not None and np.any(np.isfinite(efforts)):
+            most = int(np.nanargmax(np.abs(efforts)))
             found.append(
                 Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
             )

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.special import ellipk
 
 from playing import rattling
@@ -20,6 +21,7 @@ from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
 from trunnion.joints.motors import MOTORS
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -150,10 +152,31 @@ def test_a_driven_joint_ends_at_its_dead_centre(friction: float, close: float) -
     integration = Integration(motion, Walks(motion), 2.0, 1e-9)
     found = integration.run(initial_row(motion))
     assert found.ended is not None
-    assert found.ended.code == "simulate.not_assembled"
+    assert found.ended.code == "simulate.dead_centre"
     assert found.ended.figures["coordinate"] == pytest.approx(np.arccos(-0.78125), abs=close)
     assert 0.0 < found.ended.time - found.end < 0.05 * found.end
     assert found.asked < 1000
+
+
+@pytest.mark.slow
+def test_a_driven_joint_in_space_ends_at_its_dead_centre() -> None:
+    """The rocker of an RSSR moves by itself up to the end of its swing, which a cycle driven by the crank tells."""
+    data = read(EXAMPLES / "rssr.yaml").data()
+    swing = analyse(Mechanism(**data), 720)["joint_rotation"].sel(joint="D").values
+    end = float(_largest(swing))
+    start = {"coordinate": float(swing[0]), "speed": 30.0}
+    data["drivers"] = {"D": {"speed": 1, "free": True, "range": [float(swing[0]), end + 1], "initial": start}}
+    found = simulate(Mechanism(**data).with_friction("off"), 3.0, 3)
+    (ended,) = [one for one in found.trunnion.findings if one.code == "simulate.dead_centre"]
+    assert ended.figures["coordinate"] == pytest.approx(end, abs=3e-6)
+    assert [row[0] for row in attribute(found, "events")] == ["dead-centre"]
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    """The largest of a periodic course, by the parabola through the three values about it."""
+    k = int(np.argmax(values))
+    low, top, high = values[k - 1], values[k], values[(k + 1) % len(values)]
+    return float(top + (low - high) ** 2 / (8 * (2 * top - low - high)))
 
 
 @pytest.mark.parametrize(

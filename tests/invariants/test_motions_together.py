@@ -208,7 +208,7 @@ def test_a_press_that_is_too_weak_stalls_where_it_does_by_itself() -> None:
     mechanism = slider_crank(0.1, loads=load, drivers={"O": {"speed": 100, "start": 0.2, "motor": motor}})
     run = prepare(mechanism)
     values = dict(mechanism.parameters({"drivers.O.motor.effort": np.array([[6.0], [60.0]])}))
-    course, status = courses_of(run, values, 2, 0.1, 1e-10)
+    course, status = courses_of(run, values, 2, 0.1, 1e-11)
     assert np.all(status == DONE)
     gone = [trunnion_gone(mechanism, effort) for effort in (6.0, 60.0)]
     np.testing.assert_allclose(course.gone, gone, rtol=1e-8)

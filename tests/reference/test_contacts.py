@@ -83,7 +83,12 @@ def test_stiffness_of_a_steel_pin_in_its_hole() -> None:
 
 
 def test_the_first_contact_of_a_rattling_pin() -> None:
-    """Time, speed, penetration and duration as known before; all of them and the force by own equations."""
+    """Time, speed, penetration and duration as known before; all of them and the force by own equations.
+
+    Extrapolation (Gragg, Bulirsch, Stoer) of the same two equations in numbers of 40 digits, with √(t − t₀) in place of
+    the time during the contact, finds the largest force 45872.275412 N, 2.4089 × 10⁻⁵ s after the onset, and the
+    penetration 7.79522239 × 10⁻⁵ m, whether in 40 steps or 60.
+    """
     result = trunnion.simulate(rattling(), duration=3e-4, steps=300)
     begin, end = float(result["impact_begin"][0]), float(result["impact_end"][0])
     assert begin == pytest.approx(2.2728603e-4, rel=1e-7)
@@ -95,7 +100,8 @@ def test_the_first_contact_of_a_rattling_pin() -> None:
     assert end - begin == pytest.approx(lasts, rel=1e-6)
     assert float(result["impact_approach"][0]) == pytest.approx(onset, rel=1e-9)
     assert float(result["impact_force"][0]) == pytest.approx(force, rel=1e-7)
-    assert float(result["impact_force"][0]) == pytest.approx(45872.2, rel=2e-6)
+    assert float(result["impact_force"][0]) == pytest.approx(45872.275412, rel=1e-9)
+    assert float(result["impact_depth"][0]) == pytest.approx(7.7952223924e-5, rel=1e-9)
     assert float(result["impact_impulse"][0]) == pytest.approx(impulse, rel=1e-8)
     turned_over = float(abs(result["work_drive"]).max())
     assert float(abs(result["energy_residual"]).max()) < 1e-8 * turned_over

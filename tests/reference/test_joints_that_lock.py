@@ -93,6 +93,62 @@ def test_what_sticks_to_a_slider_that_jams_is_torn_away() -> None:
     assert float(abs(data.energy_residual).max()) < 1e-8
 
 
+# ---- the slider alone: one free coordinate --------------------------------------------------------------------
+
+
+def slider(force: str, friction: float | dict[str, Any] = F) -> Mechanism:
+    """The slider without the block."""
+    data = blocks(force).data()
+    del data["links"]["high"], data["joints"]["B"], data["drivers"]["B"]
+    data["joints"]["A"]["friction"] = friction
+    return Mechanism(**data)
+
+
+def test_a_slider_alone_jams_where_its_push_turns_round() -> None:
+    """As above: q̈ = T/(m (1 + κ)) ahead, a stop at once, and back by as much."""
+    data = simulate(slider("1 N - time/(1 s)*2 N"), 1.0, 8)
+    mass, half, time = LOW * (1 + JAM), 0.5, data.time.values
+    (lock, back) = events(data)
+    assert lock == ("lock", "A", pytest.approx(half, abs=1e-8), pytest.approx(LOW / 2 * (1 + half**2 / mass) ** 2))
+    assert back[:2] == ("break-away", "A")
+    wanted = np.where(time < half, 1 + (time - time**2) / mass, -((time - half) ** 2) / mass)
+    assert data.drive_rate.values[0][time != half] == pytest.approx(wanted[time != half], abs=1e-9)
+    assert float(abs(data.energy_residual).max()) < 1e-9
+    assert findings(data)["simulate.locks"]["time"] == pytest.approx(half, abs=1e-8)
+    assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
+
+
+def test_a_slider_that_jams_at_the_start_stops_at_once() -> None:
+    data = simulate(slider("-1 N"), 1.0, 4)
+    assert [one[:3] for one in events(data)] == [("lock", "A", 0.0), ("break-away", "A", 0.0)]
+    assert data.drive_rate.values[0] == pytest.approx(-data.time.values / (LOW * (1 + JAM)), abs=1e-10)
+    assert float(data.work_friction[0]) == pytest.approx(0.5 * LOW)
+
+
+@pytest.mark.parametrize(("friction", "several"), [(0.9 / JAM * F, False), (1.1 / JAM * F, True)])
+def test_several_accelerations_of_one_coordinate_are_told_from_where_inertia_locks(
+    friction: float, several: bool
+) -> None:
+    found = findings(simulate(slider("1 N", friction), 0.1, 1))
+    assert ("simulate.several_accelerations" in found) == several
+
+
+def test_without_rest_there_is_no_acceleration_and_the_figure_says_by_how_much() -> None:
+    """A law that is smooth at rest cannot hold it: the motion ends, with ∂E/∂q̈ = m (1 − κ) of m."""
+    smooth = {"law": "brown-mcphee", "coefficient": F, "static": F, "transition_speed": 1e-3}
+    data = simulate(slider("1 N - time/(1 s)*2 N", smooth), 1.0, 8)
+    found = findings(data)["simulate.no_acceleration"]
+    assert found["growth"] == pytest.approx(1 - JAM, rel=1e-3)
+    assert found["time"] == pytest.approx(0.5, abs=1e-6)
+    known = np.isfinite(data.drive_rate.values[0])
+    assert known.tolist() == (data.time.values <= found["time"]).tolist()
+
+
+def test_accelerations_that_are_not_found_are_not_laid_at_the_inertia() -> None:
+    found = findings(simulate(slider("sqrt(-1 - time/(1 s)) * 1 N"), 1.0, 4))
+    assert set(found) & {"simulate.unsolved", "simulate.no_acceleration"} == {"simulate.unsolved"}
+
+
 # ---- Painlevé's rod -------------------------------------------------------------------------------------------
 
 ROD, HALF, SLIDER, ROUGH = 1.0, 0.5, 0.02, 2.0

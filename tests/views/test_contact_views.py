@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from test_browser import NODE, run
+from test_report import Page
 
 import trunnion
 from playing import loose_slider, rattling
@@ -16,6 +19,9 @@ from trunnion.dynamics.spectrum import spectrum
 from trunnion.errors import MechanismError
 from trunnion.results.tables import columns
 from trunnion.views.motion.figure import figure
+from trunnion.views.motion.report import report
+from trunnion.views.motion.scene import motion_scene
+from trunnion.views.motion.shown import shown
 
 
 @functools.cache
@@ -51,6 +57,33 @@ def test_gaps_and_forces_over_time() -> None:
     assert forces.get_ylabel() == "contact force [kN]"
     drawn = max((line for line in forces.lines if len(line.get_xdata()) > 100), key=lambda line: len(line.get_xdata()))
     assert np.nanmax(drawn.get_ydata()) == pytest.approx(45.8, abs=0.1)
+
+
+def test_the_report_has_force_gap_orbit_and_spectrum() -> None:
+    page = Page(report(rattled()))
+    assert not page.open
+    (contact,) = page.scene()["motion"]["contacts"]
+    assert contact["name"] == "Q"
+    assert max(contact["force"]) == pytest.approx(float(rattled()["contact_normal_force"].max()), rel=1e-6)
+    assert contact["gap"] == pytest.approx(rattled()["contact_gap"].values[0], rel=1e-6)
+    pictures = [attrs["alt"] for tag, attrs in page.tags if tag == "img"]
+    assert len(pictures) == 2
+    assert "holes" in pictures[0]
+    assert "frequency" in pictures[1]
+
+
+def test_the_report_of_a_guide_in_play_has_no_orbit() -> None:
+    page = Page(report(trunnion.simulate(loose_slider(), duration=1e-3, steps=10)))
+    assert len(page.scene()["motion"]["contacts"]) == 4
+    assert not [attrs for tag, attrs in page.tags if tag == "img" and "holes" in attrs["alt"]]
+
+
+@pytest.mark.skipif(not NODE, reason="without node")
+def test_the_page_draws_forces_and_gaps(tmp_path: Path) -> None:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(motion_scene(shown(rattled()))), encoding="utf-8")
+    titles = json.loads(run("page.test.mjs", path))["motion"]["titles"]
+    assert {"Contact forces", "Gaps"} <= set(titles)
 
 
 def test_a_motion_without_play_has_no_such_figures() -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.dynamics.energy import kinetic_energy
-from trunnion.dynamics.state import Accelerated, Moment
-from trunnion.dynamics.sticking import RANK, StickingMotion, repeated
+from trunnion.dynamics.state import Accelerated, Moment, repeated
+from trunnion.dynamics.sticking import RANK, StickingMotion
 
 __all__ = ["Case", "Cases", "Lock", "Senses"]
 

@@ -25,7 +25,7 @@ from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout
 from trunnion.dynamics.rest import Rest
-from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch
+from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
@@ -36,9 +36,10 @@ Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
 CREEPING, CREPT = 400, 1e-9  # steps that get on by less of the duration: it does not get on
+SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
+AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
-SECANTS = 8  # rounds to the place of a time in a step along another number
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
 
 
@@ -76,6 +77,7 @@ class Integration:
         times = {time for time in (*known, *self.times) if 0 < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
         self.turned_over, self.asked_for, self.slips = 0.0, 0, 0.0
+        self._unique, self._doubts = True, 0
         self.breaks = [*sorted(times), self.duration]
         self.rest = Rest(self.motion, self.layout) if self.sticks else None
 
@@ -135,7 +137,10 @@ class Integration:
         with np.errstate(all="ignore"):
             second = self.dynamics(at).second
         if not np.all(np.isfinite(second)):
-            self._stop(self._cause(0.0, row, sense, now) or "no_acceleration", 0.0, row)
+            cause = self._cause(0.0, row, sense, now) or "no_acceleration"
+            if self._locked(0.0, row, sense, now, [cause]):
+                return True
+            self._stop(cause, 0.0, row)
             return False
         self.pace = np.maximum(self.pace, np.maximum(np.sqrt(np.abs(second)), np.abs(row[n : 2 * n])))
         return True
@@ -214,8 +219,9 @@ class Integration:
                 return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
             self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
             self._follow(float(solver.t), np.array(solver.y), sense, now)
+            self._compare(before, row, sense, now)
             if found := dead_centre.reached(solver, float(solver.t) - before):
-                self.end("not_assembled", *found)
+                self._turns_round(*found)
                 break
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
@@ -236,6 +242,7 @@ class Integration:
             at = self.moment(moment, asked, sense, now)
             with np.errstate(all="ignore"):
                 rates = self.dynamics(at)
+            self._unique = rates.unique
             return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
 
         return rate
@@ -338,7 +345,7 @@ class Integration:
                 return self._failed(float(held[k]), before, sense, now, failed)[:2]
             if solver.y[k] > until:
                 return self._plain(float(held[k]), before, until, sense, now, rate)
-            along = _by_time(solver.dense_output(), last, float(solver.t), k)
+            along = by_time(solver.dense_output(), last, float(solver.t), k)
             self._add(Stretch(float(held[k]), float(solver.y[k]), along, sense, False, now, self.snapshot))
         found = np.array(solver.y)
         end, found[k] = float(found[k]), to.value
@@ -398,16 +405,47 @@ class Integration:
         self, time: float, row: Array, sense: float, now: float, message: str | None
     ) -> tuple[float, Array, None]:
         """Say why there is no next step; a linkage that locks as it runs stops."""
-        n, row = self.layout.coordinates, row.copy()
-        ahead = row.copy()
+        n, row, soon = self.layout.coordinates, row.copy(), AHEAD / float(np.max(self.pace))
+        ahead, later = row.copy(), row.copy()
         ahead[:n] += 1e-6 * np.sign(row[n : 2 * n]) * np.maximum(1.0, np.abs(row[:n]))
-        causes = [self._cause(time, one, sense, now) for one in (row, ahead)]
-        if self.rest is not None and "locked" in causes:
-            self._note(time, "lock", self._stopped(time, row, np.zeros(n), sense, now), "J")
+        later[:n] += soon * row[n : 2 * n]
+        states = ((time, row), (time, ahead), (time + soon, later))
+        causes = [self._cause(when, one, sense, now) for when, one in states]
+        if self._locked(time, row, sense, now, causes):
             return time, row, None
-        code = next((one for one in causes if one != "locked" and one), "step")
-        self._stop(code, time, row)
+        code = next((one for one in causes if one), "step")
+        if code == "not_assembled" and not causes[0] and len(self.motion.names) == 1:  # it can be assembled until then
+            self._turns_round(time, {"coordinate": float(row[0]), "rate": float(row[n])})
+        else:
+            self._stop(code, time, row)
         return time, row, None
+
+    def _turns_round(self, time: float, figures: dict[str, float]) -> None:
+        """End at the dead centre of the driven joint."""
+        self._note(time, "dead-centre")
+        self.end("dead_centre", time, figures)
+
+    def _locked(self, time: float, row: Array, sense: float, now: float, causes: Sequence[str]) -> bool:
+        """Let the one free coordinate stop at once, as friction holds it: it has no solution, or it grows faster with
+        the acceleration against the motion than what brakes it."""
+        n = self.layout.coordinates
+        if self.rest is None or row[n] == 0.0:
+            return False
+        if "locked" not in causes:
+            along, against = self.motion.growth(self.moment(time, row, sense, now))[:: int(np.sign(row[n]))]
+            if "no_acceleration" not in causes or not against <= 0.0 < along:
+                return False
+        self._note(time, "lock", self._stopped(time, row, np.zeros(n), sense, now), "J")
+        return True
+
+    def _compare(self, time: float, row: Array, sense: float, now: float) -> None:
+        """Tell where one free coordinate has several accelerations, every few steps: E − T, which is continuous, has
+        other roots than that which is followed where it falls far out."""
+        if self._unique or self.motion.affine or len(self.motion.names) != 1 or SEVERAL in self.solution.notes:
+            return
+        self._doubts += 1
+        if self._doubts % LOOKED == 1 and np.any(self.motion.growth(self.moment(time, row, sense, now)) < 0.0):
+            self.solution.notes[SEVERAL] = {"time": time}
 
     def _stopped(self, time: float, row: Array, rates: Array, sense: float, now: float) -> float:
         """Change rates at once, by friction: the energy lost, J, of rotors too, which is work of friction."""
@@ -426,6 +464,11 @@ class Integration:
 
     def _stop(self, code: str, time: float, row: Array) -> None:
         figures = {"coordinate": float(row[0]), "rate": float(row[self.layout.coordinates])}
+        if code in ("no_acceleration", "locked"):
+            with np.errstate(all="ignore"):
+                growth = float(np.min(self.motion.growth(self.moment(time, row, 0.0, time))))
+            code = "no_acceleration" if growth <= 0.0 else "unsolved"
+            figures |= {"growth": growth} if growth <= 0.0 else {}
         self.end(code, time, figures)
 
     def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
@@ -441,25 +484,3 @@ class Integration:
     def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
         at = self.moment(time, row, sense, now)
         return float(np.ravel(kinetic_energy(self.motion.walk(at, np.zeros_like(at.q))))[0])
-
-
-def _by_time(dense: Callable[[Array], Array], low: float, high: float, k: int) -> Callable[[Array], Array]:
-    """The state at times, of a step along its k-th number: by the secant to where the time is that."""
-    begin, end = float(dense(np.array([low]))[k, 0]), float(dense(np.array([high]))[k, 0])
-
-    def state(time: Array) -> Array:
-        """Rising or falling, the time is nearly even along a step: a few rounds get it to rounding."""
-        time = np.clip(time, begin, end)
-        before, after = np.full(np.shape(time), low), low + (high - low) * (time - begin) / (end - begin)
-        at_before = begin - time
-        for _ in range(SECANTS):
-            at_after = dense(after)[k] - time
-            with np.errstate(all="ignore"):
-                step = at_after * (after - before) / (at_after - at_before)
-            before, at_before = after, at_after
-            after = np.clip(after - np.where(np.isfinite(step), step, 0.0), min(low, high), max(low, high))
-        rows = np.array(dense(after))
-        rows[k] = after
-        return rows
-
-    return state

@@ -41,7 +41,7 @@ CLUTCH = "clutch"  # lost in a clutch that slips
 class Rates(NamedTuple):
     """Second derivatives (coordinate,), rates of the controllers' integrals (coordinate,), of the deflections
     (bristle,), of the works, W, and of a clutch's slip, if there is one. sound: whether there is one acceleration;
-    locked: whether friction has no solution.
+    locked: whether friction has no solution; unique: whether no other acceleration can obey.
     """
 
     second: Array
@@ -51,6 +51,7 @@ class Rates(NamedTuple):
     sound: bool
     locked: bool = False
     slip: Array = np.empty(0)
+    unique: bool = False
 
 
 class Dynamics(Protocol):

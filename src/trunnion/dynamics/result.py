@@ -35,7 +35,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MOTION", "Books", "motion_findings", "result_of"]
+__all__ = ["MOTION", "Books", "Found", "motion_findings", "result_of"]
 
 Array = NDArray[np.float64]
 
@@ -81,19 +81,40 @@ class Books(NamedTuple):
     sticking: NDArray[np.bool_] | None = None
 
 
-def result_of(
-    motion: FreeMotion, solution: Solution, books: Books, stated: Run | None = None, impacts: Sequence[Impact] = ()
-) -> Result:
-    """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out;
-    impacts: of these."""
+class Found(NamedTuple):
+    """A motion with its books: what works and energies differ by at every row, J, and the energy turned over, J.
+
+    impacts: of joints in play; share: the largest difference of the energy turned over, 0 where it is rounding.
+    """
+
+    solution: Solution
+    books: Books
+    residual: Array
+    turned_over: float
+    impacts: Sequence[Impact] = ()
+
+    @classmethod
+    def of(cls, motion: FreeMotion, solution: Solution, books: Books, impacts: Sequence[Impact] = ()) -> Found:
+        """The motion with its energy account."""
+        residual, turned_over = _energy(books)
+        return cls(solution, books, residual, max(turned_over, _turned_over(motion, solution)), impacts)
+
+    @property
+    def share(self) -> float:
+        worst = float(np.nanmax(np.abs(self.residual), initial=0.0))
+        rounding = ROUNDING * float(np.nanmax(np.abs(self.books.energies), initial=0.0))
+        return worst / self.turned_over if self.turned_over > 0 and worst > rounding else 0.0
+
+
+def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Result:
+    """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out."""
+    solution, books, residual, turned_over, impacts = found
     run = stated or motion.run
     _note_switches(motion, solution)
     mechanism, system = run.system.mechanism, run.system
-    residual, turned_over = _energy(books)
-    turned_over = max(turned_over, _turned_over(motion, solution))
     findings = [
         *motion_findings(motion, solution, run, impacts),
-        *_unbalanced(books, residual, turned_over, solution.stepped),
+        *_unbalanced(found),
         *_undefined(books),
     ]
     attributes = encoded(
@@ -226,12 +247,9 @@ ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 
-def _unbalanced(books: Books, residual: Array, turned_over: float, stepped: bool) -> Iterator[Finding]:
-    worst = float(np.nanmax(np.abs(residual), initial=0.0))
-    rounding = ROUNDING * float(np.nanmax(np.abs(books.energies), initial=0.0))
-    if turned_over > 0 and worst > max(WORST * turned_over, rounding):
-        code = "simulate.energy_stepped" if stepped else "simulate.energy"
-        yield finding_for(code, share=worst / turned_over)
+def _unbalanced(found: Found) -> Iterator[Finding]:
+    if found.share > WORST:
+        yield finding_for("simulate.energy_stepped" if found.solution.stepped else "simulate.energy", share=found.share)
 
 
 def _undefined(books: Books) -> Iterator[Finding]:
@@ -240,6 +258,8 @@ def _undefined(books: Books) -> Iterator[Finding]:
     if len(rows):
         yield finding_for("simulate.undefined", "loads", count=len(rows), time=float(books.time[rows[0]]))
 
+
+OF_DRIVER = ("simulate.range", "simulate.dead_centre")  # ends that tell a place of the driver
 
 # ---- findings -------------------------------------------------------------------------------------------------
 
@@ -261,9 +281,7 @@ def motion_findings(
     yield from _rests(motion, solution, name, effort)
     if solution.ended is not None:
         ended = solution.ended
-        unit: dict[str, Any] = (
-            {"unit": "rad" if turns else "m", "driver": name} if ended.code == "simulate.range" else {}
-        )
+        unit: dict[str, Any] = {"unit": "rad" if turns else "m", "driver": name} if ended.code in OF_DRIVER else {}
         yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
 
 
@@ -361,9 +379,10 @@ def _summary(
         last = np.flatnonzero(np.isfinite(rate))[-1]
         found.append(Figure(f"{name}.speed_end", f"{what} of {name}", rate[last], unit, "at the end", _at(books, last)))
         efforts = books.arrays["drive_effort"][names.index(name)]
-        most = int(np.nanargmax(np.abs(efforts)))
         noun = "drive torque" if turns else "drive force"
-        if motion.system.mechanism.drivers[name].motor is not None:  # of others it is rounding
+        # of others it is rounding; where nothing has inertia at a dead centre there is none
+        if motion.system.mechanism.drivers[name].motor is not None and np.any(np.isfinite(efforts)):
+            most = int(np.nanargmax(np.abs(efforts)))
             found.append(
                 Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
             )

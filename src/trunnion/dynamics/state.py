@@ -28,7 +28,7 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["Accelerated", "FreeMotion", "Moment", "ahead"]
+__all__ = ["Accelerated", "FreeMotion", "Moment", "ahead", "repeated"]
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,7 @@ ROUNDS = 30  # of Newton's method
 SETTLED = 1e-11  # of the largest acceleration: where it ends
 CLOSE = 1e-6  # a step of which the next is below rounding, for it converges to the square
 FAR = 1e3  # times what is typical: an acceleration beyond which the step of the derivative was too short
+BEYOND = 1e6  # times what is typical: an acceleration at which inertia is all there is
 DIFFERENCE = 1e-4  # of the acceleration, by which the derivative is taken where E is not affine
 
 
@@ -291,6 +292,27 @@ class FreeMotion:
         """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""
         return self._linearised(at, np.zeros_like(at.q), self.beginning(at))[1]
 
+    def far(self, second: Array) -> Array:
+        """Accelerations far beyond some, one coordinate at a time, (coordinate, lane): along each, then against it."""
+        size = BEYOND * np.maximum(self.unit, np.max(np.abs(second), axis=1))
+        return np.hstack([np.diag(size), -np.diag(size)])
+
+    def growth(self, at: Moment) -> Array:
+        """det ∂E/∂q̈ over that without friction at the accelerations of `far` from none, (lane,); one lane of `at`.
+
+        Where it is not above 0 friction grows faster with the acceleration than what drives it, and the mechanism locks
+        itself under its inertia: no acceleration obeys, or several do (P. Painlevé, C. R. Acad. Sci. 121 (1895) 112).
+        """
+        far = self.far(np.zeros_like(at.q))
+        many = repeated(at, far.shape[1])
+        slopes = self._linearised(many, far, self.beginning(many))[1]
+        still = at._replace(rate=0.0 * at.rate, sense=0.0, senses=(0,) * len(at.senses))
+        none: dict[str, Sense] = dict.fromkeys((*self.resisted, *self.sticking), 0.0)
+        mass = self._linearised(still, np.zeros_like(at.q), none)[1]
+        stacks = [np.moveaxis(one * self.unit[None, :, None], -1, 0) for one in (slopes, mass)]
+        found: Array = np.linalg.det(stacks[0]) / np.linalg.det(stacks[1])
+        return found
+
     def _linearised(self, at: Moment, second: Array, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
         """E − T (coordinate, lane) and its derivatives by the accelerations (equation, coordinate, lane)."""
         count, lanes = at.q.shape
@@ -300,11 +322,7 @@ class FreeMotion:
         else:
             steps = np.maximum(np.maximum(steps, self.trial[:, None]), np.abs(second))
         tried = [second] + [second + np.where(np.arange(count)[:, None] == i, steps, 0.0) for i in range(count)]
-        q, rate, integral, bristles = (
-            np.tile(part, (1, count + 1)) for part in (at.q, at.rate, at.integral, at.bristles)
-        )
-        time = np.tile(at.time, count + 1)
-        many = at._replace(time=time, q=q, rate=rate, integral=integral, bristles=bristles)
+        many = repeated(at, count + 1)
         wide: dict[str, Sense] = {
             joint: np.tile(sense, count + 1) if isinstance(sense, np.ndarray) else sense
             for joint, sense in senses.items()
@@ -318,6 +336,12 @@ class FreeMotion:
 def ahead(second: Array, unit: Array) -> Array:
     """By how much accelerations are changed to tell a derivative: away from 0, where reactions may turn round."""
     return np.copysign(DIFFERENCE * np.maximum(np.abs(second), 1e-2 * unit), second)
+
+
+def repeated(at: Moment, times: int) -> Moment:
+    """The same state in more lanes."""
+    q, rate, integral, bristles = (np.tile(part, (1, times)) for part in (at.q, at.rate, at.integral, at.bristles))
+    return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles)
 
 
 def _solved(matrix: Array, right: Array) -> Array:

@@ -17,6 +17,7 @@ from scipy.integrate import OdeSolver
 
 from trunnion.dynamics.cases import IDLE, SLACK, Case, Cases, Senses
 from trunnion.dynamics.contact_motion import ContactMotion, Crossing, Dense
+from trunnion.dynamics.integrate import AHEAD, SEVERAL
 from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
 from trunnion.dynamics.sticking import RANK, StickingMotion
@@ -25,9 +26,7 @@ __all__ = ["StickMotion"]
 
 Array = NDArray[np.float64]
 
-AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 FEW = 8  # steps after which one looks for other accelerations
-SEVERAL = "simulate.several_accelerations"
 
 
 @dataclass
@@ -99,7 +98,7 @@ class StickMotion(ContactMotion):
         with np.errstate(all="ignore"):
             case = self._cases.of(at, before, crossed)
             if case.senses is None:
-                if self._locked(time, row, case.base):
+                if self._jammed(time, row, case.base):
                     return self._decided(time, row)
                 self._stop("no_acceleration", time, row)
                 return False
@@ -117,7 +116,7 @@ class StickMotion(ContactMotion):
             self._others(time, row, case)
         return True
 
-    def _locked(self, time: float, row: Array, senses: Senses) -> bool:
+    def _jammed(self, time: float, row: Array, senses: Senses) -> bool:
         """Let joints lock, if they can: they stop at once."""
         found = self._cases.lock(self.moment(time, row, 0.0, self.now), senses)
         if found is None:
@@ -140,7 +139,7 @@ class StickMotion(ContactMotion):
             ahead[:n] += soon * row[n : 2 * n]
             ahead[n : 2 * n] += soon * second
             causes = {self._cause(when, one, sense, now) for when, one in ((time, row), (time + soon, ahead))}
-            if causes & {"locked", "no_acceleration"} and self._locked(time, row, self.senses):
+            if causes & {"locked", "no_acceleration"} and self._jammed(time, row, self.senses):
                 return time, row, None
         return super()._failed(time, row, sense, now, message)
 

@@ -19,16 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.state import ROUNDS, SETTLED, Accelerated, FreeMotion, Moment, ahead
+from trunnion.dynamics.state import ROUNDS, SETTLED, Accelerated, FreeMotion, Moment, ahead, repeated
 from trunnion.solve.backward import Backward, Sense
 from trunnion.solve.forward import Forward
 
-__all__ = ["StickingMotion", "least_shares", "repeated"]
+__all__ = ["StickingMotion", "least_shares"]
 
 Array = NDArray[np.float64]
 
 RANK = 1e-9  # of the largest: singular values below are 0
-FAR = 1e6  # times what is typical: an acceleration at which inertia is all there is
 HELD = 1e-8  # of the accelerations: a joint that sticks has none but for rounding
 
 
@@ -85,11 +84,6 @@ class StickingMotion(FreeMotion):
             if not np.any(left):
                 return self.searched(at, second, pulls)
         return found
-
-    def far(self, second: Array) -> Array:
-        """Accelerations far beyond some, one coordinate at a time, (coordinate, lane)."""
-        size = FAR * np.maximum(self.unit, np.max(np.abs(second), axis=1))
-        return np.hstack([np.diag(size), -np.diag(size)])
 
     def searched(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
         """See `accelerate`, from one place."""
@@ -181,12 +175,6 @@ class StickingMotion(FreeMotion):
         none: dict[str, Sense] = dict.fromkeys(self.resisted, 0.0)
         found: Array = self._linearised(free, np.zeros_like(at.q), none)[1][:, :, 0]
         return found * np.sqrt(self.unit) * np.sqrt(self.unit)[:, None]
-
-
-def repeated(at: Moment, times: int) -> Moment:
-    """The same state in more lanes."""
-    q, rate, integral, bristles = (np.tile(part, (1, times)) for part in (at.q, at.rate, at.integral, at.bristles))
-    return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles)
 
 
 def _steps(

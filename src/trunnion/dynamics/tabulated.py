@@ -119,7 +119,7 @@ class TabulatedRates:
         remembering = [(rub, slip) for rub, slip in zip(self.tables.rubs, slips, strict=True) if rub.bristle >= 0]
         memory = [_relaxed(self.tables, rub, float(slip) * speed, at) for rub, slip in remembering]
         error = self.drive.error(at.time, at.rate[0], at.integral[0], at.now) if self.drive.controlled else [0.0]
-        return Rates(np.array([second]), np.asarray(error, float), np.array(memory), works, True)
+        return Rates(np.array([second]), np.asarray(error, float), np.array(memory), works, True, unique=True)
 
     def _forces(self, at: Moment, speed: float, matrix: Array, slips: Array) -> Forces:
         through = at.sense or (1.0 if speed >= 0.0 else -1.0)

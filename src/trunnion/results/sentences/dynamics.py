@@ -35,9 +35,21 @@ DYNAMICS: dict[str, Sentence] = {
     ),
     "simulate.no_acceleration": Sentence(
         ERROR,
-        "there is no acceleration, or there are several, at {time:~s} (coordinate {coordinate:.6g}, rate {rate:.6g}): "
-        "friction grows faster with the acceleration than what drives it",
+        "there is no acceleration at {time:~s} (coordinate {coordinate:.6g}, rate {rate:.6g}), as the mechanism locks "
+        "itself under its inertia: the effort that an acceleration takes (det ∂E/∂q̈) is {growth:.4g} of that without "
+        "friction, and must be above 0",
         "lower the friction or the inertia behind the joints that lock; see `trunnion locking`",
+    ),
+    "simulate.unsolved": Sentence(
+        ERROR,
+        "the accelerations are not found at {time:~s} (coordinate {coordinate:.6g}, rate {rate:.6g})",
+        "check the forces there: one of them has no value, jumps, or grows without bound",
+    ),
+    "simulate.dead_centre": Sentence(
+        ERROR,
+        "{driver} reaches its dead centre, {coordinate:.6g} {unit}, at {time:~s}: the links cannot be assembled beyond "
+        "it, and go on while {driver} turns round; the motion ends there",
+        "drive a joint that has no dead centre there, or limit the motion by a stop or a load",
     ),
     "simulate.not_assembled": Sentence(
         ERROR,

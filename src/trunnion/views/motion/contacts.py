@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["OF_CONTACTS", "check_kind", "forces", "gaps", "in_play", "orbit", "spectrum"]
+__all__ = ["OF_CONTACTS", "check_kind", "forces", "gaps", "in_play", "orbit", "pictures", "spectrum"]
 
 OF_CONTACTS = ("contacts", "gaps", "orbit", "spectrum")  # kinds of figures that need a joint in play
 LONGEST = 0.6  # of the clearance: how far the largest force is drawn beyond the wall
@@ -49,6 +50,14 @@ def refuse(result: xr.Dataset, kind: str) -> None:
     if kind == "spectrum" and "frequency" not in result.dims:
         what = "no contact forces over time: bodies are rigid, or there are too few rows"
         raise MechanismError(Finding(what, "--kind spectrum", "state a contact law, or give more --steps"))
+
+
+def pictures(result: xr.Dataset) -> Iterator[tuple[str, Figure]]:
+    """What a report has beside the courses, with what it shows: the ways of pins in their holes, and the spectrum."""
+    if in_play(result) and _pins(result):
+        yield "The ways of the pins in their holes, with the forces on the walls", orbit(result)
+    if "frequency" in result.dims:
+        yield "Amplitude of the contact forces over frequency", spectrum(result)
 
 
 def forces(axes: Axes, result: xr.Dataset, over: Abscissa) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.views.common.cycle import abscissa, series
+from trunnion.views.common.cycle import abscissa, names, series
 from trunnion.views.cycle.scene import scene
 from trunnion.views.motion.shown import OF_IMPACTS, Shown, drivers_of, energies
 
@@ -37,6 +37,7 @@ def motion_scene(shown: Shown) -> dict[str, Any]:
     own: dict[str, Any] = {
         "duration": last,
         "free": _free(kept),
+        "contacts": _contacts(kept),
         "energies": [{"label": text, "values": series(values)} for _, text, values in energies(kept)],
         "events": [
             {"at": float(f"{min(one.time, last) * factor:.9g}"), "word": one.word, "quiet": one.word in OF_IMPACTS}
@@ -66,6 +67,16 @@ def _picked(rows: xr.Dataset) -> NDArray[np.intp]:
     firsts = np.arange(0, count, -(-count // (MOST_ROWS // 2 - 1)))
     peaks = [begin + int(part.argmax()) for begin, part in zip(firsts, np.split(size, firsts[1:]), strict=True)]
     return np.unique([*firsts, *peaks, count - 1])
+
+
+def _contacts(rows: xr.Dataset) -> list[dict[str, Any]]:
+    """Normal force and gap of every contact of joints in play."""
+    known = names(rows, "contact") if "contact" in rows.dims else []
+    forces, gaps = (rows[f"contact_{name}"].values if known else () for name in ("normal_force", "gap"))
+    return [
+        {"name": name, "force": series(force), "gap": series(gap)}
+        for name, force, gap in zip(known, forces, gaps, strict=True)
+    ]
 
 
 def _free(rows: xr.Dataset) -> list[dict[str, Any]]:

@@ -20,7 +20,8 @@ __all__ = [
 Array = NDArray[np.float64]
 WORDS = {
     "break-away": "starts", "rest": "rests", "stick": "sticks", "lock": "locks", "motor-off": "motor off",
-    "brake": "brake on", "clutch-slips": "clutch slips", "clutch-holds": "clutch holds", "clutch-opens": "clutch opens",
+    "dead-centre": "dead centre", "brake": "brake on", "clutch-slips": "clutch slips", "clutch-holds": "clutch holds",
+    "clutch-opens": "clutch opens",
 }  # fmt: skip
 OF_IMPACTS = ("impact", "lift-off", "closes")  # events without a word in figures: the curves show them
 ENERGIES = (
@@ -38,7 +39,8 @@ ENERGIES = (
 
 NOISE = 1e-12  # of the largest reaction times 1 m, or of the largest energy: below is rounding
 # findings that tell where a motion ends early
-ENDS = {f"simulate.{code}" for code in ("range", "no_acceleration", "not_assembled", "step", "events", "stopped")}
+EARLY = ("range", "no_acceleration", "unsolved", "not_assembled", "dead_centre", "step", "events", "stopped")
+ENDS = {f"simulate.{code}" for code in (*EARLY, "no_contact_force")}
 
 
 class Happening(NamedTuple):

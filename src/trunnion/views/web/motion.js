@@ -22,6 +22,15 @@ export function energyChart(scene) {
   return series.length ? [{ title: "Works and energies", unit: "J", series }] : [];
 }
 
+/** Forces and gaps of the contacts of joints in play; none where there is none. */
+export function contactCharts(scene) {
+  const { contacts } = scene.motion;
+  const series = (key) => contacts.map((one, order) => ({ label: one.name, values: full(one[key], scene.count), kind: `k${order % 6}` }));
+  if (!contacts.length) return [];
+  const note = "Below 0 the surfaces press each other in.";
+  return [{ title: "Contact forces", unit: "N", series: series("force") }, { title: "Gaps", unit: "m", note, series: series("gap") }];
+}
+
 /** Coordinate and speed of every free driver at the present time, as [label, index => text]. */
 export function stateRows({ motion }) {
   return (motion?.free ?? []).flatMap(({ name, unit, coordinate, rate }) => [

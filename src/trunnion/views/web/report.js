@@ -6,7 +6,7 @@ import { at, full, magnitude, peak, solved, state, total, usualPeak } from "./da
 import { html, svg } from "./dom.js";
 import { fixed, quantity } from "./format.js";
 import { mechanismView } from "./mechanism.js";
-import { energyChart, listenToEvents, speedCharts, stateRows } from "./motion.js";
+import { contactCharts, energyChart, listenToEvents, speedCharts, stateRows } from "./motion.js";
 import { listenToKeys, player } from "./player.js";
 import { polarChart } from "./polar.js";
 import { seatCharts } from "./seat.js";
@@ -31,7 +31,7 @@ export function charts(scene, kinds) {
   if (scene.space === "spatial") reactions.push(momentChart(scene, kinds));
   const power = motion && !moved(scene, lost) ? [] : [powerChart(scene, lost)];
   const list = motion
-    ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...reactions, ...losses, ...power]
+    ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...contactCharts(scene), ...reactions, ...losses, ...power]
     : [...efforts, ...drivers.flatMap((driver) => rateChart(scene, driver)), ...losses, ...reactions, ...power];
   if (sums.efficiency_instant) list.push(efficiencyChart(scene));
   return [...list, ...errorCharts(scene, kinds)];

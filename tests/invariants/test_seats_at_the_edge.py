@@ -143,3 +143,38 @@ def test_passages_are_found_between_wide_steps(steps: int) -> None:
     first, *more = finding["figures"]["at"].split(", ")
     assert 4.89 < float(first.removeprefix("at ").removesuffix("° (end 1)")) < 4.97
     assert more == ["at 191.6° (end 1)", "at 191.6° (end 2)"]
+
+
+@pytest.mark.parametrize(("pinch", "known"), [("0.05 mm", False), ("5 mm", True)])
+def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch: str, known: bool) -> None:
+    """A ram touches its work with the pins on one side of their holes and not on the other: what flows is not known.
+
+    Pressed by much more than the play, nearly all of the work is known: it is that of the spring.
+    """
+    pin = {"at": [0, 0], "axis": [1, 0]}
+    model = {
+        "trunnion": 1, "name": "press", "space": "planar", "gravity": [0, 0],
+        "dimensions": {"r": "40 mm", "l": "150 mm", "pinch": pinch},
+        "links": {
+            "ground": {"points": {"O": [0, 0], "S": pin, "W": ["r + l + 50 mm", 0]}},
+            "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
+            "ram": {"points": {"Q": [0, 0], "S": pin}},
+        },
+        "joints": {
+            "O": {"type": "revolute", "links": ["ground", "crank"]},
+            "P": {"type": "revolute", "links": ["crank", "rod"]},
+            "Q": {"type": "revolute", "links": ["rod", "ram"]},
+            "S": {"type": "prismatic", "links": ["ground", "ram"], "friction": 0},
+        },
+        "joint_defaults": {"pin": {"radius": "5 mm", "clearance": "0.05 mm"}, "friction": 0.1, "seat": "loaded"},
+        "drivers": {"O": {"range": ["-90 deg", "-1 deg"], "speed": "1 rad/s"}},
+        "springs": {"work": {"between": ["ground.W", "ram.Q"], "stiffness": "800 N/mm", "only": "push", "useful": True,
+                             "free_length": "50 mm + pinch"}},
+        "assembly": {"Q": ["l", 0]},
+    }  # fmt: skip
+    figures = {one.name: one for one in analyse(Mechanism(**model), steps=36).trunnion.summary}
+    for name in ("efficiency", "efficiency_error", "friction_power_mean"):
+        assert (figures[name].value is not None) == known
+    assert ("pins do not settle where" in figures["efficiency"].note) != known
+    assert figures["efficiency_ideal"].value is not None

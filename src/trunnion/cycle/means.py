@@ -18,7 +18,7 @@ from trunnion.algebra.quadrature import CANCELLED, Effort, integrals
 from trunnion.errors import Status
 from trunnion.solve.switches import Mechanisms, edges
 
-__all__ = ["AVERAGED", "Mean", "Means", "Powers", "means_of", "still"]
+__all__ = ["AVERAGED", "MOST_SUPPOSED", "SUPPOSED", "Mean", "Means", "Powers", "means_of", "still", "unknown"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -26,6 +26,8 @@ Powers = Callable[[Rows, Array], Mapping[str, Array]]
 
 # what `Powers` has of each lane and node, NaN where there is no answer
 AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
+SUPPOSED = "supposed_power"  # and may have: power through the drivers, W, where that of another mechanism stands in
+MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
 NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
 
@@ -49,7 +51,8 @@ class Means:
     """Means over one cycle, W; NaN where any place of it has no answer.
 
     drive_power: of all drivers; useful_power: that the useful loads take; friction_power: lost in all joints;
-    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N.
+    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N; supposed: share of
+    the power through the drivers that flows where another mechanism stands in (`SUPPOSED`).
     """
 
     drive_power: Mean
@@ -57,6 +60,7 @@ class Means:
     friction_power: Mean
     friction_power_mean: Array
     drive_effort_rms: Array
+    supposed: float = 0.0
 
     @property
     def drive_power_mean(self) -> float:
@@ -95,7 +99,9 @@ def means_of(
         found = powers(rows, time)
         driven, lost = np.sum(found["drive_power"], axis=0), found["friction_power"]
         known = [driven, found["useful_power"], np.sum(lost, axis=0), np.abs(found["power_residual"])]
-        return np.concatenate([np.stack(known), found["drive_effort"] ** 2, lost])
+        whole = np.abs(driven)
+        both = [whole, found.get(SUPPOSED, np.zeros_like(whole))]
+        return np.concatenate([np.stack(known), found["drive_effort"] ** 2, lost, np.stack(both)])
 
     def floor(sizes: Array) -> Array:
         """Powers that are nothing beside the others; how even the residual is does not matter."""
@@ -103,6 +109,7 @@ def means_of(
         least[:] = NEGLIGIBLE * np.max(sizes[:3], axis=0)
         least[3] = np.inf
         least[4 : 4 + drivers] = NEGLIGIBLE * np.max(sizes[4 : 4 + drivers], axis=0, initial=0.0)
+        least[-2:] = np.inf
         return least
 
     between = edges(of) if between is None else between
@@ -113,9 +120,16 @@ def means_of(
         rounding = np.maximum(CANCELLED * size, RESIDUALS * value[3])
         rounding[2] = max(rounding[2], CANCELLED * np.max(size[:3]))
         driven, useful, lost = (Mean(*(float(one[i]) for one in (value, error, size, rounding))) for i in range(3))
-        efforts = np.sqrt(value[4 : 4 + drivers])
-        told.append(Means(driven, useful, lost, value[4 + drivers :], efforts))
+        efforts, share = np.sqrt(value[4 : 4 + drivers]), float(value[-1] / value[-2]) if value[-2] > 0 else 0.0
+        told.append(Means(driven, useful, lost, value[4 + drivers : -2], efforts, share))
     return told
+
+
+def unknown(means: Means) -> Means:
+    """The same means without an answer; what share of them is supposed stays."""
+    no = Mean(np.nan, np.nan, np.nan, np.nan)
+    lost, efforts = (np.full_like(one, np.nan) for one in (means.friction_power_mean, means.drive_effort_rms))
+    return Means(no, no, no, lost, efforts, means.supposed)
 
 
 def still(arrays: Mapping[str, Array]) -> Means:

@@ -14,7 +14,7 @@ from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
 from trunnion.cycle.kept import needed
-from trunnion.cycle.means import AVERAGED, Means, means_of, still
+from trunnion.cycle.means import AVERAGED, MOST_SUPPOSED, SUPPOSED, Means, means_of, still, unknown
 from trunnion.cycle.near_locking import LOOKED
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
@@ -161,12 +161,14 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
         seen = around(time.ravel(), run.cycle)
         found = settle(run, seen, method, run.ideal(seen.times, method))
         valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
-        # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows there
+        # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows in a short one
         meant = _powers(run.ideal(time.ravel(), method=method), time)
-        return {name: np.where(valid, array, meant[name]) for name, array in _powers(found.back, time).items()}
+        powers = {name: np.where(valid, array, meant[name]) for name, array in _powers(found.back, time).items()}
+        return {**powers, SUPPOSED: np.where(valid, 0.0, np.abs(np.sum(meant["drive_power"], axis=0)))}
 
     between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
-    return means_of(of, seated, between, SEATED)[0]
+    means = means_of(of, seated, between, SEATED)[0]
+    return means if means.supposed <= MOST_SUPPOSED else unknown(means)
 
 
 def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:

@@ -14,7 +14,7 @@ from trunnion.cycle import contact_loss, diagnosis, near_locking, uncounted
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
-from trunnion.cycle.means import Means
+from trunnion.cycle.means import MOST_SUPPOSED, Means
 from trunnion.cycle.positions import Positions, positions
 from trunnion.cycle.scene import DRAWN
 from trunnion.errors import Finding, MechanismError, Status
@@ -405,6 +405,8 @@ def _why(means: Means, arrays: Arrays) -> str:
         return ""
     if np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return "not every position is solved"
+    if means.supposed > MOST_SUPPOSED:
+        return f"pins do not settle where {means.supposed:.0%} of the work flows"
     if not np.isfinite(means.drive_power.value):
         return "not every position between the steps is solved"
     if means.drive_power.net < 0:

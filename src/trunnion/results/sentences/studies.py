@@ -74,6 +74,12 @@ PLAY = {
         "the {statistic} is at {at}: the worst case of {measure} to first order, ±{worst:~{unit}}, is of that place; "
         "the figure and the files show the whole cycle besides",
     ),
+    "play.beside_jump": Sentence(
+        WARNING,
+        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
+        "what play does to the place of the jump is left out",
+        "use `trunnion tolerance` with samples and more --steps",
+    ),
     "play.no_effect": Sentence(
         NOTE,
         "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
@@ -104,6 +110,11 @@ PLAY = {
         ERROR,
         "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}; it does so "
         "{over}",
+        "reduce the play of the joints with the largest share",
+    ),
+    "limit.exceeded_there": Sentence(
+        ERROR,
+        "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}",
         "reduce the play of the joints with the largest share",
     ),
     "limit.kept": Sentence(

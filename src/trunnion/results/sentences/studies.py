@@ -378,6 +378,12 @@ ALLOCATION = {
         "confidence interval {low:.6g} to {high:.6g}, required are {target:g}",
         "to be surer take more samples, or require a higher yield",
     ),
+    "yield.spare": Sentence(
+        NOTE,
+        "fresh samples have {share:.6g}, 95 % confidence interval {low:.6g} to {high:.6g}, more than the required "
+        "{target:g}",
+        "more samples may lower the cost",
+    ),
     "yield.unresolved": Sentence(
         WARNING,
         "even with all tolerances at their least the samples have a yield of {share:.6g} (95 % confidence interval "

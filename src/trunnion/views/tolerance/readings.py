@@ -26,6 +26,7 @@ __all__ = [
     "MeasureReading",
     "failures",
     "fixed",
+    "is_play",
     "limits_text",
     "methods",
     "outer",
@@ -269,7 +270,7 @@ class MeasureReading:
         short = _without_section(paths)
         found = [
             ContributionRow(
-                path, short[j], unit, with_unit(lower[j], upper[j], unit), float(slope[j]), float(worst[j]),
+                path, short[j], unit, with_unit(lower[j], upper[j], unit, path), float(slope[j]), float(worst[j]),
                 float(worst[j]) / total if total > 0 else math.nan, float(rss[j]), float(variance[j]),
             )
             for j, (path, unit) in enumerate(zip(paths, units, strict=True))
@@ -323,13 +324,19 @@ def _signed(value: float) -> str:
     return f"+{_short(value)}" if value > 0 else _short(value + 0.0)
 
 
-def with_unit(lower: float, upper: float, unit: str) -> str:
+def is_play(path: str) -> bool:
+    """Whether a parameter is the play of a joint: how far its pin may be from the middle, to any side."""
+    return path.startswith("joints.") and path.endswith(".clearance") and path.count(".") == 2
+
+
+def with_unit(lower: float, upper: float, unit: str, path: str) -> str:
     """Limits of a toleranced number with their unit."""
     if math.isnan(lower) or math.isnan(upper):
         return ""
     size = max(abs(lower), abs(upper))
     factor, shown = drawn_in(size, unit)
-    return joined(limits_text(lower * factor, upper * factor), shown.replace(" ", "\u00a0"))
+    told = f"within\u00a0{_short(upper * factor)}" if is_play(path) else limits_text(lower * factor, upper * factor)
+    return joined(told, shown.replace(" ", "\u00a0"))
 
 
 def _known(value: float) -> float:

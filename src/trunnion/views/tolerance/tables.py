@@ -356,7 +356,7 @@ def inputs(result: xr.Dataset) -> TextTable:
     rows = []
     for j, path in enumerate(names(result, "parameter")):
         unit = about[path].unit
-        told = [value_text(float(nominal[j]), unit), limits_of(float(lower[j]), float(upper[j]), unit)]
+        told = [value_text(float(nominal[j]), unit), limits_of(float(lower[j]), float(upper[j]), unit, path)]
         told += [value_text(float(row[j]), unit, 4) if row.size else "" for row in (deviation, shift)]
         rows.append([path, *told])
     return TextTable(

@@ -196,3 +196,25 @@ def test_fresh_samples_of_an_allocation_are_told() -> None:
     (found,) = coded(result, "yield.spare")
     assert found.figures["low"] == float(result["yield_checked_low"]) > 0.9
     assert "yield of fresh samples" in headed(result)
+
+
+def test_a_sensitivity_is_by_the_unit_of_the_tolerance() -> None:
+    dimensions = {**SLIDER["dimensions"], "F": "250 kN ± 5 kN"}
+    loads = {"work": {"joint": "S", "resisting_force": "F"}}
+    more = {"tolerances": {}, "measures": {"torque": {"effort": "O", "at": "60 deg"}}}
+    result = trunnion.tolerance(slider(dimensions=dimensions, loads=loads, **more), methods=["linear"], steps=12)
+    rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
+    (row,) = [[cell.replace("\u00a0", " ") for cell in one] for one in rows if one[0] == "F"]
+    torque, half = float(result["nominal"][0]), 5 / 250
+    assert row[1] == "±5 kN"
+    assert row[2].endswith("/kN")
+    assert float(row[3].split()[0]) == pytest.approx(abs(torque) * half * 1e-3, abs=1e-4)  # kN m
+    assert float(row[2].split()[0].replace("−", "-")) == pytest.approx(torque / 250e3, rel=1e-3)
+
+
+def test_a_yield_and_its_interval_have_the_same_digits() -> None:
+    tight = slider(measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.25 mm"}})
+    (found,) = coded(trunnion.tolerance(tight, samples=300, steps=12), "limit.missed")
+    told = re.search(r"yield ([\d.]+) % \(95 % interval ([\d.]+) to ([\d.]+) %\)", found.what)
+    assert told
+    assert len({len(one.partition(".")[2]) for one in told.groups()}) == 1

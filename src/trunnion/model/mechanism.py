@@ -85,7 +85,7 @@ class Mechanism(Numbers):
         except ValidationError as error:
             findings = schema_findings(error, Mechanism, data)
             try:  # what can still be checked without the unreadable entries is, so that all is said in one go
-                mended, lost = repair(error, data)
+                mended, lost = repair(error, data, findings)
                 super().__init__(**mended)
             except ValidationError:
                 raise MechanismError(findings) from None

@@ -276,7 +276,7 @@ TOLERANCE = {
         lambda kept, done, samples: f"stopped before the end: {done:,} of {counted(samples, 'sample')}",
         lambda kept, done, samples: "continue with --resume" if kept else "use --checkpoint FILE to keep what is done",
     ),
-    "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}"),
+    "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}", quiet=True),
     "samples.machines": Sentence(
         NOTE,
         "the samples were computed on {kinds} kinds of machines, whose sines or logarithms differ in the last bit",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
-from trunnion.results.quantities import scale_of, signed
+from trunnion.results.quantities import decimals_of, scale_of, signed
 from trunnion.results.sentences import finding_for
 
 if TYPE_CHECKING:
@@ -132,7 +132,8 @@ def _short(counted: Sampled | None, i: int, sure: bool) -> list[str]:
     share, low, high, cpk = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk"))
     found = []
     if share < 1:
-        found.append(f"yield {100 * share:.6g} % (95 % interval {100 * low:.5g} to {100 * high:.5g} %)")
+        own, least, most = (f"{100 * one:.{decimals_of(high - low)}f}" for one in (share, low, high))
+        found.append(f"yield {own} % (95 % interval {least} to {most} %)")
     if cpk < 1 and not sure:
         found.append(f"Cpk {cpk:.3g}")
     return found

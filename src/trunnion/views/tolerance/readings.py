@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import drawn_in, joined, number, scale_of
+from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
 from trunnion.views.common.cycle import Abscissa, Array, names
 
 if TYPE_CHECKING:
@@ -351,7 +351,7 @@ def share(value: float, decimals: int | None = None) -> str:
     if math.isnan(value):
         return "—"
     if decimals is None:
-        decimals = _decimals(min(value, 1 - value))
+        decimals = decimals_of(min(value, 1 - value))
     return f"{fixed(100 * value, 0 if value in (0.0, 1.0) else decimals)}\u00a0%"
 
 
@@ -365,14 +365,9 @@ def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | 
     """A share, its interval, empty if there is none, and to how many decimals of a per cent they are told."""
     if math.isnan(low) or math.isnan(high):
         return share(value), "", None
-    decimals = _decimals(high - low)
+    decimals = decimals_of(high - low)
     least = share(low, decimals).removesuffix("\u00a0%")
     return share(value, decimals), f"{least} to {share(high, decimals)}", decimals
-
-
-def _decimals(small: float) -> int:
-    """Of a share in per cent, so that a part of this size shows two digits."""
-    return min(max(1 - math.floor(math.log10(100 * small)), 1), 8) if small > 0 else 1
 
 
 def failures(result: xr.Dataset) -> list[tuple[str, int]]:

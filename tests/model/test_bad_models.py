@@ -224,6 +224,16 @@ def test_a_mistyped_key_is_told_without_what_follows(section: str, entry: dict[s
     assert "did you mean" in found.remedy
 
 
+def test_a_motor_stated_by_its_power_is_told_what_to_state() -> None:
+    """And no unit of a power is expected there."""
+    data = YAML(typ="safe").load(FOURBAR)
+    data["drivers"]["A"]["motor"] = {"kind": "induction", "power": "5 kW"}
+    with pytest.raises(MechanismError) as error:
+        Mechanism(**data)
+    (found,) = (one for one in error.value.findings if one.where.endswith("motor.power"))
+    assert "did you mean 'breakdown_effort'" in found.remedy
+
+
 def test_doubts_are_kept_apart_from_errors(findings_of: FindingsOf, tmp_path) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / "model.yaml"
     path.write_text(FOURBAR.replace("AB: 2 m", "AB: 2 m\n  unused: 3").replace("friction: 0.1", "friction: 1.4"))

@@ -205,6 +205,35 @@ def test_python_raises_the_same_findings_without_lines(findings_of: FindingsOf) 
     assert all(one.line is None and not one.file for one in found)
 
 
+@pytest.mark.parametrize(
+    ("section", "entry"),
+    [
+        ("joint_defaults", {"pin": {"diameter": 0.015}, "friction": 0.1}),
+        (
+            "springs",
+            {"s": {"between": ["ground.A", "coupler.C"], "stifness": 10.0, "only": "push", "free_length": 9.0}},
+        ),
+    ],
+)
+def test_a_mistyped_key_is_told_without_what_follows(section: str, entry: dict[str, object]) -> None:
+    """The rest is checked as if the key that was meant stood there."""
+    data = YAML(typ="safe").load(FOURBAR) | {section: entry}
+    with pytest.raises(MechanismError) as error:
+        Mechanism(**data)
+    (found,) = error.value.findings
+    assert "did you mean" in found.remedy
+
+
+def test_a_motor_stated_by_its_power_is_told_what_to_state() -> None:
+    """And no unit of a power is expected there."""
+    data = YAML(typ="safe").load(FOURBAR)
+    data["drivers"]["A"]["motor"] = {"kind": "induction", "power": "5 kW"}
+    with pytest.raises(MechanismError) as error:
+        Mechanism(**data)
+    (found,) = (one for one in error.value.findings if one.where.endswith("motor.power"))
+    assert "did you mean 'breakdown_effort'" in found.remedy
+
+
 def test_doubts_are_kept_apart_from_errors(findings_of: FindingsOf, tmp_path) -> None:  # type: ignore[no-untyped-def]
     path = tmp_path / "model.yaml"
     path.write_text(FOURBAR.replace("AB: 2 m", "AB: 2 m\n  unused: 3").replace("friction: 0.1", "friction: 1.4"))

@@ -35,6 +35,7 @@ __all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"
 
 MOST_STEPS = 100_000_000
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
+COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks for more, as a jump does that seats move
 
 
 def check_steps(steps: int) -> None:
@@ -168,7 +169,9 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
 
     between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
     means = means_of(of, seated, between, SEATED)[0]
-    return means if means.supposed <= MOST_SUPPOSED else unknown(means)
+    if means.supposed > MOST_SUPPOSED:
+        return unknown(means)
+    return means_of(of, seated, between, FINER)[0] if means.efficiency_error > COARSE else means
 
 
 def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:

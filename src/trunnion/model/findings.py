@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import types
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -140,14 +141,21 @@ def _classes(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def repair(error: ValidationError, data: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
-    """The data without what could not be read, to check the rest; and the names of the entries lost with it."""
+def repair(
+    error: ValidationError, data: Mapping[str, Any], told: Sequence[Finding]
+) -> tuple[dict[str, Any], frozenset[str]]:
+    """The data without what could not be read, to check the rest; and the names of the entries lost with it.
+
+    told: `schema_findings`; an unknown key with one that was meant counts as that one.
+    """
     mended = {key: _mutable(value) for key, value in data.items()}
     lost: set[str] = set()
-    for one in reversed(list(_errors(error))):  # from the end, so that places in lists stay right
+    # from the end, so that places in lists stay right
+    for one, finding in reversed(list(zip(_errors(error), told, strict=True))):
         location = _plain(one["loc"])
         if one["type"] == "extra_forbidden":
-            _at(mended, location, lambda holder, key: holder.pop(key))
+            meant = re.fullmatch(r"did you mean '([^']*)'.*", finding.remedy)
+            _at(mended, location, partial(_renamed, name=meant and meant[1]))
         elif one["type"] == "quantity":
             _at(mended, location, _unreadable)
         else:
@@ -162,6 +170,12 @@ def _mutable(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _mutable(item) for key, item in value.items()}
     return [_mutable(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def _renamed(holder: Any, key: int | str, name: str | None) -> None:
+    value = holder.pop(key)
+    if name and name not in holder:
+        holder[name] = value
 
 
 def _unreadable(holder: Any, key: int | str) -> None:

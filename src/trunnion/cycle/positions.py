@@ -12,7 +12,7 @@ from trunnion.algebra.quadrature import Effort
 from trunnion.algebra.unwrap import Tail
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
-from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
+from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.kept import needed
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.near_locking import LOOKED
@@ -26,7 +26,7 @@ from trunnion.solve.eccentricity_rate import Lanes, around, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import settle
+from trunnion.solve.seating import Seats, settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
@@ -217,17 +217,24 @@ def _fill_as_built(
     if run.seats:
         seated = settle(run, seen, method, meant)
         back = seated.back
-        causes.note_seats(seated.offsets, seated.sticks, window.start)
         fill_chunk(arrays, back, part, window, causes)
-        fill_seats(arrays, run.seats, seated, window)
-        status = arrays["status"][window]
-        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
+        _note_seats(arrays, seated, window, causes)
     else:
         back = run.solve(part, method=method)
         fill_chunk(arrays, back, part, window, causes)
     fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
     return back
+
+
+def _note_seats(arrays: Arrays, seated: Seats, window: slice, causes: diagnosis.Causes) -> None:
+    """What the iteration came to in one chunk, beside the walk with the pins in their seats."""
+    causes.note_seats(seated.offsets, seated.sticks, window.start)
+    arrays["seat_rounds"][window] = seated.rounds
+    arrays["seat_travel"][window] = seated.told
+    arrays["seat_change"][window] = seated.change
+    status = arrays["status"][window]
+    np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
 
 
 def _fill_compiled(

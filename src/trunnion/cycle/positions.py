@@ -22,11 +22,12 @@ from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers,
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import Lanes, around, lanes
+from trunnion.solve.compiled_seats import CompiledLooks, SeatKernels, Travelling, as_inputs
+from trunnion.solve.eccentricity_rate import Lanes, around, lanes, part_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import Seats, settle
+from trunnion.solve.seating import Seats, seats_of, settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
@@ -34,6 +35,7 @@ __all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"
 
 
 MOST_STEPS = 100_000_000
+SEATED_AT_ONCE = 1 << 17  # positions whose seats the compiled engine settles together
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
 
 
@@ -247,41 +249,93 @@ def _fill_compiled(
     or_not: bool,
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
+    if run.seats:
+        return _fill_seated(arrays, ideal, run, time, method, causes, or_not)
     try:
         own = _kernel(run, run.values, time, arrays, method)
     except MechanismError:
         if or_not:
             return False
         raise
-    _fill_rest(arrays, own.fill(arrays, run.values, time)[1], run.solve, time, method, causes)
+    left = own.fill(arrays, run.values, time)[1]
+    _fill_rest(arrays, left, lambda lanes: run.solve(time[lanes], method=method), time, causes)
     if run.erring:
-        quick, system = replace(method, margin_up_to=0.0), run.system
-        labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-        meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
-        other = _kernel(run, run.ideal_values, time, meant, quick)
-        _fill_rest(meant, other.fill(meant, run.ideal_values, time)[1], run.ideal, time, quick)
-        ideal |= {name: meant[name] for name in ideal}
-        fill_errors(arrays, meant, link_numbers(system), slice(None))
-        blank(arrays, arrays["status"].astype(np.int8), slice(None))
+        _fill_beside_ideal(arrays, ideal, run, time, slice(0, len(time)), method)
+    return True
+
+
+def _fill_beside_ideal(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    window: slice,
+    method: FrictionMethod,
+) -> None:
+    """The ideal mechanism at some positions, compiled, and what differs from it."""
+    quick, system, part = replace(method, margin_up_to=0.0), run.system, time[window]
+    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
+    meant = results.allocate(labels, len(part), absent, wanted={*IDEAL, *COMPARED})
+    left = _kernel(run, run.ideal_values, part, meant, quick).fill(meant, run.ideal_values, part)[1]
+    _fill_rest(meant, left, lambda lanes: run.ideal(part[lanes], quick), part)
+    for name, array in ideal.items():
+        array[..., window] = meant[name]
+    fill_errors(arrays, meant, link_numbers(system), window)
+    blank(arrays, arrays["status"][window].astype(np.int8), window)
+
+
+def _fill_seated(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+    or_not: bool,
+) -> bool:
+    """The same with pins in seats, as many positions at a time as memory should hold twice."""
+    quick = replace(method, margin_up_to=0.0)
+    for low in range(0, len(time), SEATED_AT_ONCE):
+        window = slice(low, min(low + SEATED_AT_ONCE, len(time)))
+        part, some = time[window], {name: array[..., window] for name, array in arrays.items()}
+        seen = lanes(part, run.cycle)
+        try:
+            kernels = run.once(("seats", quick), lambda: SeatKernels(run, quick))
+            seats = seats_of(run, seen, CompiledLooks(kernels, seen.times))
+            inputs = {**run.values, **as_inputs(seats.offsets, seats.moving)}
+            own = _kernel(run, inputs, part, some, method)
+        except MechanismError:
+            if or_not:
+                return False
+            raise
+
+        def solved(places: NDArray[np.intp], seats: Seats = seats, low: int = low) -> Backward:
+            own = places - low
+            offsets = {path: numbers[own] for path, numbers in seats.offsets.items()}
+            return run.at(time[places], offsets, method, travel=part_of(seats.moving, own, whole=True))
+
+        _fill_rest(arrays, own.fill(some, inputs, part)[1] + low, solved, time, causes)
+        _note_seats(arrays, seats, window, causes)
+        _fill_beside_ideal(arrays, ideal, run, time, window, method)
     return True
 
 
 def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:
-    """The compiled kernel of some variables, made once."""
+    """The compiled kernel of some variables, made once for numbers of one kind."""
     read = tuple(name for name, array in arrays.items() if array.strides[-1])
-    key = "compiled", values is run.values, method, read
-    return run.once(key, lambda: CycleKernel(run, values, time, arrays, write, method))
+    of = Travelling(run.system, run.values, run.cycle, run.chosen) if len(values) > len(run.values) else run
+    key = "compiled", values is run.values, len(values), method, read
+    return run.once(key, lambda: CycleKernel(of, values, time, arrays, write, method))
 
 
 def _fill_rest(
     arrays: Arrays,
     left: NDArray[np.intp],
-    solve: Callable[..., Backward],
+    solve: Callable[[NDArray[np.intp]], Backward],
     time: NDArray[np.float64],
-    method: FrictionMethod,
     causes: diagnosis.Causes | None = None,
 ) -> None:
-    """Those positions that the compiled engine leaves to NumPy."""
+    """Those positions that the compiled engine leaves to NumPy. solve: the walk of some of them."""
     for low in range(0, len(left), CHUNK):
         lanes = left[low : low + CHUNK]
-        fill_lanes(arrays, solve(time[lanes], method=method), time[lanes], (lanes,), causes)
+        fill_lanes(arrays, solve(lanes), time[lanes], (lanes,), causes)

@@ -198,6 +198,10 @@ def _pairs(even: NDArray[np.bool_], own: Lane, step: int) -> tuple[Lane, Lane]:
     return before, after
 
 
-def part_of(found: Mapping[str, Travel], lanes: Sequence[int] | Lane) -> dict[str, Travel]:
-    """The velocities at some of the positions, as if the links were not accelerated by it."""
-    return {link: Travel(each(one.twist, lambda number: sliced(number, lanes))) for link, one in found.items()}
+def part_of(found: Mapping[str, Travel], lanes: Lane, whole: bool = False) -> dict[str, Travel]:
+    """The velocities at some of the positions, as if the links were not accelerated by it; whole: as they are."""
+
+    def part(numbers: Any) -> Any:
+        return each(numbers, lambda number: sliced(number, lanes))
+
+    return {link: Travel(part(one.twist), part(one.acceleration) if whole else None) for link, one in found.items()}

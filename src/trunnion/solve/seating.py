@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 from trunnion.solve.seats import GivenSeat
 
-__all__ = ["ROUNDS", "TOLERANCE", "Looks", "Pressed", "Seated", "Seats", "loads_of", "seats_of", "settle", "wanted"]
+__all__ = [
+    "ROUNDS", "TOLERANCE", "ByNumpy", "Looks", "Pressed", "Seated", "Seats", "loads_of", "seats_of", "settle", "wanted",
+]  # fmt: skip
 
 ROUNDS = 10  # most of the iteration
 MARGIN = 50.0  # by which a second round may gain less than the first
@@ -128,13 +130,12 @@ def _share(back: Backward, joint: str) -> Number | None:
     return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 
-class _ByNumpy:
-    """`Looks` of a run. start: motion and reactions of the ideal mechanism at the times of all lanes."""
+class ByNumpy:
+    """`Looks` of a run by NumPy."""
 
-    def __init__(self, run: Run, method: FrictionMethod, start: Backward, count: int) -> None:
+    def __init__(self, run: Run, method: FrictionMethod, first: Pressed, meant: Mapping[str, Any]) -> None:
         self._run, self._method = run, method
-        self.first = _told(run, start, count)
-        self.meant: Mapping[str, Any] = start.walk.motions
+        self.first, self.meant = first, meant
 
     def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
         return _told(self._run, self._run.at(time, offsets, self._method, travel=travel), len(time))
@@ -148,7 +149,8 @@ def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Se
 
     start: motion and reactions of the ideal mechanism at the times of all lanes; the first guess.
     """
-    looks = _ByNumpy(run, replace(method, margin_up_to=0.0), start, len(seen.times))
+    first = _told(run, start, len(seen.times))
+    looks = ByNumpy(run, replace(method, margin_up_to=0.0), first, start.walk.motions)
     found = seats_of(run, seen, looks)
     back = run.at(seen.times[seen.own], found.offsets, method, travel=found.moving)
     loads = {seat.joint: loads_of(back, seat) for seat in run.seats}

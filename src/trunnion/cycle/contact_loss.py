@@ -130,14 +130,17 @@ def _turned(run: Run, back: Backward, seat: GivenSeat, time: NDArray[np.float64]
         peak = float(np.nanmax(_size(load), initial=0.0))
         if peak <= NO_LOAD * largest:
             continue
-        for place, _ in _passages(load, peak, periodic=False, near=np.inf):
-            k = min(int(place), len(time) - 2)
-            if k == place:  # there is no load here, with nothing to look at more closely
-                yield float(time[k])
-                continue
-            fine = np.linspace(time[k], time[k + 1], PARTS + 1)
-            for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
-                yield float(np.interp(one, np.arange(len(fine)), fine))
+        places = [place for place, _ in _passages(load, peak, periodic=False, near=np.inf)]
+        # where there is no load there is nothing to look at more closely
+        yield from (float(time[int(place)]) for place in places if place == min(int(place), len(time) - 2))
+        wide = np.array([k for place in places if (k := min(int(place), len(time) - 2)) != place], np.intp)
+        if not len(wide):
+            continue
+        fine = np.linspace(time[wide], time[wide + 1], PARTS + 1, axis=-1)  # (passage, time)
+        close = _loads_at(run.ideal(fine.ravel()), seat, fine.ravel())[number].reshape(-1, *fine.shape)
+        for k, times in enumerate(fine):
+            for one, _ in _passages(close[:, k], peak, periodic=False):
+                yield float(np.interp(one, np.arange(len(times)), times))
 
 
 def _loads_at(back: Backward, seat: GivenSeat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -191,7 +194,7 @@ def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: 
     size = np.sum(force * force, axis=1)
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
-        across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
+        across = np.sqrt(np.sum((rate - force * (along / size)[:, None]) ** 2, axis=1))
         # no rate tells a jump, of the load or of a friction: there the second difference is no smaller than the first
         bends = np.sum((after - 2 * force + before) ** 2, axis=1) > 0.25 * np.sum((after - before) ** 2, axis=1)
         jumps = (np.sum(after * before, axis=1) < 0) | bends

@@ -27,7 +27,7 @@ from trunnion.solve.eccentricity_rate import Lanes, around, lanes, part_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import Seats, seats_of, settle
+from trunnion.solve.seating import Seats, by_numpy, seats_of, settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
@@ -51,7 +51,7 @@ class Positions:
 
     means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
     one walk that they all came of, where it was one and pins lie in no seats; ideal_arrays: what the means of the ideal
-    mechanism are made of.
+    mechanism are made of; compiled: whether the compiled engine found them.
     """
 
     arrays: Arrays
@@ -65,6 +65,7 @@ class Positions:
     losses: list[contact_loss.Loss]
     walked: Backward | None = None
     ideal_arrays: Arrays = field(default_factory=dict)
+    compiled: bool = False
 
 
 def positions(
@@ -95,7 +96,7 @@ def positions(
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     return replace(
         found,
-        means=_means(run, found.arrays, quick),
+        means=_means(run, found.arrays, quick, compiled=found.compiled and bool(run.seats)),
         ideal=_means(run, found.ideal_arrays, quick, ideal=True) if run.erring else None,
     )
 
@@ -120,11 +121,11 @@ def stretch(
     arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts, wanted)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    done = compiles(engine, run, max(steps, among), method) and _fill_compiled(
+    compiled = compiles(engine, run, max(steps, among), method) and _fill_compiled(
         arrays, ideal, run, time, method, causes, engine == "auto"
     )
     back = None
-    for low in range(0, 0 if done else steps, CHUNK):
+    for low in range(0, 0 if compiled else steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
         if run.erring:
             back = _fill_as_built(arrays, ideal, run, time, window, method, causes)
@@ -140,17 +141,17 @@ def stretch(
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     meant = still(ideal) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal)
+    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal, compiled)
 
 
-def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
+def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False, compiled: bool = False) -> Means:
     """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
     if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return still(arrays)
-    return run.once(("means", method, ideal), lambda: _averaged(run, method, ideal))
+    return run.once(("means", method, ideal, compiled), lambda: _averaged(run, method, ideal, compiled))
 
 
-def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
+def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> Means:
     """Means over the cycle, which do not depend on the positions that are asked for."""
     of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
     if ideal or not run.seats:
@@ -161,11 +162,14 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
 
     def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
         seen = around(time.ravel(), run.cycle)
-        found = settle(run, seen, method, run.ideal(seen.times, method))
+        found = settle(run, seen, method, CompiledLooks(_seat_kernels(run, method), seen.times) if compiled else None)
         valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
+        powers = _powers(found.back, time)
+        if np.all(valid):
+            return powers
         # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows there
         meant = _powers(run.ideal(time.ravel(), method=method), time)
-        return {name: np.where(valid, array, meant[name]) for name, array in _powers(found.back, time).items()}
+        return {name: np.where(valid, array, meant[name]) for name, array in powers.items()}
 
     between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
     return means_of(of, seated, between, SEATED)[0]
@@ -217,7 +221,7 @@ def _fill_as_built(
     for name, array in ideal.items():
         array[..., window] = scratch[name]
     if run.seats:
-        seated = settle(run, seen, method, meant)
+        seated = settle(run, seen, method, by_numpy(run, seen, method, meant))
         back = seated.back
         fill_chunk(arrays, back, part, window, causes)
         _note_seats(arrays, seated, window, causes)
@@ -300,8 +304,7 @@ def _fill_seated(
         part, some = time[window], {name: array[..., window] for name, array in arrays.items()}
         seen = lanes(part, run.cycle)
         try:
-            kernels = run.once(("seats", quick), lambda: SeatKernels(run, quick))
-            seats = seats_of(run, seen, CompiledLooks(kernels, seen.times))
+            seats = seats_of(run, seen, CompiledLooks(_seat_kernels(run, quick), seen.times))
             inputs = {**run.values, **as_inputs(seats.offsets, seats.moving)}
             own = _kernel(run, inputs, part, some, method)
         except MechanismError:
@@ -318,6 +321,11 @@ def _fill_seated(
         _note_seats(arrays, seats, window, causes)
         _fill_beside_ideal(arrays, ideal, run, time, window, method)
     return True
+
+
+def _seat_kernels(run: Run, method: FrictionMethod) -> SeatKernels:
+    """The compiled kernels by which pins settle in their seats, made once."""
+    return run.once(("seats", method), lambda: SeatKernels(run, method))
 
 
 def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:

@@ -19,12 +19,11 @@ from trunnion.solve.eccentricity_rate import Moved, moved
 from trunnion.solve.forward import Travel
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.seating import ByNumpy, Pressed, wanted
+from trunnion.solve.seating import ByNumpy, Pressed, centred, wanted
 from trunnion.solve.system import Values, rubbing
 
 __all__ = ["CompiledLooks", "SeatKernels", "Travelling", "as_inputs"]
 
-FEW = 256  # positions that NumPy does as quickly
 RATE, SPEED = "rate ", "speed "  # before the path of an offset, the name of a joint
 Tell = Callable[[Backward], dict[str, Number]]
 
@@ -40,18 +39,18 @@ class SeatKernels:
     def __init__(self, run: Run, method: FrictionMethod) -> None:
         self.run, self.method = run, method
         self.loaded = [seat for seat in run.seats if seat.given is None]
-        time = np.zeros(2)
-        start = run.ideal(time, method)
+        start = run.ideal(np.zeros(1), method)
         self.links = [link for module in run.system.plan.modules for link in module.links]
         self.motion = {link: start.walk.motions[link] for link in self.links}
         self.paths = list(wanted(run.seats, start))
         offsets = {path: np.zeros((1, 2)) for path in self.paths}
         rates = {RATE + path: np.zeros((1, 2)) for path in self.paths}
-        self.ideal = self._kernel(self._tell_ideal, run.ideal_values, time)
-        self.rounds = self._kernel(self._tell, {**run.values, **offsets}, time)
-        self.moved = self._kernel(self._tell_moved, {**run.values, **offsets, **rates}, time, forces=False)
+        own = list(self._tell(start))
+        self.ideal = self._kernel(self._tell_ideal, [*own, *self._names(2)], run.ideal_values)
+        self.rounds = self._kernel(self._tell, own, {**run.values, **offsets})
+        self.moved = self._kernel(self._tell_moved, self._names(3), {**run.values, **offsets, **rates}, forces=False)
 
-    def _kernel(self, tell: Tell, values: Values, time: Array, forces: bool = True) -> VectorKernel:
+    def _kernel(self, tell: Tell, names: Iterable[str], values: Values, forces: bool = True) -> VectorKernel:
         last: tuple[Backward | None, dict[str, Number]] = None, {}
 
         def told(back: Backward) -> dict[str, Number]:
@@ -61,12 +60,10 @@ class SeatKernels:
                 last = back, tell(back)
             return last[1]
 
-        with np.errstate(all="ignore"):
-            names = list(tell(self.run.solve(time, values, self.method)))
         figures = {name: lambda back, name=name: told(back)[name] for name in names}
         what = f"seats {tell.__name__}"
         kernel = VectorKernel(self.run, figures, forces, self.method, gravest=Status.SOLVED, described=what)
-        kernel.check(values, time)
+        kernel.check(values, np.zeros(2))
         return kernel
 
     def _tell(self, back: Backward) -> dict[str, Number]:
@@ -81,11 +78,14 @@ class SeatKernels:
         found = moved(self.run, values, {path: values[RATE + path] for path in self.paths}, back.walk.time)
         return _numbered(found.items())
 
+    def _names(self, parts: int) -> list[str]:
+        return [name for link in self.links for name in _names(link, parts * _size(self.motion[link]))]
+
     def motions(self, found: Mapping[str, Array], parts: int) -> dict[str, tuple[Any, ...]]:
         """So many twists or accelerations of every link, from the rows of their numbers."""
         told = {}
         for link in self.links:
-            rows = iter(found[name][0] for name in _names(link, parts * len(list(flat(self.motion[link].twist)))))
+            rows = iter(found[name][0] for name in _names(link, parts * _size(self.motion[link])))
             told[link] = tuple(each(self.motion[link].twist, lambda _, rows=rows: next(rows)) for _ in range(parts))
         return told
 
@@ -101,10 +101,8 @@ class CompiledLooks(ByNumpy):
             link: _Motion(*parts) for link, parts in kernels.motions(found, 2).items()
         })  # fmt: skip
 
-    def pressed(
-        self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None
-    ) -> Pressed:
-        if travel or len(time) < FEW:
+    def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
+        if travel or len(time) == 1:
             return super().pressed(time, offsets, travel)
         values = {**self._kernels.run.values, **as_inputs(offsets, {})}
         return self._pressed(self._kernels.rounds.curves(values, time)[0])
@@ -127,7 +125,7 @@ class CompiledLooks(ByNumpy):
         }
         offsets = {
             path: np.full(count, float(stated[path])) if path in stated
-            else np.nan_to_num(found[path][0], posinf=0.0, neginf=0.0)
+            else centred(found[path][0])
             for path in kernels.paths
         }  # fmt: skip
         speeds = [found[SPEED + joint][0] for joint in rubbing(kernels.run.system)]
@@ -158,7 +156,7 @@ class Travelling(Run):
     def _travel(self, values: Values) -> dict[str, Travel]:
         found = {}
         for link, motion in self._still.items():
-            count = 2 * len(list(flat(motion.twist)))
+            count = 2 * _size(motion)
             if f"travel.{link} 0" in values:
                 rows = iter(values[f"travel.{name}"] for name in _names(link, count))
                 found[link] = Travel(*(each(motion.twist, lambda _, rows=rows: next(rows)) for _ in range(2)))
@@ -176,6 +174,11 @@ def as_inputs(offsets: Mapping[str, Array], moving: Mapping[str, Travel]) -> dic
 def _numbered(parts: Iterable[tuple[str, Any]]) -> dict[str, Number]:
     """The numbers in nested tuples, each under its name and its place."""
     return {f"{name} {k}": number for name, part in parts for k, number in enumerate(flat(tuple(part)))}
+
+
+def _size(motion: Any) -> int:
+    """Numbers of a twist."""
+    return len(list(flat(motion.twist)))
 
 
 def _names(name: str, count: int) -> list[str]:

@@ -161,14 +161,16 @@ def _rates(run: Run, seen: Lanes, offsets: Offsets) -> tuple[dict[str, NDArray[n
     bends by more than BEND from a lane to the next and the one after; so does one that is known on one side alone.
     There the rate is taken on the side on which all turn least, and is 0 where that is more than QUICK.
     """
-    inner = np.arange(len(seen.times))[seen.inner]
-    before, after = inner - seen.step, inner + seen.step
+    count, step = len(seen.times), seen.step
+    sides = slice(0, count - 2 * step), seen.inner, slice(2 * step, count)
+    before, inner, after = (np.arange(count)[side] for side in sides)
     ends = [[f"seats.{seat.joint}.{key}" for key in end] for seat in run.seats for end in seat.play.model.ends]
     bend = back = ahead = np.zeros(len(inner))
     for paths in ends:
-        was, is_, will = ([offsets[path][side] for path in paths] for side in (before, inner, after))
+        was, is_, will = ([offsets[path][side] for path in paths] for side in sides)
         # a pin whose load is not known lies in the middle: from there to its wall is a jump, not a way
-        size = np.max([np.sqrt(np.sum(np.square(side), axis=0)) for side in (was, is_, will)], axis=0)
+        far = np.sqrt(sum(offsets[path] ** 2 for path in paths))
+        size = np.maximum(np.maximum(far[sides[0]], far[sides[1]]), far[sides[2]])
         scale = 1 / np.where(size > 0, size, np.inf)
         back = np.maximum(back, scale * _apart(was, is_))
         ahead = np.maximum(ahead, scale * _apart(is_, will))

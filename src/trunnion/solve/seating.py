@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 from trunnion.solve.seats import GivenSeat
 
 __all__ = [
-    "ROUNDS", "TOLERANCE", "ByNumpy", "Looks", "Pressed", "Seated", "Seats", "loads_of", "seats_of", "settle", "wanted",
+    "ROUNDS", "TOLERANCE", "ByNumpy", "Looks", "Pressed", "Seated", "Seats", "by_numpy", "centred", "loads_of",
+    "seats_of", "settle", "wanted",
 ]  # fmt: skip
 
 ROUNDS = 10  # most of the iteration
@@ -144,17 +145,19 @@ class ByNumpy:
         return rate.moved(self._run, {**self._run.values, **offsets}, rates, time)
 
 
-def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Seated:
-    """The positions of some lanes with every pin in its seat.
-
-    start: motion and reactions of the ideal mechanism at the times of all lanes; the first guess.
-    """
-    first = _told(run, start, len(seen.times))
-    looks = ByNumpy(run, replace(method, margin_up_to=0.0), first, start.walk.motions)
-    found = seats_of(run, seen, looks)
+def settle(run: Run, seen: Lanes, method: FrictionMethod, looks: Looks | None = None) -> Seated:
+    """The positions of some lanes with every pin in its seat. looks: by which they settle, by NumPy if not given."""
+    found = seats_of(run, seen, looks or by_numpy(run, seen, method))
     back = run.at(seen.times[seen.own], found.offsets, method, travel=found.moving)
     loads = {seat.joint: loads_of(back, seat) for seat in run.seats}
     return Seated(**vars(found), back=back, loads=loads)
+
+
+def by_numpy(run: Run, seen: Lanes, method: FrictionMethod, start: Backward | None = None) -> ByNumpy:
+    """`Looks` at some lanes by NumPy. start: motion and reactions of the ideal mechanism at all of them, if known."""
+    quick = replace(method, margin_up_to=0.0)
+    start = start or run.ideal(seen.times, quick)
+    return ByNumpy(run, quick, _told(run, start, len(seen.times)), start.walk.motions)
 
 
 def seats_of(run: Run, seen: Lanes, looks: Looks) -> Seats:
@@ -209,8 +212,7 @@ def _iterate(
     ACM 12 (1965) 547-560, doi:10.1145/321296.321305).
     """
     paths = list(offsets)
-    before = after = np.zeros((len(paths), 0))
-    last = np.full(len(left), 1 / MARGIN)
+    last, earlier, kept = np.full(len(left), 1 / MARGIN), None, left
     while len(left):
         part = {path: numbers[left] for path, numbers in offsets.items()}
         goal, speeds = looks.pressed(time[left], part, part_of(moving, left) if moving else None)
@@ -218,15 +220,19 @@ def _iterate(
         rounds[left] += 1
         now = _change(run.seats, part, goal)
         change[left] = now * np.minimum(now / np.where(last > 0, last, 1.0), 1.0)
-        here, there = (np.array([one[path] for path in paths]) for one in (part, goal))
-        following = there
-        if after.size:
+        for path in paths:
+            offsets[path][left] = goal[path]
+        if earlier:
+            slow = np.flatnonzero(now > SLUGGISH * last)
+            steps = ((earlier, kept[slow]), ((part, goal), slow))
+            before, after, here, there = (
+                np.array([one[path][places] for path in paths]) for both, places in steps for one in both
+            )
             ahead = _at_the_wall(run.seats, paths, _extrapolated(before, after, here, there), there)
-            following = np.where(now > SLUGGISH * last, ahead, there)
-        for path, numbers in zip(paths, following, strict=True):
-            offsets[path][left] = numbers
-        open_ = (change[left] > TOLERANCE) & (rounds[left] < ROUNDS)
-        before, after, last, left = here[:, open_], there[:, open_], now[open_], left[open_]
+            for path, numbers in zip(paths, ahead, strict=True):
+                offsets[path][left[slow]] = numbers
+        earlier, kept = (part, goal), np.flatnonzero((change[left] > TOLERANCE) & (rounds[left] < ROUNDS))
+        last, left = now[kept], left[kept]
 
 
 def _extrapolated(
@@ -254,15 +260,20 @@ def _at_the_wall(
 
 
 def _told(run: Run, back: Backward, count: int) -> Pressed:
-    """What a walk by NumPy says of the seats; a pin whose load is not known (locked, open) is left in the middle."""
-    offsets = {path: np.nan_to_num(_row(number, count), posinf=0.0, neginf=0.0)
-               for path, number in wanted(run.seats, back).items()}  # fmt: skip
+    """What a walk by NumPy says of the seats."""
+    offsets = {path: centred(_row(number, count)) for path, number in wanted(run.seats, back).items()}
     speeds = [_row(back.slips[joint].speed, count) for joint in rubbing(run.system)]
     return Pressed(offsets, np.array(speeds).reshape(len(speeds), count))
 
 
 def _row(number: Number, count: int) -> Array:
     return np.array(np.broadcast_to(primal(number), (count,)), float)
+
+
+def centred(offsets: Array) -> Array:
+    """The same array; a pin whose load is not known (locked, not assembled) is left in the middle."""
+    offsets[~np.isfinite(offsets)] = 0.0
+    return offsets
 
 
 def wanted(found: Sequence[GivenSeat], back: Backward) -> dict[str, Number]:

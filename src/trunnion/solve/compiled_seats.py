@@ -24,6 +24,7 @@ from trunnion.solve.system import Values, rubbing
 
 __all__ = ["CompiledLooks", "SeatKernels", "Travelling", "as_inputs"]
 
+FEW = 256  # positions that NumPy does as quickly; they are those that are hard to settle, where rounding decides
 RATE, SPEED = "rate ", "speed "  # before the path of an offset, the name of a joint
 Tell = Callable[[Backward], dict[str, Number]]
 
@@ -102,7 +103,7 @@ class CompiledLooks(ByNumpy):
         })  # fmt: skip
 
     def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
-        if travel or len(time) == 1:
+        if travel or len(time) < FEW:
             return super().pressed(time, offsets, travel)
         values = {**self._kernels.run.values, **as_inputs(offsets, {})}
         return self._pressed(self._kernels.rounds.curves(values, time)[0])

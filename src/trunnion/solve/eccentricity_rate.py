@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Lanes", "Moved", "around", "lanes", "moved", "part_of", "travel"]
 
 BEND = 0.005  # rad: change of the angle that a seat turns from one lane to the next; more is no even turning
+ALIKE = 1e-6  # by which the ways of the seats on both sides of a lane may differ by rounding
 QUICK = 0.1  # rad from one lane to the next, likewise
 FINE = 1440  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
 
@@ -177,8 +178,9 @@ def _rates(run: Run, seen: Lanes, offsets: Offsets) -> tuple[dict[str, NDArray[n
         middle = [0.5 * (a + b) for a, b in zip(was, will, strict=True)]
         bend = np.maximum(bend, 2 * scale * _apart(middle, is_))
     even = bend <= BEND
-    one = np.where(even | (back <= ahead), before, inner)
-    two = np.where(even | (back > ahead), after, inner)
+    behind = back <= (1 + ALIKE) * ahead
+    one = np.where(even | behind, before, inner)
+    two = np.where(even | ~behind, after, inner)
     span = seen.times[two] - seen.times[one]
     still = (span <= 0) | (~even & (np.minimum(back, ahead) > QUICK))
     found = {

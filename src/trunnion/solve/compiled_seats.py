@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -48,8 +48,10 @@ class SeatKernels:
         rates = {RATE + path: np.zeros((1, 2)) for path in self.paths}
         own = list(self._tell(start))
         self.ideal = self._kernel(self._tell_ideal, [*own, *self._names(2)], run.ideal_values)
-        self.rounds = self._kernel(self._tell, own, {**run.values, **offsets})
-        self.moved = self._kernel(self._tell_moved, self._names(3), {**run.values, **offsets, **rates}, forces=False)
+        if self.loaded:
+            lain = {**run.values, **offsets}
+            self.rounds = self._kernel(self._tell, own, lain)
+            self.moved = self._kernel(self._tell_moved, self._names(3), {**lain, **rates}, forces=False)
 
     def _kernel(self, tell: Tell, names: Iterable[str], values: Values, forces: bool = True) -> VectorKernel:
         last: tuple[Backward | None, dict[str, Number]] = None, {}
@@ -87,7 +89,7 @@ class SeatKernels:
         told = {}
         for link in self.links:
             rows = iter(found[name][0] for name in _names(link, parts * _size(self.motion[link])))
-            told[link] = tuple(each(self.motion[link].twist, lambda _, rows=rows: next(rows)) for _ in range(parts))
+            told[link] = tuple(_like(self.motion[link].twist, rows) for _ in range(parts))
         return told
 
 
@@ -160,7 +162,7 @@ class Travelling(Run):
             count = 2 * _size(motion)
             if f"travel.{link} 0" in values:
                 rows = iter(values[f"travel.{name}"] for name in _names(link, count))
-                found[link] = Travel(*(each(motion.twist, lambda _, rows=rows: next(rows)) for _ in range(2)))
+                found[link] = Travel(*(_like(motion.twist, rows) for _ in range(2)))
         return found
 
 
@@ -180,6 +182,11 @@ def _numbered(parts: Iterable[tuple[str, Any]]) -> dict[str, Number]:
 def _size(motion: Any) -> int:
     """Numbers of a twist."""
     return len(list(flat(motion.twist)))
+
+
+def _like(twist: Any, rows: Iterator[Number]) -> Any:
+    """The next numbers as a twist."""
+    return each(twist, lambda _: next(rows))
 
 
 def _names(name: str, count: int) -> list[str]:

@@ -193,9 +193,9 @@ def test_means_with_pins_in_seats_agree() -> None:
 
 def test_seats_are_compiled_from_fewer_positions_on() -> None:
     run = prepare(seated("durango-fourbar"))
-    assert compiles("auto", run, 50_000)
-    assert not compiles("auto", run, 360)
-    assert not compiles("auto", prepare(trunnion.read(DURANGO)), 50_000)
+    assert compiles("auto", run, 100_000)
+    assert not compiles("auto", run, 10_000)
+    assert not compiles("auto", prepare(trunnion.read(DURANGO)), 100_000)
 
 
 # ---- machine code that is kept --------------------------------------------------------------------------------

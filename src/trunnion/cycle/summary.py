@@ -44,6 +44,8 @@ from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "BALANCED",
+    "balance",
     "beside_jumps",
     "books",
     "dataset_of",
@@ -52,6 +54,7 @@ __all__ = [
     "figures",
     "inputs",
     "model_notes",
+    "peak",
     "references",
     "result_of",
     "scene_of",
@@ -383,7 +386,7 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
 
 def _rounding(arrays: Arrays, variable: str) -> float:
     """What is no more than rounding of the reactions or of the drive."""
-    return 1e-11 * max(_peak(arrays[variable]), _peak(arrays["drive_effort"]), 1e-300)
+    return 1e-11 * max(peak(arrays[variable]), peak(arrays["drive_effort"]), 1e-300)
 
 
 def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
@@ -432,15 +435,18 @@ def _why(means: Means, arrays: Arrays) -> str:
     return "the driver does no net work"
 
 
+# the power balance: what is left over, and what that is held against
+BALANCED = ("power_residual", "drive_power", "useful_power", "friction_power", "spring_power")
+
+
 def balance(arrays: Arrays) -> float:
     """Largest power residual over the largest power that any driver, or else any load, has."""
-    residual = _peak(arrays["power_residual"])
-    kinds = ("drive_power", "useful_power", "friction_power", "spring_power")
-    highest = max(_peak(arrays[name]) for name in kinds if name in arrays)
+    residual, *powers = (peak(arrays[name]) for name in BALANCED if name in arrays)
+    highest = max(powers)
     return residual / highest if highest > 0 else residual
 
 
-def _peak(values: NDArray[np.float64]) -> float:
+def peak(values: NDArray[np.float64]) -> float:
     """Largest magnitude, without a copy of the values."""
     return float(max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)))
 

@@ -41,6 +41,13 @@ def test_no_steady_cycle_is_a_finding_with_its_cause(program: Run) -> None:
     assert "O does not start" in err
 
 
+def test_a_press_that_stalls_is_an_error(program: Run) -> None:
+    code, out, err = program("simulate", PRESS, "--set", "force=1000kN", "--set", "breakdown_effort=20Nm", "--time=2s")
+    assert code == 1
+    assert "error: drivers.O: O stalls at 1.129 s, at 235.6°, with the motor on: 87.69 N m act on it" in out + err
+    assert "flywheel" in out + err
+
+
 @pytest.mark.parametrize("name", ["b.spectrum.csv", "b.impacts.csv", "b.events.csv --steady", "b.png --kind orbit"])
 def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found(
     program: Run, tmp_path: Path, name: str

@@ -97,6 +97,26 @@ def test_a_motor_too_weak_does_not_start() -> None:
     assert np.all(result["resting"].values == 1)
 
 
+def test_a_motor_too_weak_stalls() -> None:
+    """It gets slower by (0.6 − 0.5) N m/J and stops for good; a motor switched off, braked, or of no torque by then
+    does not stall, nor does one that breaks away again."""
+
+    constant = {"kind": "constant", "effort": 0.5}
+
+    def codes(**motor: Any) -> dict[str, dict[str, Any]]:
+        own = {"kind": "table", "over": "time", **motor} if "points" in motor else constant | motor
+        result = simulate(wheel(own, initial={"speed": 2.0}), 2.0, 4, 1e-11)
+        return {one.code: one.figures for one in result.trunnion.findings}
+
+    (figures,) = codes().values()
+    wanted = {"time": 1.0, "coordinate": 1.0, "place": "rad", "given": 0.5, "needed": 0.6, "unit": "N m", "driver": "A"}
+    assert figures == {key: one if isinstance(one, str) else pytest.approx(one) for key, one in wanted.items()}
+    assert list(codes()) == ["simulate.stalls"]
+    assert list(codes(off_from=0.5)) == list(codes(brake=0.1, brake_from=0.5)) == ["simulate.rests"]
+    assert list(codes(points=[[0, 0.5], [1.4, 0.5], [1.5, 0]])) == ["simulate.rests"]
+    assert not codes(points=[[0, 0.5], [1.4, 0.5], [1.5, 1]])
+
+
 def test_a_gear_a_rotor_and_a_loss() -> None:
     """(J + i² J_r η) ω̇ = i η T − T_f: ω = ω∞ (1 − e^(−t/τ))."""
     motor = {**LINEAR, "ratio": 3, "efficiency": 0.9, "inertia": 0.002}

@@ -304,19 +304,37 @@ def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> It
     if not (rests and solution.stretches and solution.stretches[-1].resting):
         return
     last, stays = solution.stretches[-1], all(one.resting for one in solution.stretches)
-    more: dict[str, Any] = {} if stays else {"times": len(rests), "time": rests[-1].time}
+    on = _on(motion, solution)
+    more: dict[str, Any] = {} if stays else {"time": rests[-1].time, **({} if on else {"times": len(rests)})}
     if motion.resisted:
         at = solution.layout.moment(np.array([last.begin]), solution.at(np.array([last.begin]))[0], now=last.now)
         shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
         worst = int(np.argmax(shares))
-        code = "none_starts" if stays else "all_rest"
+        code = "none_starts" if stays else "all_stall" if on else "all_rest"
         joint = motion.resisted[worst]
+        more |= {"drivers": on} if code == "all_stall" else {}
         yield finding_for(f"simulate.{code}", f"joints.{joint}", joint=joint, share=float(shares[worst]), **more)
         return
     given, needed = _holding(motion, solution, last)
     figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
-    code = "stays_at_rest" if stays else "rests"
+    code = "stays_at_rest" if stays else "stalls" if on else "rests"
+    if code == "stalls":
+        place = float(solution.at(np.array([last.begin]))[0][0, 0])
+        turns = motion.system.turns(motion.names[0])
+        more |= {"coordinate": place % (2 * np.pi) if turns else place, "place": "rad" if turns else "m"}
     yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
+
+
+def _on(motion: FreeMotion, solution: Solution) -> list[str]:
+    """The free drivers whose motor still acts at the end, through its clutch if it has one, and is not braked."""
+    last, time = solution.stretches[-1], np.array([solution.end])
+    at = solution.layout.moment(time, solution.at(time)[0], now=last.now)
+    found = []
+    for i, (name, drive) in enumerate(motion.drives.items()):
+        effort = drive.seen(last.now, last.slips).shaft(time, at.rate[i], at.integral[i], last.now)
+        if np.any(effort != 0.0) and not drive.braking(last.now):
+            found.append(name)
+    return found
 
 
 def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:

@@ -231,6 +231,37 @@ def test_it_turns_round_before_the_end_of_its_range() -> None:
     assert float(result["drive_coordinate"].values[0, 1]) == pytest.approx(-np.pi / 2 + 0.5, abs=1e-7)
 
 
+def test_the_largest_values_of_the_summary_are_those_between_the_rows() -> None:
+    """Of a press, where its work begins; the same by a hundred thousand rows, of which none is there exactly."""
+    press = read(EXAMPLES / "flywheel-press.yaml")
+    few = {one.name: one for one in simulate(press, 1.0, 20).trunnion.summary}
+    many = simulate(press, 1.0, 100_000)
+    effort = many["drive_effort"].values[0]
+    most = int(np.argmax(np.abs(effort)))
+    assert few["O.effort_max"].value == pytest.approx(effort[most], rel=1e-4)
+    assert few["O.effort_max"].value >= effort[most]
+    assert float(few["O.effort_max"].place.split()[1]) == pytest.approx(many["time"].values[most], abs=1e-4)
+    for joint, size in zip("OPQS", np.sqrt(np.sum(many["reaction_force"].values ** 2, axis=1)), strict=True):
+        assert few[f"{joint}.reaction_max"].value == pytest.approx(np.max(size), rel=1e-4)
+
+
+def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
+    """ω² = 2 g (1 − cos 0.5) at the bottom, a quarter of a period from the start."""
+    bob = {"points": {"A": [0, 0]}, "mass": 1, "centre": [1, 0]}
+    data: dict[str, Any] = {
+        "gravity": [0, -9.81],
+        "links": {"ground": {"points": {"A": [0, 0]}}, "bob": bob},
+        "joints": {"A": {"type": "revolute", "links": ["ground", "bob"]}},
+        "drivers": {"A": {"speed": 1, "free": True, "initial": {"coordinate": -np.pi / 2 + 0.5}}},
+    }
+    quarter = ellipk(np.sin(0.25) ** 2) / np.sqrt(9.81)
+    figure = next(
+        one for one in simulate(Mechanism(**data), 1.7 * quarter, 2).trunnion.summary if "speed_max" in one.name
+    )
+    assert figure.value == pytest.approx(-np.sqrt(2 * 9.81 * (1 - np.cos(0.5))), rel=1e-7)
+    assert figure.place == f"at {quarter:.4g} s"
+
+
 @pytest.mark.parametrize("options", [{"duration": -1.0}, {"duration": 1.0, "steps": 0}, {"tolerance": 1.0}])
 def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(MechanismError):

@@ -20,7 +20,7 @@ from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
 from trunnion.dynamics.rates import Seeing, Walks
-from trunnion.dynamics.result import Found, result_of
+from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion
@@ -103,7 +103,7 @@ def simulated(
     def found(tolerance: float) -> Found:
         motion.begin(None)
         solution = _run(integration_of(motion, known, duration, tolerance, progress, rates), row.copy())
-        return Found.of(motion, solution, Filling(motion, solution, time).books())
+        return Found.of(motion, solution, time, lambda when: Filling(motion, solution, when).books())
 
     return result_of(motion, _balanced(found, tolerance))
 
@@ -151,7 +151,11 @@ def _with_play(
     def found(tolerance: float) -> Found:
         integration = integrating(duration, tolerance, progress=progress, times=times)
         solution = _run(integration, row.copy())
-        return Found.of(motion, solution, Filling(motion, solution, time, bare).books(), integration.finished())
+
+        def between(when: Array) -> Books:
+            return Filling(motion, solution, when, bare).books()
+
+        return Found.of(motion, solution, time, between, integration.finished())
 
     return result_of(motion, _balanced(found, max(fine, FINEST)), run)
 

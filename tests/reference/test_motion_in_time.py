@@ -88,6 +88,18 @@ def test_an_induction_motor_runs_up_by_kloss() -> None:
         assert 1 - at(result, "drive_rate", time) / (50 * np.pi) == pytest.approx(slip, rel=1e-9)
 
 
+def test_an_induction_motor_by_its_data_sheet_carries_its_rated_torque_at_its_rated_speed() -> None:
+    """T_k = k P/ω_N and s_k = s_N (k + √(k² − 1)): 5.5 kW, 1455 rpm of 1500 rpm, breakdown ratio 2.8."""
+    motor = {
+        "kind": "induction",
+        "breakdown_effort": 101.0716,
+        "breakdown_slip": 0.1624602,
+        "synchronous_speed": 50 * np.pi,
+    }
+    result = simulate(wheel(motor, drag=5500 / (1455 * np.pi / 30), initial={"speed": 140.0}), 1.0, 1, 1e-10)
+    assert at(result, "drive_rate", 1.0) == pytest.approx(1455 * np.pi / 30, rel=1e-5)
+
+
 def test_a_motor_too_weak_does_not_start() -> None:
     result = simulate(wheel({**LINEAR, "stall_effort": 0.5}), 1.0, 10)
     (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.stays_at_rest"]

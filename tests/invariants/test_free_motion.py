@@ -211,6 +211,24 @@ def test_what_has_no_mass_has_no_acceleration() -> None:
     assert caught.value.findings[0].where == "drivers.A"
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.06])
+def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
+    """A piston that is the only mass, at its dead centre; not with a rotor, nor beside the dead centre."""
+    data = read(EXAMPLES / "flywheel-press.yaml").data()
+    for link in ("crank", "rod"):
+        data["links"][link] = {"points": data["links"][link]["points"]}
+    data["joint_defaults"], data["loads"] = {"friction": friction}, {}
+    motor = {"kind": "constant", "effort": 50}
+
+    def begun(start: float, **more: float) -> None:
+        simulate(Mechanism(**{**data, "drivers": {"O": {"speed": 10, "start": start, "motor": motor | more}}}), 1e-4, 1)
+
+    with pytest.raises(MechanismError, match="nothing moves that has a mass"):
+        begun(np.pi / 2)
+    begun(np.pi / 2, inertia=0.02)
+    begun(np.pi / 2 + 0.3)
+
+
 def test_it_turns_round_before_the_end_of_its_range() -> None:
     """A pendulum in a range that it nearly reaches: its period is that of the whole swing, by the elliptic integral."""
     data: dict[str, Any] = {

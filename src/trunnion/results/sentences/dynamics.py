@@ -60,7 +60,7 @@ DYNAMICS: dict[str, Sentence] = {
     "simulate.dead_centre": Sentence(
         ERROR,
         "{driver} reaches its dead centre, {coordinate:.6g} {unit}, at {time:~s}: the links cannot be assembled beyond "
-        "it, and go on while {driver} turns round; the motion ends there",
+        "it, and go on while {driver} moves back; the motion ends there",
         "drive a joint that has no dead centre there, or limit the motion by a stop or a load",
     ),
     "simulate.not_assembled": Sentence(

@@ -104,6 +104,8 @@ CASES = [
     ("10 rad/s", "0", 26, "drivers.A.speed", "the speed is 0", "however small"),
     ("10 rad/s", "10 rad/s, range: [1, 1]", 26, "drivers.A.range", "begins and ends at 1", "extent"),
     ("B: [AB, 0]", "B: [0, 0]", 10, "links.crank.points", "'A' and 'B' of the link 'crank' are at one", "move"),
+    ("10 rad/s", "10 rad/s, motor: {kind: induction, breakdown_effort: 9, breakdown_slip: 0.2, synchronous_speed: 1, "
+     "power: 5 kW}", 26, "drivers.A.motor.power", "the key 'power' is unknown", "breakdown_slip = s (k + √(k² − 1))"),
     (", force: [0, -1 kN]", "", 28, "loads.work", "this load is empty", "force or a moment"),
     ("link: coupler, at: C", "at: coupler.C", 28, "loads.work", "neither or both", "link: coupler, at: C"),
     ("AB: 2 m", "AB: ±2 mm", 4, "dimensions.AB", "a tolerance without a value", "tolerances: {"),

@@ -12,6 +12,7 @@ import pytest
 
 import trunnion
 from browsing import CHROMIUM
+from served import served
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
@@ -97,6 +98,40 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.click("text=Discard it")
         user.idle()
         assert user.state("s.text.value") == ""
+        user.keys("Control+z")
+        assert user.state("s.text.value") == drawn
+
+    def test_unsaved_work_on_a_file_is_offered_beside_another_sheet(user):
+        user.of("actions", "m.save(given)", "lever.yaml")
+        user.idle()
+        changed = user.state("s.text.value").replace("friction: 0.1", "friction: 0.2") + "# mine\n"
+        user.of("actions", "m.typed(given)", changed)
+        user.idle()
+        page = user.page.context.new_page()
+        user.page.close(run_before_unload=False)
+        user.page = page
+        user.open()
+        assert user.state("s.fileName.value") == "four-bar.yaml"
+        assert "Unsaved work on lever.yaml" in user.page.locator(".message-card").inner_text()
+        user.page.click("button:has-text('Open it')")
+        user.until("s.fileName.value === 'lever.yaml'")
+        assert user.state("s.text.value") == changed
+        user.of("actions", "m.save(given)", "lever.yaml")
+        user.idle()
+
+    def test_a_studio_that_has_stopped_says_so_and_answers_a_save(user, tmp_path):
+        (tmp_path / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], "utf-8")
+        with served(tmp_path, "four-bar.yaml") as other:
+            user.page.goto(other.address)
+            user.until("s.solved.value")
+        user.page.wait_for_selector("text=The studio on this machine has stopped")
+        for act in ("m.save()", "m.setValue(['gravity'], [0, 0])"):
+            user.state("s.say('')")
+            user.of("actions", act)
+            told = user.state("s.notice.value")
+            assert told["bad"]
+            assert "not saved" in told["words"] or "not carried out" in told["words"]
+        user.wrong.clear()  # the browser's own lines about a server that is gone
 
     @pytest.mark.slow
     def test_a_joint_is_dragged_and_brought_back(user):

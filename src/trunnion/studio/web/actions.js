@@ -22,13 +22,14 @@ export function start() {
 async function begun() {
   link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
     state.connected.value = open;
+    if (open) state.stopped.value = false;
+    else fetch("/files").then(({ ok }) => (state.stopped.value = !ok), () => (state.stopped.value = true)); // another token, or nobody there
     if (open && untracked(() => state.text.value)) solve();
   });
   const files = await fetch("/files").then((reply) => reply.json());
   state.folder.value = { folder: files.folder, names: files.files };
   if (!sheets) await opened(files);
-  const left = state.kept(null);
-  if (state.fileName.value !== null && left && left.text !== left.saved) state.waiting.value = left.time;
+  state.waiting.value = leftBehind(files.files);
   state.keepSteps();
   effect(() => {
     state.friction.value; // another friction is another answer
@@ -36,6 +37,12 @@ async function begun() {
   });
   const about = await link.ask("start", {}); // not before the picture, for it takes the whole of Python
   if (about && !about.error) state.about.value = about;
+}
+
+/** The latest of the sheets that were left with unsaved work, {name, time}, beside the open one; or null. */
+function leftBehind(names) {
+  const others = [null, ...names].filter((name) => name !== state.fileName.value).map((name) => ({ name, ...state.kept(name) }));
+  return others.filter(({ text, saved }) => text !== saved).sort((a, b) => b.time.localeCompare(a.time))[0] ?? null;
 }
 
 /** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
@@ -199,19 +206,20 @@ export function openSheet({ name, saved, content, first = null }) {
   return solve();
 }
 
-/** Open the unsaved sheet without a name, or throw it away. */
+/** Open the sheet that was left unsaved, or throw its work away. */
 export function takeWaiting(open) {
+  const { name } = state.waiting.value;
   state.waiting.value = null;
-  if (open) return openSheet({ name: null, saved: "", content: "" });
-  state.forget(null);
-  forgetPhoto(null);
+  if (open) return name === null ? openSheet({ name: null, saved: "", content: "" }) : openFile(name);
+  state.forget(name);
+  if (name === null) forgetPhoto(null);
   return null;
 }
 
-/** Leave the recovered work and go back to the file as it was saved. */
+/** Go back from the recovered work to the file as it was saved, as a step to undo. */
 export function discard() {
-  state.forget(state.fileName.value);
-  openSheet({ name: state.fileName.value, saved: state.savedText.value, content: state.savedText.value });
+  state.recovered.value = null;
+  return takeText(state.savedText.value, "Discard the recovered work");
 }
 
 export function openFile(name) {
@@ -283,7 +291,8 @@ async function shipped({ name, title }) {
 
 /** Save under the name, or ask for one; why it was refused, or "". */
 export function save(name = state.fileName.value) {
-  return name ? counted(stored(name)) : void (state.dialog.value = "save");
+  const gone = () => unsaved(`${name} was not saved: the studio on this machine does not answer.`);
+  return name ? counted(stored(name).catch(gone)) : void (state.dialog.value = "save");
 }
 
 async function stored(name) {

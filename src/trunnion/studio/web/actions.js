@@ -5,6 +5,7 @@ import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
+import { pictureOf } from "./picture.js";
 import { sheet } from "./sheet.js";
 import { connection, decode } from "./socket.js";
 
@@ -322,13 +323,21 @@ function unsaved(words) {
 /** Export and hand the file to the browser. */
 export async function exported(what) {
   state.say(`${what.toUpperCase()} is being made …`);
+  if (sheet.view && (what === "png" || what === "svg")) {
+    const { name, blob } = await counted(pictureOf(what));
+    return handOver(name, blob);
+  }
   const made = await counted(link.ask("export", { text: state.text.value, what, steps: STEPS }));
   if (!made) return;
   if (made.error) return state.say(made.error, true);
   const [first, count] = made.bytes.bytes;
-  const address = URL.createObjectURL(new Blob([made.body.slice(first, first + count)], { type: made.mime }));
-  const anchor = Object.assign(document.createElement("a"), { href: address, download: made.name });
+  handOver(made.name, new Blob([made.body.slice(first, first + count)], { type: made.mime }));
+}
+
+function handOver(name, blob) {
+  const address = URL.createObjectURL(blob);
+  const anchor = Object.assign(document.createElement("a"), { href: address, download: name });
   anchor.click();
   setTimeout(() => URL.revokeObjectURL(address), 1000);
-  state.say(`${made.name} exported.`);
+  state.say(`${name} exported.`);
 }

@@ -270,6 +270,24 @@ def test_a_drop_writes_what_the_drag_showed():
     assert "chooses the branch" in text
 
 
+def test_a_pin_on_the_ground_keeps_lengths_where_it_shall():
+    text = EXAMPLES[FOURBAR]
+    scene = ask(ask="model", text=text)["scene"]
+    to = np.add([scene["points"]["rocker.D"][axis][0] for axis in "xy"], [0.1, -0.2])
+    asked = {"text": text, "point": "D", "index": 0, "to": list(to)}
+    found = ask(ask="drag", keep=True, **asked)["points"]
+    for one, two in (("crank.B", "rocker.C"), ("rocker.C", "rocker.D")):
+        before, after = (
+            np.hypot(*(np.subtract(points[one][axis], points[two][axis]) for axis in "xy"))
+            for points in (scene["points"], found)
+        )
+        np.testing.assert_allclose(after, before, rtol=1e-6)
+    assert [found["rocker.D"][axis][0] for axis in "xy"] == pytest.approx(to, abs=1e-6)
+    free, locked = ask(ask="drag", **asked), ask(ask="drag", keep=True, locked=["C"], **asked)
+    assert free["changes"] == locked["changes"] != []
+    assert any(row[0] == "CD" for row in free["changes"])
+
+
 def test_a_crank_follows_by_turning():
     found = ask(ask="drag", text=EXAMPLES[FOURBAR], point="B", index=10, to=[0.0, 2.2])
     track = found["points"]["crank.B"]

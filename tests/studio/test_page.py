@@ -140,14 +140,15 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.mouse.move(x, y)
         user.page.mouse.down()
         for k in range(1, 16):
-            user.page.mouse.move(x - 2 * k, y - k)
+            user.page.mouse.move(x - k, y - 2 * k)
             user.page.wait_for_timeout(16)
         user.page.wait_for_timeout(150)
-        assert "BC" in user.page.locator("body").inner_text()
+        assert "BC" in user.page.locator(".next-step").inner_text()
         user.page.mouse.up()
         user.idle()
+        assert "Move C: BC 6 m → " in user.state("s.notice.value.words")
         there = user.handle("C")
-        assert np.hypot(there[0] - x + 30, there[1] - y + 15) < 6
+        assert np.hypot(there[0] - x + 15, there[1] - y + 30) < 6
         text = user.state("s.text.value")
         np.testing.assert_allclose(efforts(user), analysed(text)["drive_effort"].values[0], rtol=1e-6)
         user.keys("Control+z")
@@ -277,7 +278,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert body.search(first)[1] != body.search(turned)[1] == body.search(bare)[1]
         assert body.search(bare)[1] == user.page.locator(".plate.k0").first.get_attribute("d")
         assert f">{user.of('sheet', 'm.shown.value.scene.abscissa.label')} 90°<" in turned
-        forces = [len(re.findall(r'class="reaction k\d"[^>]*? d="M', one)) for one in drawn]
+        forces = [len(re.findall(r'class="reaction k[^"]*" d="M', one)) for one in drawn]
         assert forces[0] > 0 == forces[2]
         assert "handle" not in turned
 

@@ -171,13 +171,13 @@ def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
 
 
 def _drag(asked: Asked) -> dict[str, Any]:
-    """The cycle with a joint or point dragged to a place: nothing is written."""
+    """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links; no text changes."""
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
     sketch = _shown(state, steps, index)
     sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
-    changes = sketch.moved(point, to)
+    changes = sketch.moved(point, to, bool(asked.get("keep")))
     back = _walked(state, {change.path: change.value for change in changes}, steps)
     columns = _columns(back, steps)
     shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point

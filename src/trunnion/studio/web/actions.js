@@ -105,15 +105,15 @@ let queue = Promise.resolve(true);
 
 /**
  * Carry out gestures as one step to undo; one after the other, for each starts from what the one before left.
- * Steps in a row with the same `merge` are undone as one. Whether it could be done.
+ * Steps in a row with the same `merge` are undone as one. `places`: what they start from, else what is shown. Whether it could be done.
  */
-export function edit(gestures, merge = null) {
-  queue = queue.then(() => carryOut(gestures, merge)).catch((problem) => refuse(String(problem.message ?? problem)));
+export function edit(gestures, merge = null, places = null) {
+  queue = queue.then(() => carryOut(gestures, merge, places)).catch((problem) => refuse(String(problem.message ?? problem)));
   return counted(queue);
 }
 
-async function carryOut(gestures, merge) {
-  const before = present();
+async function carryOut(gestures, merge, places) {
+  const before = places ? { ...present(), places } : present();
   const done = await link.ask("edit", { ...before, gestures, fine: sheet.fine() });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);

@@ -62,7 +62,9 @@ export function ToolBar() {
 
 /** What to do next with the tool, over the sheet. */
 export function Hint() {
-  return state.tool.value === "select" ? null : html`<p class="next-step">${hint()}</p>`;
+  const dragged = state.live.value?.to; // what it changes stands where the hand looks
+  const words = state.tool.value !== "select" ? hint() : dragged ? state.notice.value.words : "";
+  return words ? html`<p class="next-step">${words}</p>` : null;
 }
 
 export function ZoomBar() {

@@ -85,7 +85,7 @@ export function BottomBar() {
         onClick=${() => state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`)}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
     </ul>
     <${Margin} />
-    <span class=${bad ? "notice bad" : "notice"}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>
+    <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore

@@ -2,6 +2,7 @@
 
 import { say } from "../web/data.js";
 import { svg } from "../web/dom.js";
+import { stemOf } from "./geometry.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 
@@ -40,8 +41,7 @@ async function sheetAlone() {
   copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
   copy.setAttribute("width", String(frame.width));
   copy.setAttribute("height", String(frame.height));
-  const stem = String(state.answer.value.entries?.name ?? "").replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "").slice(0, 60); // prettier-ignore
-  return { svg: copy, name: stem || "mechanism" };
+  return { svg: copy, name: stemOf(state.answer.value.entries) };
 }
 
 /** A picture as dots, twice as many as the sheet has. */

@@ -72,6 +72,12 @@ def test_an_empty_sheet_has_nothing_wrong():
     assert (found["entries"], found["findings"], found["solved"]) == ({}, [], False)
 
 
+def test_a_finding_names_what_it_is_about_once():
+    found = ask(ask="model", text=EXAMPLES["scotch-yoke"])["findings"]
+    rest = [f"{one['place']} {one['what']}"[:30] for one in found if "at rest" in one["what"]]
+    assert rest == ["joint S is momentarily at rest", "joint G is momentarily at rest"]
+
+
 def test_masses_of_links_are_not_solved():
     links = "".join(f"  l{k}: {{points: {{A: [0, 0]}}}}\n" for k in range(500))
     found = ask(ask="model", text=f"trunnion: 1\nlinks:\n{links}")

@@ -72,6 +72,12 @@ def test_an_empty_sheet_has_nothing_wrong():
     assert (found["entries"], found["findings"], found["solved"]) == ({}, [], False)
 
 
+def test_a_finding_names_what_it_is_about_once():
+    found = ask(ask="model", text=EXAMPLES["scotch-yoke"])["findings"]
+    rest = [f"{one['place']} {one['what']}"[:30] for one in found if "at rest" in one["what"]]
+    assert rest == ["joint S is momentarily at rest", "joint G is momentarily at rest"]
+
+
 def test_masses_of_links_are_not_solved():
     links = "".join(f"  l{k}: {{points: {{A: [0, 0]}}}}\n" for k in range(500))
     found = ask(ask="model", text=f"trunnion: 1\nlinks:\n{links}")
@@ -268,6 +274,24 @@ def test_a_drop_writes_what_the_drag_showed():
     np.testing.assert_allclose(*(np.array(effort, float) for effort in efforts), rtol=1e-4)
     assert found["places"]["rocker.C"] == pytest.approx(to, abs=1e-5)
     assert "chooses the branch" in text
+
+
+def test_a_pin_on_the_ground_keeps_lengths_where_it_shall():
+    text = EXAMPLES[FOURBAR]
+    scene = ask(ask="model", text=text)["scene"]
+    to = np.add([scene["points"]["rocker.D"][axis][0] for axis in "xy"], [0.1, -0.2])
+    asked = {"text": text, "point": "D", "index": 0, "to": list(to)}
+    found = ask(ask="drag", keep=True, **asked)["points"]
+    for one, two in (("crank.B", "rocker.C"), ("rocker.C", "rocker.D")):
+        before, after = (
+            np.hypot(*(np.subtract(points[one][axis], points[two][axis]) for axis in "xy"))
+            for points in (scene["points"], found)
+        )
+        np.testing.assert_allclose(after, before, rtol=1e-6)
+    assert [found["rocker.D"][axis][0] for axis in "xy"] == pytest.approx(to, abs=1e-6)
+    free, locked = ask(ask="drag", **asked), ask(ask="drag", keep=True, locked=["C"], **asked)
+    assert free["changes"] == locked["changes"] != []
+    assert any(row[0] == "CD" for row in free["changes"])
 
 
 def test_a_crank_follows_by_turning():

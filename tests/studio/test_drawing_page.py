@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -157,6 +159,48 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         assert user.state("s.locked.value") == []
         drag(user, "C", 30, 30)
         assert np.hypot(*np.subtract(user.handle("C"), np.add(stays, 30))) < 4
+
+    def lengths(user):
+        links = user.state("s.answer.value.entries.links")
+        return {name: links[name]["points"] for name in ("link1", "link2", "link3")}
+
+    def test_a_joint_on_its_path_moves_the_mechanism_and_off_it_changes_lengths(user):
+        user.new_sheet()
+        user.draw_four_bar()
+        drawn, turn = user.state("s.text.value"), user.handle("A")
+        x, y = user.handle("B")
+        drag(user, "B", 75, 25)  # far off the circle: the drive turns it all the same
+        assert user.state("s.text.value") == drawn
+        assert "lengths" in user.state("s.notice.value.words")
+        now = user.handle("B")
+        assert np.hypot(*np.subtract(now, turn)) == pytest.approx(np.hypot(x - turn[0], y - turn[1]), abs=0.5)
+        assert np.arctan2(turn[1] - now[1], now[0] - turn[0]) < np.arctan2(turn[1] - y, x - turn[0]) - 0.5
+        x, y = user.handle("C")
+        drag(user, "C", 4, 4)  # beside its path
+        assert user.state("s.text.value") == drawn
+        user.page.keyboard.down("Alt")
+        drag(user, "B", 0, -20)
+        user.page.keyboard.up("Alt")
+        assert user.state("s.text.value") != drawn
+        words = user.state("s.notice.value.words")
+        assert words.startswith("Move B: link1.points.B.x")
+        for name, length in re.findall(r"(\S+) \S+ \S+ → (\S+ mm)", words):  # as told while the crank followed
+            link, _, point, axis = name.split(".")
+            assert lengths(user)[link][point]["xy".index(axis)] == length
+        user.keys("Control+z")
+        assert user.state("s.text.value") == drawn
+
+    def test_a_pin_on_the_ground_keeps_the_lengths_of_its_links(user):
+        user.new_sheet()
+        user.draw_four_bar()
+        before = lengths(user)
+        x, y = drag(user, "D", 40, 20)
+        assert np.hypot(*np.subtract(user.handle("D"), (x + 40, y + 20))) < 4
+        assert lengths(user) == before
+        user.page.keyboard.down("Alt")
+        drag(user, "D", -40, -20)
+        user.page.keyboard.up("Alt")
+        assert lengths(user) != before
 
     @pytest.mark.slow
     def test_two_fingers_shift_and_zoom_the_sheet(user):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import json
 import re
 import subprocess
@@ -101,6 +102,52 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.until("s.about.value.version")
         assert user.state("s.text.value") == ""
         assert user.state("s.fileName.value") is None
+
+    def test_what_stands_on_one_spot_is_read_and_a_slot_is_its_links(user):
+        user.of("actions", "m.openExample({ name: 'drawing-press' })")
+        user.until("s.solved.value")
+        assert "K, R" in user.page.locator("text.name").all_text_contents()
+        user.page.locator(".slot").click()
+        assert user.state("s.selection.value") == {"kind": "links", "name": "barrel"}
+        assert user.page.locator(".slot.chosen").count() == 1
+        user.of("actions", "m.openExample({ name: 'durango-fourbar' })")
+        user.until("s.solved.value && s.answer.value.scene.loads.length")
+        user.state(
+            "s.selection.value = { kind: 'points', name: s.answer.value.scene.links.flatMap((one) => one.free)[0] }"
+        )
+        user.state("s.layers.value = { ...s.layers.value, values: true }")
+        user.page.wait_for_selector(".laid")
+        for index in range(0, 360, 15):
+            user.state(f"s.index.value = {index}")
+            boxes = [
+                [one.bounding_box() for one in user.page.locator(kind).all()] for kind in (".laid", ".sheet .load text")
+            ]
+            assert all(boxes)
+            for one, two in itertools.product(*boxes):
+                wide, high = (
+                    min(one[at] + one[size], two[at] + two[size]) - max(one[at], two[at])
+                    for at, size in (("x", "width"), ("y", "height"))
+                )
+                assert min(wide, high) < 8, index  # a box is higher than its letters
+
+    def test_why_it_does_not_move_and_the_name_of_a_new_file(user):
+        user.of("actions", "m.openExample({ name: 'drawing-press' })")
+        user.until("s.solved.value")
+        user.of("actions", "m.save()")
+        field = user.page.locator("dialog input")
+        assert field.input_value() == "Toggle-drawing-press.yaml"
+        assert field.evaluate("(one) => one.selectionEnd - one.selectionStart") == len("Toggle-drawing-press.yaml")
+        user.keys("Escape")
+        text = user.state("s.text.value")
+        for old, new, told in (
+            ("pin: {radius: 20 mm}, ", "", "friction without the radius of the pin (joint O)"),
+            ("friction: 0.1", "friction: banana", "'banana' is not one of the dimensions"),
+        ):
+            assert old in text
+            user.of("actions", "m.typed(given)", text.replace(old, new))
+            user.page.wait_for_timeout(600)
+            user.idle()
+            assert told in user.page.locator(".motion").inner_text()
 
     def test_a_refused_name_is_told_in_the_dialog(user):
         choose(user, "File", "Save as")

@@ -265,6 +265,28 @@ def test_a_variant_over_another_stroke_shows_the_nearest_of_its_own_positions():
     )
 
 
+@pytest.mark.parametrize("stroke", ["[0 mm, 118 mm]", "[20.3 mm, 100 mm]"])
+def test_the_motion_of_a_point_is_laid_over(stroke):
+    after = EXAMPLES["drawing-press"]
+    before = after.replace("range: [0 mm, 118 mm]", f"range: {stroke}").replace("L: 200 mm", "L: 205 mm")
+    asked = {"text": after, "others": [{"text": before}], "steps": 60}
+    (found,) = ask("compare", point="lower.P", **asked)["others"]
+    own, present = analysed(before, steps=60), analysed(after, steps=60)
+    slides = [one["joint_slide"].sel(joint="Z").values for one in (own, present)]
+    gap = np.abs(slides[0][None, :] - slides[1][:, None])
+    spacing = np.diff(slides[0]).max()
+    for name in ("velocity", "acceleration"):
+        for axis in "xy":
+            row = own[f"point_{name}"].sel(point="lower.P", axis=axis).values
+            near(
+                found["point"][name][axis], np.where(gap.min(axis=1) <= 0.5 * spacing, row[gap.argmin(axis=1)], np.nan)
+            )
+    placed = ask("layers", text=after, steps=60, place={"link": "lower", "at": [0, 0], "index": 0})["point"]
+    place = {key: placed[key] for key in ("link", "start", "local")}
+    (found,) = ask("compare", place=place, **asked)["others"]
+    assert found["point"]["key"] == placed["key"]
+
+
 def test_another_drive_is_not_laid_over():
     found, rows = compared(EXAMPLES["drawing-press"], EXAMPLES[FOURBAR])
     assert found["scene"] is None

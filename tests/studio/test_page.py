@@ -5,6 +5,7 @@ Every test fails on an error of the page, on one in its console, and on a reques
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 import trunnion
 from browsing import CHROMIUM
+from served import served
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
@@ -97,6 +99,40 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.click("text=Discard it")
         user.idle()
         assert user.state("s.text.value") == ""
+        user.keys("Control+z")
+        assert user.state("s.text.value") == drawn
+
+    def test_unsaved_work_on_a_file_is_offered_beside_another_sheet(user):
+        user.of("actions", "m.save(given)", "lever.yaml")
+        user.idle()
+        changed = user.state("s.text.value").replace("friction: 0.1", "friction: 0.2") + "# mine\n"
+        user.of("actions", "m.typed(given)", changed)
+        user.idle()
+        page = user.page.context.new_page()
+        user.page.close(run_before_unload=False)
+        user.page = page
+        user.open()
+        assert user.state("s.fileName.value") == "four-bar.yaml"
+        assert "Unsaved work on lever.yaml" in user.page.locator(".message-card").inner_text()
+        user.page.click("button:has-text('Open it')")
+        user.until("s.fileName.value === 'lever.yaml'")
+        assert user.state("s.text.value") == changed
+        user.of("actions", "m.save(given)", "lever.yaml")
+        user.idle()
+
+    def test_a_studio_that_has_stopped_says_so_and_answers_a_save(user, tmp_path):
+        (tmp_path / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], "utf-8")
+        with served(tmp_path, "four-bar.yaml") as other:
+            user.page.goto(other.address)
+            user.until("s.solved.value")
+        user.page.wait_for_selector("text=The studio on this machine has stopped")
+        for act in ("m.save()", "m.setValue(['gravity'], [0, 0])"):
+            user.state("s.say('')")
+            user.of("actions", act)
+            told = user.state("s.notice.value")
+            assert told["bad"]
+            assert "not saved" in told["words"] or "not carried out" in told["words"]
+        user.wrong.clear()  # the browser's own lines about a server that is gone
 
     @pytest.mark.slow
     def test_a_joint_is_dragged_and_brought_back(user):
@@ -104,14 +140,15 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.mouse.move(x, y)
         user.page.mouse.down()
         for k in range(1, 16):
-            user.page.mouse.move(x - 2 * k, y - k)
+            user.page.mouse.move(x - k, y - 2 * k)
             user.page.wait_for_timeout(16)
         user.page.wait_for_timeout(150)
-        assert "BC" in user.page.locator("body").inner_text()
+        assert "BC" in user.page.locator(".next-step").inner_text()
         user.page.mouse.up()
         user.idle()
+        assert "Move C: BC 6 m → " in user.state("s.notice.value.words")
         there = user.handle("C")
-        assert np.hypot(there[0] - x + 30, there[1] - y + 15) < 6
+        assert np.hypot(there[0] - x + 15, there[1] - y + 30) < 6
         text = user.state("s.text.value")
         np.testing.assert_allclose(efforts(user), analysed(text)["drive_effort"].values[0], rtol=1e-6)
         user.keys("Control+z")
@@ -226,6 +263,24 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             allowed = {"mobility.redundant", "input.drivers", "input.tables"}
             assert user.state("s.solved.value") or set(errors) <= allowed, (name, errors)
             assert not user.wrong, (name, user.wrong)
+
+    def test_a_picture_shows_the_position_and_the_layers_of_the_sheet(user):
+        drawn = []
+        for index, layer in ((0, "true"), (90, "true"), (90, "false")):
+            user.state(f"(s.index.value = {index}, s.layers.value = {{ ...s.layers.value, reactions: {layer} }})")
+            user.idle()
+            user.page.click("summary:has-text('Export')")
+            with user.page.expect_download() as told:
+                user.page.locator(".menu button", has_text="SVG").click()
+            drawn.append(Path(told.value.path()).read_text("utf-8"))
+        first, turned, bare = drawn
+        body = re.compile(r'class="plate k0"[^>]*? d="([^"]+)"')
+        assert body.search(first)[1] != body.search(turned)[1] == body.search(bare)[1]
+        assert body.search(bare)[1] == user.page.locator(".plate.k0").first.get_attribute("d")
+        assert f">{user.of('sheet', 'm.shown.value.scene.abscissa.label')} 90°<" in turned
+        forces = [len(re.findall(r'class="reaction k[^"]*" d="M', one)) for one in drawn]
+        assert forces[0] > 0 == forces[2]
+        assert "handle" not in turned
 
     @pytest.mark.slow
     @pytest.mark.parametrize("what", ["CSV", "PNG", "SVG", "GIF", "Report", "Python"])

@@ -177,6 +177,11 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert number(cells[2]) == pytest.approx(100 * (peaks[1] / peaks[0] - 1), abs=0.06)
         legend = user.page.locator(".chart").first.locator(".legend .label").all_inner_texts()
         assert legend == ["torque", "torque, variant A"]
+        user.state("s.selection.value = { kind: 'joints', name: 'C' }")
+        user.idle()
+        moving = user.page.locator(".chart", has_text="Velocity of").locator(".legend .label").all_inner_texts()
+        assert moving[0] == "magnitude"
+        assert user.page.locator(".chart", has_text="Velocity of").locator("path.curve.variant").count() == 3
         overlaid = variant(user, "v.compared.value[0].scene.drivers[0].effort")
         own = results[0]["drive_effort"].values[0]
         np.testing.assert_allclose(overlaid, own, atol=FLOAT * np.abs(own).max())

@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,9 @@ from trunnion.studio.variants import overlaid
 from trunnion.studio.words import remedied, spoken
 from trunnion.version import __version__
 from trunnion.views.cycle.scene import scene
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["ANSWERS", "answer", "examples"]
 
@@ -153,7 +156,11 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 
 def _row(one: Finding) -> dict[str, Any]:
-    own = {"severity": one.severity.value, "place": spoken(one.where), "remedy": remedied(one.remedy)}
+    section, _, name = one.where.partition(".")
+    place = spoken(one.where)
+    if name and one.what.startswith(f"{name} "):  # what it is about is said once
+        place = section if "," in name else section.removesuffix("s")
+    own = {"severity": one.severity.value, "place": place, "remedy": remedied(one.remedy)}
     return own | {key: getattr(one, key) for key in ("code", "what", "where", "line")}
 
 
@@ -171,13 +178,13 @@ def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
 
 
 def _drag(asked: Asked) -> dict[str, Any]:
-    """The cycle with a joint or point dragged to a place: nothing is written."""
+    """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
     sketch = _shown(state, steps, index)
     sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
-    changes = sketch.moved(point, to)
+    changes = sketch.moved(point, to, bool(asked.get("keep")))
     back = _walked(state, {change.path: change.value for change in changes}, steps)
     columns = _columns(back, steps)
     shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
@@ -284,18 +291,24 @@ def _layers(asked: Asked) -> dict[str, Any]:
     """
     state, steps = loaded(str(asked["text"])), _steps(asked)
     result = state.result(steps, asked.get("friction") != "off")
-    wanted, point = set(asked.get("wanted") or ()), str(asked.get("point"))
-    found: dict[str, Any] = {"point": point_motion(result, point) if point in result["point"].values else None}
+    wanted = set(asked.get("wanted") or ())
+    found: dict[str, Any] = {"point": _moving(asked, result)}
     if state.run.system.mechanism.space != "planar":
         return found
-    if asked.get("place"):
-        found["point"] = place_motion(result, asked["place"])
     if "circles" in wanted:
         found["circles"] = circles(result, rubbing(state.run.system))
     if wanted & {"centres", "transmission"}:
         walk = _walked(state, {}, steps).walk
         found |= {name: tell(walk, steps) for name, tell in WALKED.items() if name in wanted}
     return found
+
+
+def _moving(asked: Asked, result: xr.Dataset) -> dict[str, Any] | None:
+    """Motion of the point, or in the plane of the place on a link, that is asked for; None where there is none."""
+    if asked.get("place") and result.sizes["axis"] == 2:
+        return place_motion(result, asked["place"])
+    point = str(asked.get("point"))
+    return point_motion(result, point) if point in result["point"].values else None
 
 
 WALKED = {"centres": centres, "transmission": transmission}
@@ -306,9 +319,10 @@ def _compare(asked: Asked) -> dict[str, Any]:
     state, steps = loaded(str(asked["text"])), _steps(asked)
     friction = asked.get("friction") != "off"
     present, rubs = state.result(steps, friction), friction and bool(rubbing(state.run.system))
+    moves = partial(_moving, asked)
     return {
         "others": [
-            overlaid(loaded(str(other["text"])), other.get("friction") != "off", steps, present, rubs)
+            overlaid(loaded(str(other["text"])), other.get("friction") != "off", steps, present, rubs, moves)
             for other in asked["others"]
         ]
     }

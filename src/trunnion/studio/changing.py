@@ -24,7 +24,7 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 def move(sketch: Sketch, given: Given) -> str:
     """A joint or point goes to a place."""
     point, to = str(given["point"]), vector(given["to"])
-    sketch.write(sketch.moved(point, to))
+    sketch.write(sketch.moved(point, to, bool(given.get("keep"))))
     hints = sketch.entries.get("assembly") or {}
     if isinstance(hints.get(point), list) and not given.get("index"):
         hints[point] = [sketch.length(part) for part in to]

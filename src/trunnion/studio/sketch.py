@@ -163,8 +163,11 @@ class Sketch:
 
     # ---- dragging ---------------------------------------------------------------------------------------------
 
-    def moved(self, point: str, to: Vector) -> list[Change]:
-        """What changes where a joint, or a free point "link.point", is dragged to a place."""
+    def moved(self, point: str, to: Vector, keep: bool = False) -> list[Change]:
+        """What changes where a joint, or a free point "link.point", is dragged to a place.
+
+        keep: the links at a pin on the ground keep their lengths, unless other joints are locked where they are.
+        """
         joints = self._together(point) if point in self.joints else []
         if held := sorted(self.locked & {point, *joints}):
             raise MechanismError(Finding("is locked where it is", held[0], "unlock it first (key K)"))
@@ -177,6 +180,9 @@ class Sketch:
             self._apart(link, local, local | {name: there})
             return list(self._at(link, name, there))
         found: list[Change] = []
+        pins = [one for one in joints if self.ground in self.joints[one]["links"] and self._turns(one)]
+        if keep and pins and not self.locked:
+            return [change for pin in pins for change in self._at(self.ground, pin, to)]
         for link in dict.fromkeys(link for joint in joints for link in self.joints[joint]["links"]):
             mine = [joint for joint in joints if link in self.joints[joint]["links"] and self._turns(joint)]
             if link == self.ground:

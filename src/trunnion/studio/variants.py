@@ -5,7 +5,7 @@ A variant is another text, or the same without friction.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Figure", "compared", "figures", "overlaid"]
+
+Moves = Callable[["xr.Dataset"], "dict[str, Any] | None"]
 
 
 @dataclass(frozen=True)
@@ -106,8 +108,11 @@ def compared(before: xr.Dataset, rubbed: bool, after: xr.Dataset, rubs: bool) ->
     return rows
 
 
-def overlaid(state: Loaded, friction: bool, steps: int, present: xr.Dataset, rubs: bool) -> dict[str, Any]:
-    """A variant to lay over the present result: its scene at the positions of that, its margin, the table.
+def overlaid(
+    state: Loaded, friction: bool, steps: int, present: xr.Dataset, rubs: bool, moves: Moves = lambda _: None
+) -> dict[str, Any]:
+    """A variant to lay over the present result: its scene at the positions of that, its margin, the table, and as
+    `point` what `moves` tells of its result: the motion of a point.
 
     `shifted`: its drive runs over another range, and each position shows the nearest of its own; `why`: it has no
     cycle, or none that runs over the same drive.
@@ -126,11 +131,18 @@ def overlaid(state: Loaded, friction: bool, steps: int, present: xr.Dataset, rub
     index, inside = _nearest(own, over)
     shown = scene(result, None, max_positions=result.sizes["position"])
     margin = margin_of(result, rubbed)["margin"]
+    point = moves(result)
     same = bool(np.array_equal(index, np.arange(len(own.values))) and np.all(inside))
     if not same:
         shown = _picked(shown, result.sizes["position"], index, inside)
         margin = None if margin is None else np.where(inside, margin[index], np.nan)
-    return {"scene": shown, "margin": margin, "why": None, "shifted": not same, "rows": rows}
+        point = point and {
+            key: {axis: np.where(inside, row[index], np.nan) for axis, row in one.items()}
+            if isinstance(one, dict)
+            else one
+            for key, one in point.items()
+        }
+    return {"scene": shown, "margin": margin, "point": point, "why": None, "shifted": not same, "rows": rows}
 
 
 def _nearest(own: Abscissa, over: Abscissa) -> tuple[Any, Any]:

@@ -78,7 +78,8 @@ def _measure(value: Quantity, known: Dimensions) -> Dimension | None:
 def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known: Dimensions) -> Finding:
     """A name in an expression that means nothing there."""
     section = path.partition(".")[0]
-    what = f"'{source}' refers to '{name}', which is not one of the dimensions"
+    refers = "" if str(source).strip() == name else f"refers to '{name}', which "
+    what = f"'{source}' {refers}is not one of the dimensions"
     if name in ("off", "none"):
         return Finding(f"'{source}' is no number", path, "write 0")
     if PLACED in name and section != "loads":

@@ -5,6 +5,7 @@ import * as state from "./state.js";
 import { placesAt, posedAt } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
+import { pictureOf } from "./picture.js";
 import { sheet } from "./sheet.js";
 import { connection, decode } from "./socket.js";
 
@@ -22,13 +23,14 @@ export function start() {
 async function begun() {
   link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
     state.connected.value = open;
+    if (open) state.stopped.value = false;
+    else fetch("/files").then(({ ok }) => (state.stopped.value = !ok), () => (state.stopped.value = true)); // another token, or nobody there
     if (open && untracked(() => state.text.value)) solve();
   });
   const files = await fetch("/files").then((reply) => reply.json());
   state.folder.value = { folder: files.folder, names: files.files };
   if (!sheets) await opened(files);
-  const left = state.kept(null);
-  if (state.fileName.value !== null && left && left.text !== left.saved) state.waiting.value = left.time;
+  state.waiting.value = leftBehind(files.files);
   state.keepSteps();
   effect(() => {
     state.friction.value; // another friction is another answer
@@ -36,6 +38,12 @@ async function begun() {
   });
   const about = await link.ask("start", {}); // not before the picture, for it takes the whole of Python
   if (about && !about.error) state.about.value = about;
+}
+
+/** The latest of the sheets that were left with unsaved work, {name, time}, beside the open one; or null. */
+function leftBehind(names) {
+  const others = [null, ...names].filter((name) => name !== state.fileName.value).map((name) => ({ name, ...state.kept(name) }));
+  return others.filter(({ text, saved }) => text !== saved).sort((a, b) => b.time.localeCompare(a.time))[0] ?? null;
 }
 
 /** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
@@ -97,15 +105,15 @@ let queue = Promise.resolve(true);
 
 /**
  * Carry out gestures as one step to undo; one after the other, for each starts from what the one before left.
- * Steps in a row with the same `merge` are undone as one. Whether it could be done.
+ * Steps in a row with the same `merge` are undone as one. `places`: what they start from, else what is shown. Whether it could be done.
  */
-export function edit(gestures, merge = null) {
-  queue = queue.then(() => carryOut(gestures, merge)).catch((problem) => refuse(String(problem.message ?? problem)));
+export function edit(gestures, merge = null, places = null) {
+  queue = queue.then(() => carryOut(gestures, merge, places)).catch((problem) => refuse(String(problem.message ?? problem)));
   return counted(queue);
 }
 
-async function carryOut(gestures, merge) {
-  const before = present();
+async function carryOut(gestures, merge, places) {
+  const before = places ? { ...present(), places } : present();
   const done = await link.ask("edit", { ...before, gestures, fine: sheet.fine() });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
   if (done.error) return refuse(done.error);
@@ -199,19 +207,20 @@ export function openSheet({ name, saved, content, first = null }) {
   return solve();
 }
 
-/** Open the unsaved sheet without a name, or throw it away. */
+/** Open the sheet that was left unsaved, or throw its work away. */
 export function takeWaiting(open) {
+  const { name } = state.waiting.value;
   state.waiting.value = null;
-  if (open) return openSheet({ name: null, saved: "", content: "" });
-  state.forget(null);
-  forgetPhoto(null);
+  if (open) return name === null ? openSheet({ name: null, saved: "", content: "" }) : openFile(name);
+  state.forget(name);
+  if (name === null) forgetPhoto(null);
   return null;
 }
 
-/** Leave the recovered work and go back to the file as it was saved. */
+/** Go back from the recovered work to the file as it was saved, as a step to undo. */
 export function discard() {
-  state.forget(state.fileName.value);
-  openSheet({ name: state.fileName.value, saved: state.savedText.value, content: state.savedText.value });
+  state.recovered.value = null;
+  return takeText(state.savedText.value, "Discard the recovered work");
 }
 
 export function openFile(name) {
@@ -283,7 +292,8 @@ async function shipped({ name, title }) {
 
 /** Save under the name, or ask for one; why it was refused, or "". */
 export function save(name = state.fileName.value) {
-  return name ? counted(stored(name)) : void (state.dialog.value = "save");
+  const gone = () => unsaved(`${name} was not saved: the studio on this machine does not answer.`);
+  return name ? counted(stored(name).catch(gone)) : void (state.dialog.value = "save");
 }
 
 async function stored(name) {
@@ -313,13 +323,21 @@ function unsaved(words) {
 /** Export and hand the file to the browser. */
 export async function exported(what) {
   state.say(`${what.toUpperCase()} is being made …`);
+  if (sheet.view && (what === "png" || what === "svg")) {
+    const { name, blob } = await counted(pictureOf(what));
+    return handOver(name, blob);
+  }
   const made = await counted(link.ask("export", { text: state.text.value, what, steps: STEPS }));
   if (!made) return;
   if (made.error) return state.say(made.error, true);
   const [first, count] = made.bytes.bytes;
-  const address = URL.createObjectURL(new Blob([made.body.slice(first, first + count)], { type: made.mime }));
-  const anchor = Object.assign(document.createElement("a"), { href: address, download: made.name });
+  handOver(made.name, new Blob([made.body.slice(first, first + count)], { type: made.mime }));
+}
+
+function handOver(name, blob) {
+  const address = URL.createObjectURL(blob);
+  const anchor = Object.assign(document.createElement("a"), { href: address, download: name });
   anchor.click();
   setTimeout(() => URL.revokeObjectURL(address), 1000);
-  state.say(`${made.name} exported.`);
+  state.say(`${name} exported.`);
 }

@@ -63,9 +63,10 @@ function Messages() {
   const waiting = state.waiting.value;
   return html`<div class="messages">
     <${Hint} />
+    ${state.stopped.value && html`<div class="message-card bad" role="alert">The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.</div>`}
     ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.
       <${Button} label="Discard it" onClick=${discard} /> <${Button} label="Keep it" onClick=${() => (state.recovered.value = null)} /></div>`}
-    ${waiting && html`<div class="message-card">A sheet that was not saved is left from ${clock(waiting)}.
+    ${waiting && html`<div class="message-card">${waiting.name ? `Unsaved work on ${waiting.name}` : "A sheet that was not saved"} is left from ${clock(waiting.time)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}
     ${lacks.length > 0 && html`<div class="message-card">${lacks.join(" ")}</div>`}
     ${wrong.length > 0 && html`<button type="button" class="message-card bad" onClick=${() => (state.tab.value = "findings")}>

@@ -62,7 +62,9 @@ export function ToolBar() {
 
 /** What to do next with the tool, over the sheet. */
 export function Hint() {
-  return state.tool.value === "select" ? null : html`<p class="next-step">${hint()}</p>`;
+  const dragged = state.live.value?.to; // what it changes stands where the hand looks
+  const words = state.tool.value !== "select" ? hint() : dragged ? state.notice.value.words : "";
+  return words ? html`<p class="next-step">${words}</p>` : null;
 }
 
 export function ZoomBar() {
@@ -83,7 +85,7 @@ export function BottomBar() {
         onClick=${() => state.say(`${what[0].toUpperCase()}${what.slice(1)}: ${why}`)}><span aria-hidden="true">${ok ? "✓" : "–"}</span> ${what}</button></li>`)}
     </ul>
     <${Margin} />
-    <span class=${bad ? "notice bad" : "notice"}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>
+    <span class=${bad ? "notice bad" : "notice"} title=${words}>${words || (state.spatial.value ? "Drag turns the mechanism, with Shift it shifts, the wheel zooms." : hint())}</span>
     <span class="work">${state.connected.value ? (state.busy.value ? "Working …" : "") : "Connection lost; trying again …"}</span>
     <span class="unseen" role="status" aria-live="polite">${words}</span>
   </footer>`; // prettier-ignore

@@ -3,6 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { openFile, openLink, openText, save } from "./actions.js";
 import { Examples } from "./gallery.js";
+import { stemOf } from "./geometry.js";
 import { carries } from "./links.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
@@ -43,7 +44,7 @@ function Open() {
 }
 
 function Save() {
-  const [name, setName] = useState(state.fileName.value ?? "mechanism.yaml");
+  const [name, setName] = useState(state.fileName.value ?? `${stemOf(state.answer.value?.entries)}.yaml`);
   const known = state.folder.value.names.includes(name) && name !== state.fileName.value;
   const [wrong, setWrong] = useState("");
   const submit = async (event) => {
@@ -52,7 +53,7 @@ function Save() {
   };
   return html`<form onSubmit=${submit}>
     <h2>Save as</h2>
-    <label class="choice wide-choice">Name <input value=${name} onInput=${(event) => setName(event.target.value)} required autofocus /></label>
+    <label class="choice wide-choice">Name <input value=${name} onInput=${(event) => setName(event.target.value)} onFocus=${({ target }) => target.select()} required autofocus /></label>
     <p class="calm">In ${state.folder.value.folder}${known ? html` — <b>a file of this name is there and will be replaced</b>` : ""}</p>
     <p class="wrong" role="alert">${wrong}</p>
     <p class="row-of-buttons end"><button type="submit" class="plain strong">Save</button></p>

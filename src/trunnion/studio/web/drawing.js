@@ -111,7 +111,7 @@ function allParts(scene, view) {
     supports: scene.joints.filter((one) => fixed(one) && !slides(one)).map(support),
     guides: scene.joints.filter((one) => fixed(one) && slides(one)).map((one) => ({ joint: one, node: svg("path", { class: "hatch" }) })),
     bodies: moving.map((link, order) => body(link, order)),
-    slots: slotsOf(scene, (name) => `k${moving.findIndex((link) => link.name === name) % 6}`),
+    slots: slotsOf(scene, (name) => `k${moving.findIndex((link) => link.name === name) % 6}`).map((one) => marked(one, "links", one.joint.links[0])),
     gears: scene.gears.map((one) => gear(one)),
     points: scene.links.flatMap((link) => link.free.map((key) => ({ key, node: svg("g", { class: "point" }, svg("circle", { r: link.ground ? 3 : 4 })) }))),
     joints: scene.joints.map((one) => joint(one)),
@@ -170,7 +170,7 @@ function gear({ name, at: key, radius }) {
 
 function nameOf(key, other, name, grounded, slides) {
   const beside = slides ? [24, -15] : grounded ? [-19, 15] : [-11, -11];
-  return { key, other, beside, node: svg("text", { class: "name" }, short(name)) };
+  return { key, other, beside, name: short(name), node: svg("text", { class: "name" }, short(name)) };
 }
 
 /** Pixels a newton at which usual reactions are well seen. */
@@ -338,10 +338,18 @@ function poseVectors(view, spot) {
   }
 }
 
+/** Names that would stand on each other stand side by side. */
 function poseNames({ parts, shown }, spot) {
-  for (const { key, other, beside, node } of parts.names) {
+  const there = new Map();
+  for (const { key, other, beside, node, name } of parts.names) {
     const found = shown.names === false ? null : (spot(key) ?? spot(other));
-    moveTo(node, found && [found[0] + beside[0], found[1] + beside[1]]);
+    const at = found && [found[0] + beside[0], found[1] + beside[1]];
+    const first = at && there.get(at.map(Math.round).join());
+    moveTo(node, first ? null : at);
+    if (first && !first.textContent.split(", ").includes(name)) first.textContent += `, ${name}`;
+    if (first || !at) continue;
+    node.textContent = name;
+    there.set(at.map(Math.round).join(), node);
   }
 }
 

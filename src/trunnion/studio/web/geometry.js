@@ -49,6 +49,12 @@ export function onLine(spots, at, near) {
   return best;
 }
 
+/** The name of a file for a model: that of the model without what file names lack. */
+export function stemOf(entries) {
+  const name = String(entries?.name ?? "").replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, ""); // prettier-ignore
+  return name.slice(0, 60) || "mechanism";
+}
+
 export const nearOf = (scale) => NEAR / scale;
 
 /** Joints, then points that are no joints, with their places: [{kind, name, key, at}]. */

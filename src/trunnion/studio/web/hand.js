@@ -1,5 +1,6 @@
 // The pointer on the sheet: click, drag a joint, pan, zoom, also by two fingers. One question to Python at a time while a joint is dragged.
 
+import { place } from "../web/data.js";
 import { drag, edit, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
@@ -8,6 +9,7 @@ import * as state from "./state.js";
 import { click, pointer, toolOf } from "./tools.js";
 
 const STILL = 3; // px that a click may move
+const ON_PATH = 8; // px from its path within which a joint is on it
 
 /** Listen to the pointer; returns what ends it. */
 export function listenToPointer(root, view) {
@@ -37,7 +39,7 @@ export function listenToPointer(root, view) {
     if (fingers.size > 1 && fingers.has(event.pointerId)) return spread(fingers, event.pointerId, placed(event));
     if (fingers.has(event.pointerId)) fingers.set(event.pointerId, placed(event));
     follow(event);
-    if (hand.held) pull(view, hand.held, placed(event));
+    if (hand.held) pull(view, hand.held, placed(event), event.altKey);
   });
   root.addEventListener("pointerup", (event) => {
     fingers.delete(event.pointerId);
@@ -90,12 +92,12 @@ export function partUnder(target) {
   return node ? { kind: node.dataset.kind, name: node.dataset.name, key: node.dataset.key } : null;
 }
 
-function pull(view, held, at) {
+function pull(view, held, at, alt) {
   const far = Math.hypot(at[0] - held.start[0], at[1] - held.start[1]);
   if (!held.moved && far <= STILL) return;
   if (!held.moved) takeHold(view, held);
   held.moved = true;
-  if (held.joint) dragTo(held.joint, view.frame.from(at), gridStep(view.frame.scale) / 10);
+  if (held.joint) dragTo(held.joint, view.frame.from(at), view.frame.scale, alt);
   else if (!held.locked && (held.panning || state.tool.value === "select")) sheet.pan(at[0] - held.last[0], at[1] - held.last[1]);
   held.last = at;
 }
@@ -108,8 +110,9 @@ function takeHold(view, held) {
     return state.say(`${name} is locked where it is; unlock it first (K).`, true);
   }
   const base = present();
-  const { sketched } = shown.peek();
-  held.joint = { name, key, index: view.posed, asked: false, wanted: null, sketched, base, together: sketched ? together(kind, name, base.places) : [] };
+  const { sketched, scene } = shown.peek();
+  const path = sketched || state.locked.value.length ? null : pathOf(scene, key); // a locked joint stays where it is
+  held.joint = { name, key, index: view.posed, asked: false, wanted: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
   state.selection.value = { kind, name };
 }
 
@@ -118,8 +121,52 @@ function together(kind, name, places) {
   return kind === "joints" ? Object.keys(places).filter((key) => key.endsWith(`.${name}`)) : [name];
 }
 
-function dragTo(joint, at, fine) {
-  joint.to = at.map((value) => onGrid(value, fine));
+/** Where a point goes over the cycle, [[x, y] or null]; null for one that stays. */
+function pathOf(scene, key) {
+  const { x = [], y = [] } = scene.points[key] ?? {};
+  return Math.max(x.length, y.length) > 1 ? Array.from({ length: scene.count }, (_, index) => place(scene, key, index)) : null;
+}
+
+/** Whether a joint or point is on a link that a drive on the ground moves. */
+function driven(scene, name, key) {
+  const ground = scene.links.find((link) => link.ground)?.name;
+  const drives = scene.drivers.map((one) => scene.joints.find((joint) => joint.name === one.name)).filter((joint) => joint?.links.includes(ground));
+  const moved = drives.flatMap(({ links }) => links);
+  const own = scene.joints.find((joint) => joint.name === name)?.links ?? [key.split(".")[0]];
+  return own.some((link) => link !== ground && moved.includes(link));
+}
+
+/**
+ * The position at which a joint is nearest to a place; null where that is farther than ON_PATH px from its path, unless a drive turns it.
+ * Of positions equally near the one next to the present.
+ */
+function poseAt({ path, crank, scene }, at, scale) {
+  const far = path.map((spot) => (spot ? scale * Math.hypot(spot[0] - at[0], spot[1] - at[1]) : Infinity));
+  const least = Math.min(...far);
+  if (!(least <= ON_PATH || (crank && least < Infinity))) return null;
+  const now = state.index.peek();
+  const apart = (index) => {
+    const by = Math.abs(index - now);
+    return scene.abscissa.closed ? Math.min(by, scene.count - by) : by;
+  };
+  const near = far.flatMap((one, index) => (one <= least + (crank ? 1e-3 : 1) ? [index] : []));
+  return near.reduce((best, one) => (apart(one) < apart(best) ? one : best));
+}
+
+/** Off its path a joint changes lengths; along it, and always where a drive turns it, it turns the mechanism, unless Alt is held. */
+function dragTo(joint, at, scale, alt) {
+  const index = joint.path && !alt ? poseAt(joint, at, scale) : null;
+  joint.posed = index !== null;
+  if (joint.posed) {
+    joint.wanted = null;
+    state.live.value = null;
+    state.index.value = index;
+    joint.base = null;
+    return state.say(joint.crank ? `${joint.name} turns with the drive; with Alt it changes lengths.` : `${joint.name} is on its path: lengths stay. Off it, or with Alt, they change.`);
+  }
+  if (!joint.base) Object.assign(joint, { base: present(), index: state.index.value });
+  joint.to = at.map((value) => onGrid(value, gridStep(scale) / 10));
+  joint.keep = !alt && !joint.sketched;
   if (joint.sketched) {
     state.places.value = { ...state.places.value, ...Object.fromEntries(joint.together.map((key) => [key, joint.to])) };
     return;
@@ -133,13 +180,15 @@ async function follow(joint) {
   while (joint.wanted) {
     const to = joint.wanted;
     joint.wanted = null;
-    const found = await drag({ point: joint.name, index: joint.index, to });
+    const found = await drag({ point: joint.name, index: joint.index, to, keep: joint.keep });
     if (!found) break;
+    if (joint.posed) continue;
     if (found.error) state.say(found.error, true);
     else if (found.points && !joint.left) {
+      joint.told = wordsOf(found);
       state.live.value = { ...found, to };
       if (found.solved) state.index.value = found.index;
-      state.say(wordsOf(found), !found.solved);
+      state.say(joint.told, !found.solved);
     }
   }
   joint.asked = false;
@@ -153,10 +202,11 @@ function wordsOf({ solved, changes }) {
 async function release(held, shift) {
   if (!held.moved) return tap(held, shift);
   if (!held.joint) return;
-  const { name, index, base, sketched, to } = held.joint;
   await held.joint.asked;
+  const { name, index, base, sketched, to, told, keep, posed } = held.joint;
+  if (posed) return;
   if (sketched) state.places.value = base.places; // `edit` moves them
-  await edit([{ do: "move", point: name, to, index }]);
+  if ((await edit([{ do: "move", point: name, to, index, keep }], null, base.places)) && told) state.say(`Move ${name}: ${told}.`);
 }
 
 function tap({ spot, part, panning }, shift) {

@@ -3,7 +3,7 @@
 import * as actions from "./actions.js";
 import { partUnder } from "./hand.js";
 import { crank } from "./motion.js";
-import { sheet } from "./sheet.js";
+import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { TOOLS, cancel, choose, click, placeTyped, pointer, removePart, toolOf, typed } from "./tools.js";
 import { focusOn } from "./ui.js";
@@ -97,7 +97,7 @@ function arrow({ target, key, shiftKey, altKey }) {
 
 function nudge({ kind, name }, at) {
   state.selection.value = { kind, name };
-  actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed }], `nudge ${name}`);
+  actions.edit([{ do: "move", point: name, to: at, index: sheet.view.posed, keep: !shown.peek()?.sketched }], `nudge ${name}`);
 }
 
 /** Enter: the tool at the cross or at the joint in focus; with no tool, the properties of it. */

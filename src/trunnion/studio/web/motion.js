@@ -31,12 +31,13 @@ export function Motion() {
 
 function fill(holder) {
   const scene = state.solved.value ? state.answer.value.scene : null;
+  const first = state.findings.value.find(({ severity }) => severity === "error");
   const begun = Boolean(state.answer.value?.tracks); // the cycle is being solved
   untracked(() => {
     if (!scene) {
       crank.player?.pause();
       crank.player = null;
-      const words = begun ? "The cycle is being solved …" : "The mechanism moves as soon as it is whole and has a driver.";
+      const words = begun ? "The cycle is being solved …" : first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : "The mechanism moves as soon as it is whole and has a driver.";
       holder.replaceChildren(element("p", { class: "calm" }, words));
       return;
     }

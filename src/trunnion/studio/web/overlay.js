@@ -8,7 +8,7 @@ import { quantity, roundBelow, stated } from "../web/format.js";
 import { KEY, perNewton, trackPath } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
-import { shown } from "./sheet.js";
+import { sheet, shown } from "./sheet.js";
 import * as state from "./state.js";
 import { compared } from "./variants.js";
 
@@ -38,7 +38,8 @@ export function poseOverlay(view) {
   const told = known && laid.peek()?.scene === scene ? laid.peek() : {};
   const key = []; // lines of the key, from below
   room = view.frame.width - 6;
-  taken = wanted.names ? names(view) : [];
+  taken = [...(wanted.names ? names(view) : []), ...loads(view)];
+  if (sheet.beside().length) key.push(keyed(view, 22, "other assemblies", (x, y) => svg("g", { class: "ghost" }, svg("path", { d: `M${x},${y}h22` }))));
   layers.variants.replaceChildren(...(wanted.variant ? variants(view, key) : []));
   layers.overlay.replaceChildren(
     ...(told.circles ? circles(view, told.circles, key) : []),
@@ -220,6 +221,18 @@ function names({ parts, scene, frame, posed }) {
     const [x, y] = frame.to(found);
     const half = (LETTER * node.textContent.length) / 2 + 3;
     return [{ left: x + beside[0] - half, right: x + beside[0] + half, y: y + beside[1] }];
+  });
+}
+
+/** The values of the loads as words that stand already. */
+function loads({ parts }) {
+  return (parts?.loads ?? []).flatMap(({ node, label }) => {
+    const [x, y] = /translate\(([-\d.]+),([-\d.]+)\)/.exec(node.getAttribute("transform") ?? "")?.slice(1).map(Number) ?? [];
+    if (x === undefined) return [];
+    const [dx, dy] = ["x", "y"].map((axis) => Number(label.node.getAttribute(axis)));
+    const wide = label.measured || label.size;
+    const left = x + dx - (label.left ? wide : 0);
+    return [{ left, right: left + wide, y: y + dy + 4 }];
   });
 }
 

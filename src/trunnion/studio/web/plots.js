@@ -18,7 +18,8 @@ import { Variants, compared } from "./variants.js";
 const MOST = 24; // joints whose reactions are drawn
 const FEW = 2; // curves of a variant that are named one by one
 const DASHES = ["variant", "variant second"];
-const MEANING = "So many times the friction may grow before it locks; at 1 it locks.";
+const BEYOND = 10; // a margin that is larger is drawn there
+const MEANING = "So many times the friction may grow before it locks; at 1 it locks. More than 10 is drawn at 10.";
 
 /** Whether the polar diagrams are open, and in space the plane they are seen in. */
 const polars = signal(false);
@@ -61,10 +62,12 @@ function Curves({ class: kind, listOf }) {
 function curves(found, others) {
   const { scene } = found;
   const list = listed(found);
+  const point = laid.value?.scene === scene ? laid.value.point : null;
+  if (point) list.splice(1, 0, ...ofPoint(point));
   others.forEach((other, order) => {
-    for (const one of listed(other)) lay(list.find(({ title }) => title === one.title), one, other.name, DASHES[order]);
+    const moving = point && other.point?.key === point.key ? ofPoint(other.point) : [];
+    for (const one of [...listed(other), ...moving]) lay(list.find(({ title }) => title === one.title), one, other.name, DASHES[order]);
   });
-  if (laid.value?.scene === scene && laid.value.point) list.splice(1, 0, ...ofPoint(laid.value.point));
   return list
     .filter((one) => !one.only || one.series.length > 1)
     .map((one) => {
@@ -76,9 +79,9 @@ function curves(found, others) {
 function listed({ scene, margin, margin_least: least }) {
   const few = { ...scene, joints: scene.joints.slice(0, MOST) };
   const list = charts(few, kindsOf(few));
-  const series = margin ? [{ label: "margin", values: margin, kind: "k2" }] : [];
+  const series = margin ? [{ label: "margin", values: margin, kind: "k2", most: BEYOND }] : [];
   // one that is beyond 10 everywhere is shown only beside another
-  list.splice(1, 0, { title: "Locking margin", unit: "", series, limits: [0, 10], note: MEANING, only: !margin || least?.beyond });
+  list.splice(1, 0, { title: "Locking margin", unit: "", series, limits: [0, BEYOND], note: MEANING, only: !margin || least?.beyond });
   return list;
 }
 

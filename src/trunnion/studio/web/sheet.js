@@ -35,12 +35,15 @@ export const sheet = {
   /** @type {ReturnType<typeof drawing> | null} */
   view: null,
   after: () => {},
+  /** What is drawn beside it, [{points}]. @type {() => {points: object}[]} */
+  beside: () => [],
   /** Puts the picture behind the grid where it belongs. */
   photo: () => {},
   fit() {
     const { width, height } = sheet.view.frame;
     const { scene } = shown.peek() ?? {};
-    look(fitted(width, height, scene && extentOf(scene)));
+    const points = Object.assign({}, scene?.points, ...sheet.beside().map((one, order) => prefixed(one.points, order)));
+    look(fitted(width, height, scene && extentOf({ ...scene, points })));
   },
   zoom(factor, [x, y] = middle()) {
     const { width, height, scale, left, foot } = sheet.view.frame;
@@ -86,6 +89,11 @@ export function linkOf({ kind, name, link }, own = null) {
   const ground = sheet.view.scene.links.find((one) => one.ground)?.name;
   const moving = joint ? joint.links.filter((one) => one !== ground && one !== own) : [];
   return moving.length === 1 ? moving[0] : null;
+}
+
+/** Points with names of their own. */
+function prefixed(points, order) {
+  return Object.fromEntries(Object.entries(points).map(([key, track]) => [`${order} ${key}`, track]));
 }
 
 function middle() {

@@ -61,9 +61,8 @@ export function connection(/** @type {string} */ url, /** @type {(open: boolean)
       const revision = (revisions[kind] = (revisions[kind] ?? 0) + 1);
       finish(kind, null);
       const answer = new Promise((resolve) => (waiting[kind] = { revision, resolve }));
-      await ready;
-      if (waiting[kind]?.revision === revision) socket.send(JSON.stringify({ ask: kind, revision, ...fields }));
-      return answer;
+      ready.then(() => waiting[kind]?.revision === revision && socket.send(JSON.stringify({ ask: kind, revision, ...fields })));
+      return answer; // a connection that is lost answers with null, though it may never have been there
     },
   };
 }

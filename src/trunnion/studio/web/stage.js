@@ -32,6 +32,7 @@ function mount(holder) {
   const view = drawing(root);
   addOverlay(view);
   sheet.view = view;
+  sheet.beside = () => others.value;
   sheet.after = () => {
     chosen(view);
     untracked(() => preview(view));

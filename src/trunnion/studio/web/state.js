@@ -7,6 +7,8 @@ const STEPS = 100; // that can be undone
 const ROOM = 2e6; // characters of them that are kept over a reload
 
 export const connected = signal(false);
+/** Whether the program behind the page is gone, or runs anew with another address. */
+export const stopped = signal(false);
 /** Of the program: {version, examples, laws}. @type {Signal<Record<string, any>>} */
 export const about = signal({ version: "", examples: [], laws: [] });
 /** Of the opened folder: {folder, names}. */
@@ -47,7 +49,7 @@ export const tab = signal("properties");
 export const dialog = signal(null);
 /** {words, bad}: the latest remark, said to screen readers too. */
 export const notice = signal({ words: "", bad: false });
-/** When work on a sheet without a name was left that is not the open one, or null. */
+/** Work that was left unsaved on a sheet that is not the open one, {name, time}, its name null for one that has none; or null. */
 export const waiting = signal(null);
 /** When the recovered work was left, or null. */
 export const recovered = signal(null);

@@ -51,7 +51,7 @@ function table(scene, title, columns, { scale, most }) {
       "tr",
       { "data-index": index },
       html("th", { scope: "row", class: "figure" }, fixed(value, widest)),
-      ...columns.map((one) => html("td", { class: "figure" }, one.values[index] === null ? "—" : fixed(one.values[index] * scale.factor, most))),
+      ...columns.map((one) => html("td", { class: "figure" }, one.values[index] === null ? "—" : `${one.values[index] >= one.most ? "> " : ""}${fixed(one.values[index] * scale.factor, most)}`)),
     ),
   );
   const whole = html(

@@ -20,7 +20,7 @@ export const pointer = signal(null);
  * @type {{ id: string, label: string, key: string, hint: string[], click?: Function, tells?: Function, begins?: RegExp, on?: boolean }[]}
  */
 export const TOOLS = [
-  { id: "select", label: "Select", key: "V", hint: ["Drag a joint: the mechanism follows. Drag the sheet: it shifts. The wheel zooms."] },
+  { id: "select", label: "Select", key: "V", hint: ["Drag a joint: along its path the mechanism moves, off it lengths change."] },
   { id: "link", label: "Link", key: "L", hint: ["Click the first end: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
   { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link to pin it to the ground."], click: pin },
   { id: "slide", label: "Slide", key: "G", hint: ["Click what slides: a free end, a pin, or a link itself.", "Click the link it slides along, or the direction of a guide on the ground, or type an angle."], click: slide, tells: tellAngle, begins: /[0-9.,-]/, on: true },

@@ -10,7 +10,7 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
 
 /**
  * A chart of `series` [{label, values, kind, quiet, unlisted}] in one unit; `kind` is a class that colours the curve, `quiet`
- * has no dot, `unlisted` no line in the legend.
+ * has no dot, `unlisted` no line in the legend; a value that reaches `most` is more than that.
  * `breaks` of a series are positions that no line leads to, `marks` positions that are marked in all of the chart.
  * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
  * `pick(index, firm)` is called when the reader points. Beside {element, show(index)} it tells the {factor, unit} it shows
@@ -61,7 +61,7 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
       moveCursor(chart);
       series.forEach((one, order) => {
         const value = one.values[index];
-        values[order].textContent = value === null ? "—" : fixed(value * scale.factor, most);
+        values[order].textContent = value === null ? "—" : `${value >= one.most ? "> " : ""}${fixed(value * scale.factor, most)}`;
       });
     },
   };

@@ -202,11 +202,10 @@ TOLERANCE = {
     "tolerance.negative": Sentence(
         WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
     ),
-    "tolerance.beside_jump": Sentence(
-        WARNING,
-        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
-        "first order leaves out what moves the jump, and samples tell its place to one step",
-        "use the samples, with more --steps",
+    "tolerance.corner": Sentence(
+        NOTE,
+        "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
+        "positions (nominal {figure:~{unit}}; {coarse:~{unit}} at the positions); the motion of the corner is included",
     ),
     "tolerance.impossible": Sentence(
         WARNING, "its tolerance includes {value:~{unit}}, which no model may have: {why}", "narrow the tolerance"

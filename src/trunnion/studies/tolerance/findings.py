@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
-from trunnion.cycle.summary import beside_jumps, model_notes
+from trunnion.cycle.summary import model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
+from trunnion.measures.figures import RULES, course_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
@@ -40,7 +41,6 @@ LOOKED = 72  # positions at which loads of pins are looked at
 UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
 ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
 SIZES = ("pin.clearance", "guide.clearance", "pin.hole_radius", "pin.radius")  # what the size of a play depends on
-EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -127,10 +127,8 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
-    if any(of.measure.kind == "effort" and of.measure.statistic in EXTREMES for of in study.linear.measures):
-        for one in beside_jumps(study.run, study.steps):
-            yield finding_for("tolerance.beside_jump", one.where, **one.figures)
     for of in study.linear.measures:
+        yield from _corner(outcome, of)
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
     if counted is not None:
@@ -253,6 +251,15 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
         yield finding_for("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
+
+
+def _corner(outcome: Outcome, of: Of) -> Iterator[Finding]:
+    """An extreme at a corner, with what the positions have of it, as `analyse` tabulates them."""
+    known, unit = of.reference, of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
+    if known.corner:
+        coarse = float(RULES[of.measure.rule](course_of(known, known.parts[0])))
+        where = f"measures.{of.measure.name}"
+        yield finding_for("tolerance.corner", where, figure=known.figure, coarse=coarse, unit=unit)
 
 
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:

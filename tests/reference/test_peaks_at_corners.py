@@ -124,3 +124,27 @@ def test_an_allocation_keeps_the_yield_that_the_formula_has() -> None:
     at = {"r": R, "l": L, "x0": START}
     drawn = peak(**{name: rng.normal(at[name], size, 200_000) for name, size in zip(names, half, strict=True)})
     assert np.mean(np.abs(drawn - peak()) <= room) == pytest.approx(0.99, abs=0.004)
+
+
+def test_what_first_order_does_not_describe_is_not_advised_by_it() -> None:
+    """The stroke √((l + r)² − e²) − √((l − r)² − e²) has no derivative by the offset e of the slide at e = 0."""
+    frame = {"points": {"O": [0, 0], "S": {"at": [0, "e"], "axis": [1, 0]}}}
+    data = model().data()
+    result = trunnion.tolerance(
+        model(
+            links={**data["links"], "frame": frame},
+            dimensions={**data["dimensions"], "e": "0 mm"},
+            loads={},
+            tolerances={"e": "±4 mm", "r": "±0.1 um"},
+            measures={"stroke": {"point": "ram.Q", "axis": "x", "as": "peak-to-peak", "limit": "±4 um"}},
+        ),
+        samples=2000,
+        steps=72,
+    )
+    found = {one.code: one for one in result.trunnion.findings}
+    e = np.random.default_rng(5).normal(0.0, 4e-3 / 3, 100_000)
+    stroke = np.sqrt((L + R) ** 2 - e**2) - np.sqrt((L - R) ** 2 - e**2)
+    assert found["first_order.scatter_differs"].figures["found"] == pytest.approx(stroke.std(), rel=0.1)
+    assert "--method sobol" in found["first_order.scatter_differs"].remedy
+    assert "sobol" in found["limit.missed"].remedy
+    assert "narrow first '" not in found["limit.missed"].remedy

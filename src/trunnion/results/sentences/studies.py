@@ -242,7 +242,8 @@ TOLERANCE = {
     "first_order.scatter_differs": Sentence(
         WARNING,
         "the standard deviation of the samples is {found:~{unit}}, the first-order one {linear:~{unit}}",
-        "the measure is not linear within the tolerances: use the samples; if a load begins at once, use more --steps",
+        "first order and its contributions do not describe this measure: use the samples, and --method sobol for the "
+        "contributions",
     ),
     "play.carried": Sentence(
         NOTE,

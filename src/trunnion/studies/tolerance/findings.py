@@ -21,9 +21,8 @@ from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
-from trunnion.studies.tolerance.linear import by_position
 from trunnion.studies.tolerance.sampling import CAUSES
-from trunnion.studies.tolerance.targets import limited, missed
+from trunnion.studies.tolerance.targets import limited, missed, scatters
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.first_order import ToleranceStudy
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "summary"]
 
 Array = NDArray[np.float64]
-OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
 LOOKED = 72  # positions at which loads of pins are looked at
@@ -280,14 +278,13 @@ def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     """Measures whose samples scatter quite otherwise than first order says."""
     for i, of in enumerate(outcome.study.linear.measures):
-        linear, found = float(of.total.deviation), float(counted.arrays["deviation"][i])
-        if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
-            continue
-        if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:
-            unit = of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
-            yield finding_for(
-                "first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear, unit=unit
+        if differing := scatters(of, counted, i):
+            (found, linear), unit = (
+                differing,
+                of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values),
             )
+            where = f"measures.{of.measure.name}"
+            yield finding_for("first_order.scatter_differs", where, found=found, linear=linear, unit=unit)
 
 
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:

@@ -126,21 +126,21 @@ def test_an_allocation_keeps_the_yield_that_the_formula_has() -> None:
     assert np.mean(np.abs(drawn - peak()) <= room) == pytest.approx(0.99, abs=0.004)
 
 
-def test_what_first_order_does_not_describe_is_not_advised_by_it() -> None:
+def offset_slide(**more: Any) -> trunnion.Mechanism:
     """The stroke √((l + r)² − e²) − √((l − r)² − e²) has no derivative by the offset e of the slide at e = 0."""
-    frame = {"points": {"O": [0, 0], "S": {"at": [0, "e"], "axis": [1, 0]}}}
     data = model().data()
-    result = trunnion.tolerance(
-        model(
-            links={**data["links"], "frame": frame},
-            dimensions={**data["dimensions"], "e": "0 mm"},
-            loads={},
-            tolerances={"e": "±4 mm", "r": "±0.1 um"},
-            measures={"stroke": {"point": "ram.Q", "axis": "x", "as": "peak-to-peak", "limit": "±4 um"}},
-        ),
-        samples=2000,
-        steps=72,
+    return model(
+        links={**data["links"], "frame": {"points": {"O": [0, 0], "S": {"at": [0, "e"], "axis": [1, 0]}}}},
+        dimensions={**data["dimensions"], "e": "0 mm"},
+        loads={},
+        tolerances={"e": "±4 mm", "r": "±0.1 um"},
+        measures={"stroke": {"point": "ram.Q", "axis": "x", "as": "peak-to-peak", "limit": "±4 um"}},
+        **more,
     )
+
+
+def test_what_first_order_does_not_describe_is_not_advised_by_it() -> None:
+    result = trunnion.tolerance(offset_slide(), samples=2000, steps=72)
     found = {one.code: one for one in result.trunnion.findings}
     e = np.random.default_rng(5).normal(0.0, 4e-3 / 3, 100_000)
     stroke = np.sqrt((L + R) ** 2 - e**2) - np.sqrt((L - R) ** 2 - e**2)
@@ -148,3 +148,32 @@ def test_what_first_order_does_not_describe_is_not_advised_by_it() -> None:
     assert "--method sobol" in found["first_order.scatter_differs"].remedy
     assert "sobol" in found["limit.missed"].remedy
     assert "narrow first '" not in found["limit.missed"].remedy
+
+
+@pytest.mark.parametrize("criterion", ["worst-case", "yield"])
+def test_an_allocation_by_first_order_that_does_not_hold_is_no_optimum(criterion: Any) -> None:
+    costs = {name: {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "most": "5 mm"} for name in ("e", "r")}
+    result = trunnion.allocate(offset_slide(costs=costs), criterion=criterion, steps=72, samples=1000)
+    codes = {one.code: one.severity for one in result.trunnion.findings}
+    assert codes["allocation.not_linear"] == "error"
+    assert not {"allocation.proven", "allocation.proven_margin"} & set(codes)
+    assert not result.attrs["proven"]
+
+
+def test_tolerances_as_stated_that_cost_less_and_keep_the_limits_are_told() -> None:
+    """A force that d raises by 1 % at most, and by 10 % to first order, of 2 % that are allowed."""
+    result = trunnion.allocate(
+        model(
+            dimensions={"r": "30 mm", "l": "200 mm", "F": "50 kN", "d": "0 mm"},
+            loads={"press": {"joint": "S", "resisting_force": "F * (1 + min(d / 1 mm, 0.01))", "only": "positive"}},
+            tolerances={"d": "±0.1 mm"},
+            costs={"d": {"model": "power", "B": 1, "k": 0.5, "unit": "mm"}},
+            measures={"peak": {"effort": "O", "as": "maximum", "at_most": "1547 N m"}},
+        ),
+        steps=72,
+        samples=0,
+    )
+    found = {one.code: one.figures for one in result.trunnion.findings}
+    assert float(result["nominal"][0]) == pytest.approx(1547 / 1.02, rel=0.002)
+    assert found["allocation.dearer"]["before"] == pytest.approx(0.1**-0.5)
+    assert found["allocation.dearer"]["cost"] > 0.1**-0.5

@@ -344,6 +344,16 @@ ALLOCATION = {
     "allocation.curve_short": Sentence(
         NOTE, "{lost} of the {points} points of the curve {lost:#is/are} infeasible", _curve
     ),
+    "allocation.not_linear": Sentence(
+        ERROR,
+        "first order does not describe this measure: {told}; the tolerances found are no optimum",
+        "choose them by `trunnion tolerance` with samples and --method sobol",
+    ),
+    "allocation.dearer": Sentence(
+        ERROR,
+        "the tolerances as stated cost {before:.6g}, less than the {cost:.6g} of those found, and keep the limits too",
+        "keep them as stated",
+    ),
     "allocation.worst_case_beyond": Sentence(
         WARNING,
         "the worst case of the mechanism, {worst:~{unit}}, exceeds the limit {limit:~{unit}} by {percent:.2g} %; to "

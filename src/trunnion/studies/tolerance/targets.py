@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from trunnion.studies.tolerance.outcome import Outcome
     from trunnion.studies.tolerance.sampled import Sampled
 
-__all__ = ["MISSED", "against", "limited", "limits", "missed", "scatters"]
+__all__ = ["ENOUGH", "MISSED", "OTHERWISE", "against", "limited", "limits", "missed", "scatters"]
 
 Array = NDArray[np.float64]
 MISSED = "limit.missed"  # with which the code of such a finding begins

@@ -20,6 +20,7 @@ LIMIT = {"r": 0.02e-3, "l": 0.05e-3, "x0": 0.03e-3}
 LOADS = {
     "at once": "F * between(S.slide, x0, x0 + 40 mm)",
     "ramp": "F * min(1, max(0, (S.slide - x0) / 0.2 mm + 1))",  # whole at the same place
+    "obtuse": "F * min(1, max(0, 1 - (x0 - S.slide) / 15 mm))",  # nearly as a smooth curve through 72 positions
 }
 
 

@@ -10,11 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.measures.extremes import Extreme
 from trunnion.measures.figures import FLAT, Reference, course_of
+
+if TYPE_CHECKING:
+    from trunnion.solve.run import Run
 
 __all__ = ["extreme", "with_corner"]
 
@@ -22,29 +27,47 @@ Array = NDArray[np.float64]
 Look = Callable[[Array], Array]  # from times in the cycle, s, to the course there, both (row, place)
 SIGNS = {"maximum": (1.0,), "minimum": (-1.0,), "largest": (1.0, -1.0), "peak-to-peak": (1.0, -1.0)}
 ROUNDS, PLACES = 12, 9  # of the places in a round the next one takes the two gaps about the best
+BESIDE, ALIKE = 3.5, 1e-6  # steps that a polynomial reaches; of the range of a course: what it may be off
 FEWEST = 8  # positions from which the shape of a course is known
 
 
-def with_corner(known: Reference, look: Look) -> Reference:
-    """The same nominal mechanism, its figure that of the corner where it is an extreme of forces at one."""
-    if not _cornered(known):
+def with_corner(known: Reference, look: Look, run: Run) -> Reference:
+    """The same nominal mechanism, its figure that of the corner where it is an extreme of forces at one.
+
+    It is at one where no polynomial goes through the positions; near an edge of the run also where what one makes of
+    them is not found there, as it may round off an obtuse corner.
+    """
+    tops = _tops(known)
+    sharp = any(bool(top.inside) and int(top.used) == 0 for top in tops)
+    if not sharp and not any(_beside(known, float(np.ravel(top.place)[0]), run.edges) for top in tops):
         return known
-    return replace(known, corner=True, figure=float(extreme(known, known.parts[0][None], look)[0]))
+    figure = float(extreme(known, known.parts[0][None], look)[0])
+    if not sharp and abs(figure - known.figure) <= ALIKE * np.ptp(known.parts[0]):
+        return known
+    return replace(known, corner=True, figure=figure)
 
 
-def _cornered(known: Reference) -> bool:
-    """Whether no polynomial goes through an extreme of the nominal mechanism, within the range."""
+def _tops(known: Reference) -> list[Extreme]:
+    """The extremes that a figure of forces is made of, by polynomials; none of other figures."""
     measure = known.measure
     signs = SIGNS.get(measure.rule, ())
     if not signs or known.against or known.turning or measure.of_motion or measure.in_time or len(known.parts) != 1:
-        return False
+        return []
     if len(known.window.index) < FEWEST or not np.all(np.isfinite(known.parts[0])):
-        return False
+        return []
     course = course_of(known, known.parts[0])
     if not np.ptp(course.number) > FLAT * np.max(np.abs(course.number)):
-        return False
-    tops = [course.largest(sign) for sign in signs]
-    return any(bool(top.inside) and int(top.used) == 0 for top in tops)
+        return []
+    return [course.largest(sign) for sign in signs]
+
+
+def _beside(known: Reference, place: float, edges: Array) -> bool:
+    """Whether an edge is so near to a place, s, that the polynomial there goes over it."""
+    time, period = known.window.time, known.window.period
+    away = edges - place
+    if period is not None:
+        away = away - period * np.rint(away / period)
+    return bool(np.any(np.abs(away) <= BESIDE * (time[-1] - time[0]) / (len(time) - 1)))
 
 
 def extreme(known: Reference, course: Array, look: Look) -> Array:

@@ -110,7 +110,7 @@ def figures_of(run: Run, measures: Sequence[Measure], steps: int, method: Fricti
             course = courses_of(run, [measure], time.ravel(), method)[0][measure.name][0]
             return np.broadcast_to(np.asarray(primal(course), float).reshape(-1), time.size).reshape(time.shape)
 
-        found[measure.name] = with_corner(one, look).figure
+        found[measure.name] = with_corner(one, look, run).figure
     return found
 
 

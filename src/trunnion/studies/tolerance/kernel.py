@@ -142,7 +142,7 @@ def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[
         turns = measure.of_motion and measure.turning(system)
         rate = measure.coordinate(system).rate(walk) if turns else None
         one = reference(measure, courses[measure.name], plan.windows[measure.name], system, rate)
-        found[measure.name] = with_corner(one, _looking(kernel, plan, values, measure))
+        found[measure.name] = with_corner(one, _looking(kernel, plan, values, measure), run)
     return found
 
 

@@ -51,28 +51,32 @@ def test_a_load_that_rises_is_no_jump() -> None:
     assert told("-50 kN * max(sin(drive), 0)", 180)[1] == []
 
 
-def test_sweeps_and_tolerances_tell_it_too() -> None:
-    """With the bound that `analyse` has; a tolerance only of an extreme of the effort."""
+def test_sweeps_tell_it_too() -> None:
+    """With the bound that `analyse` has."""
     _, (one,) = told(PRESS["loads"]["cut"]["force"][0], 180)
-    tolerances = {"rod.points.Q.x": "±0.05 mm"}
-    model = trunnion.Mechanism.model_validate({**PRESS, "tolerances": tolerances})
+    model = trunnion.Mechanism.model_validate(PRESS)
     swept = trunnion.sweep(model, {"rod.points.Q.x": [0.2, 0.201]}, steps=180).trunnion.findings
     assert [found.figures for found in swept if found.code == "effort.beside_jump"] == [one.figures]
-    for measure, expected in (("effort:O", []), ("maximum:effort:O", [("warning", one.figures)])):
+
+
+def test_a_tolerance_tells_the_figures_of_the_positions_and_between_them() -> None:
+    """Of an extreme of the effort alone."""
+    model = trunnion.Mechanism.model_validate({**PRESS, "tolerances": {"rod.points.Q.x": "±0.05 mm"}})
+    coarse, fine = (told(PRESS["loads"]["cut"]["force"][0], steps)[0] for steps in (180, 36_000))
+    for measure, count in (("effort:O", 0), ("maximum:effort:O", 1)):
         found = trunnion.tolerance(model, [measure], methods=("linear",), steps=180).trunnion.findings
-        assert [(f.severity, f.figures) for f in found if f.code == "tolerance.beside_jump"] == expected
+        figures = [one.figures for one in found if one.code == "tolerance.corner"]
+        assert len(figures) == count
+        for one in figures:
+            assert one["coarse"] == pytest.approx(coarse, rel=1e-12)
+            assert one["figure"] == pytest.approx(fine, rel=1e-3)
 
 
-def test_play_and_allocations_tell_it_too() -> None:
+def test_play_tells_it_too() -> None:
     """Of the extreme of an effort, with the same bound."""
     _, (one,) = told(PRESS["loads"]["cut"]["force"][0], 180)
     joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": {"radius": "25 mm", "clearance": "20 um"}}}
     measures = {"torque": {"effort": "O", "as": "maximum", "limit": "±50 N m"}}
-    more = {
-        "tolerances": {"rod.points.Q.x": "±0.05 mm"},
-        "costs": {"rod.points.Q.x": {"model": "power", "B": 1, "k": 1}},
-    }
-    model = trunnion.Mechanism.model_validate({**PRESS, "joints": joints, "measures": measures, **more})
-    for result in (trunnion.play(model, steps=180), trunnion.allocate(model, steps=180, samples=0)):
-        (found,) = (one for one in result.trunnion.findings if one.code.endswith("beside_jump"))
-        assert (found.severity, found.figures) == ("warning", one.figures)
+    model = trunnion.Mechanism.model_validate({**PRESS, "joints": joints, "measures": measures})
+    (found,) = (one for one in trunnion.play(model, steps=180).trunnion.findings if one.code.endswith("beside_jump"))
+    assert (found.severity, found.figures) == ("warning", one.figures)

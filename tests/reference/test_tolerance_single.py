@@ -24,6 +24,8 @@ from trunnion.studies.tolerance.first_order import study
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 25
+DENSE = 20_000  # positions at which an extreme at a corner of its course is as good as found
+EXTREMES = {"maximum": np.max, "minimum": np.min, "peak-to-peak": np.ptp, "largest": lambda one: np.max(np.abs(one))}
 
 
 def planar(name: str, **options: Any) -> Callable[[], Data]:
@@ -105,6 +107,11 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
             own = float(np.ravel(figure(measure.curve(back), nominal[measure.name]))[0])
             known = nominal[measure.name]
             scale = max(abs(own), abs(known.figure), *(np.max(np.abs(part), initial=0.0) for part in known.parts))
+            if found.references[measure.name].corner:
+                course = measure.curve(run.solve(run.cycle.times(DENSE), None, FrictionMethod(margin_up_to=MARGIN)))
+                own = float(EXTREMES[measure.rule](np.asarray(course[0], float)))
+                assert figures[k, i] == pytest.approx(own, rel=0, abs=2e-4 * scale), measure.name
+                continue
             assert figures[k, i] == pytest.approx(own, rel=1e-7, abs=1e-7 * scale + 1e-13, nan_ok=True), measure.name
             seen += np.isfinite(own)
     assert seen > len(measures) / 2

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
+from trunnion.measures.corners import with_corner
 from trunnion.measures.figures import known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import plan
@@ -103,7 +104,13 @@ def figures_of(run: Run, measures: Sequence[Measure], steps: int, method: Fricti
     for measure in measures:
         rate = measure.coordinate(system).rate(walk) if measure.turning(system) else None
         window = places.windows[measure.name]
-        found[measure.name] = reference(measure, courses[measure.name], window, system, rate).figure
+        one = reference(measure, courses[measure.name], window, system, rate)
+
+        def look(time: NDArray[np.float64], measure: Measure = measure) -> NDArray[np.float64]:
+            course = courses_of(run, [measure], time.ravel(), method)[0][measure.name][0]
+            return np.broadcast_to(np.asarray(primal(course), float).reshape(-1), time.size).reshape(time.shape)
+
+        found[measure.name] = with_corner(one, look, run).figure
     return found
 
 

@@ -35,7 +35,7 @@ from trunnion.measures.positions import Window
 from trunnion.solve.system import System
 
 __all__ = [
-    "RULES", "Curve", "Reference", "course_of", "figure", "judged", "judged_course", "kept", "known", "moment",
+    "FLAT", "RULES", "Curve", "Reference", "course_of", "figure", "judged", "judged_course", "kept", "known", "moment",
     "number_at", "reference", "shown", "span",
 ]  # fmt: skip
 
@@ -147,7 +147,7 @@ class Reference:
 
     parts: its course, (position,) each, angles without jumps; turning: whether it is an angle; attitude: whether it is
     the turn of a link in space; turns: what an angle gains in a period, rad; figure: its figure, 0 for what is a
-    deviation by itself; NaN where it has none.
+    deviation by itself; NaN where it has none. corner: whether that is an extreme at a corner of the course, `corners`.
     """
 
     measure: Measure
@@ -158,6 +158,7 @@ class Reference:
     parts: tuple[Array, ...]
     turns: float = 0.0
     figure: float = 0.0
+    corner: bool = False
 
     @property
     def against(self) -> bool:

@@ -213,11 +213,10 @@ TOLERANCE = {
     "tolerance.negative": Sentence(
         WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
     ),
-    "tolerance.beside_jump": Sentence(
-        WARNING,
-        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
-        "first order leaves out what moves the jump, and samples tell its place to one step",
-        "use the samples, with more --steps",
+    "tolerance.corner": Sentence(
+        NOTE,
+        "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
+        "positions (nominal {figure:~{unit}}; {coarse:~{unit}} at the positions); the motion of the corner is included",
     ),
     "tolerance.impossible": Sentence(
         WARNING, "its tolerance includes {value:~{unit}}, which no model may have: {why}", "narrow the tolerance"
@@ -254,7 +253,8 @@ TOLERANCE = {
     "first_order.scatter_differs": Sentence(
         WARNING,
         "the standard deviation of the samples is {found:~{unit}}, the first-order one {linear:~{unit}}",
-        "the measure is not linear within the tolerances: use the samples; if a load begins at once, use more --steps",
+        "first order and its contributions do not describe this measure: use the samples, and --method sobol for the "
+        "contributions",
     ),
     "play.carried": Sentence(
         NOTE,
@@ -354,6 +354,16 @@ ALLOCATION = {
     ),
     "allocation.curve_short": Sentence(
         NOTE, "{lost} of the {points} points of the curve {lost:#is/are} infeasible", _curve
+    ),
+    "allocation.not_linear": Sentence(
+        ERROR,
+        "first order does not describe this measure: {told}; the tolerances found are no optimum",
+        "choose them by `trunnion tolerance` with samples and --method sobol",
+    ),
+    "allocation.dearer": Sentence(
+        ERROR,
+        "the tolerances as stated cost {before:.6g}, less than the {cost:.6g} of those found, and keep the limits too",
+        "keep them as stated",
     ),
     "allocation.worst_case_beyond": Sentence(
         WARNING,

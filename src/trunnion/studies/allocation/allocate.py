@@ -8,7 +8,7 @@ they stay the same. Then the mechanism is analysed with the tolerances found: wo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, Allocated, AllocationRequest, Choice, share_of
-from trunnion.studies.allocation.result import dataset
+from trunnion.studies.allocation.result import dataset, stated_cost
 
 __all__ = ["allocate", "half_widths"]
 
@@ -101,6 +101,7 @@ def allocate(
         jobs, curve, exact,
     )  # fmt: skip
     found = _found(asked)
+    found = replace(found, findings=(*found.findings, *_dearer(found)))
     with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
     names = [of.measure.name for of in found.study.linear.measures]
     methods = ["linear", "worst-case"] if found.answer.found else ["linear"]
@@ -367,6 +368,26 @@ def _beyond(now: ToleranceStudy) -> list[float]:
         lower, upper = limits(of)
         found.append(max(share_of(least.value, lower), share_of(most.value, upper)))
     return found
+
+
+def _dearer(found: Allocated) -> list[Finding]:
+    """That the tolerances as stated cost less and keep the limits too: by search, or the yield by samples."""
+    asked, before = found.asked, stated_cost(found)
+    if not found.answer.cost > before * (1 + SAME):
+        return []
+    if asked.criterion == "worst-case":
+        now = asked.studied({})
+        known = all(np.isfinite(corner.value) for ends in now.worst() for corner in ends)
+        kept = known and max(_beyond(now)) <= 1 + CLOSE
+    elif asked.criterion == "yield" and asked.samples:
+        sampled = tolerance(
+            asked.mechanism, asked.measures, ["monte-carlo"], asked.samples, asked.seed, asked.steps, asked.at,
+            friction_method=asked.friction, jobs=asked.jobs,
+        )  # fmt: skip
+        kept = float(sampled["yield_all_low"]) >= asked.target
+    else:
+        return []
+    return [finding_for("allocation.dearer", "costs", cost=found.answer.cost, before=before)] if kept else []
 
 
 def _off(now: ToleranceStudy) -> list[Finding]:

@@ -13,14 +13,15 @@ from trunnion.results.attributes import attribute
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, share_of
-from trunnion.studies.tolerance.targets import limits
+from trunnion.studies.tolerance.linear import by_position
+from trunnion.studies.tolerance.targets import ENOUGH, OTHERWISE, limits
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.studies.allocation.outcome import Allocated
 
-__all__ = ["findings_of", "summary"]
+__all__ = ["contradicted", "findings_of", "summary"]
 
 TWICE = 2.0  # so many rejects as an RSS stands for are an error
 SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
@@ -54,18 +55,15 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     yield from answer.findings
     if not answer.found:
         return
-    if answer.proven and found.asked.criterion == "yield":
-        yield finding_for("allocation.proven_margin")
-        yield from _margins(found)
-    elif answer.proven:
-        yield finding_for("allocation.proven", gap=max(answer.gap, 0.0))
+    otherwise = contradicted(found, known)
+    yield from _optimal(found, otherwise)
     yield from _plays(found)
     for name, share in found.tight.items():
         yield finding_for("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
     if found.asked.criterion != "yield" and found.study.effects.correlated:
         yield finding_for("allocation.correlations_left_out", "correlations", criterion=found.asked.criterion)
     if found.asked.criterion == "worst-case":
-        yield from _searched(found, known)
+        yield from _searched(found, known, otherwise)
     if found.asked.criterion == "rss" and "yield" in known:
         yield from _promised(known)
     if found.asked.criterion == "yield" and "yield_all" in known and answer.sampled is not None:
@@ -76,6 +74,19 @@ def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     if len(kept) < len(found.offers):
         points, least = len(found.offers), min(kept, default=None)
         yield finding_for("allocation.curve_short", points=points, lost=points - len(kept), least=least)
+
+
+def _optimal(found: Allocated, otherwise: Mapping[str, str]) -> Iterator[Finding]:
+    """Of what the cost is the least, or of which measures first order tells nothing."""
+    for name, told in otherwise.items():
+        yield finding_for("allocation.not_linear", f"measures.{name}", phrases={"told": told})
+    if otherwise or not found.answer.proven:
+        return
+    if found.asked.criterion == "yield":
+        yield finding_for("allocation.proven_margin")
+        yield from _margins(found)
+    else:
+        yield finding_for("allocation.proven", gap=max(found.answer.gap, 0.0))
 
 
 def _margins(found: Allocated) -> Iterator[Finding]:
@@ -149,7 +160,33 @@ def _promised(known: xr.Dataset) -> Iterator[Finding]:
         yield finding_for("yield.below_rss", f"measures.{name}", severity=severity, share=share, target=DEFAULT_YIELD)
 
 
-def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+def contradicted(found: Allocated, known: xr.Dataset) -> dict[str, str]:
+    """Measures that first order does not describe within the tolerances found, with what it has and what they have.
+
+    Of a worst case by its search, of other criteria by the standard deviation of samples.
+    """
+    told: dict[str, str] = {}
+    for k, of in enumerate(found.study.linear.measures if found.answer.found else ()):
+        if found.asked.criterion == "worst-case":
+            lower, upper = limits(of)
+            ends = [
+                (known[f"{key}_lower"].values[k], known[f"{key}_upper"].values[k]) for key in ("searched", "worst_case")
+            ]
+            real, linear = (max(share_of(float(low), lower), share_of(float(high), upper)) for low, high in ends)
+            what = f"the worst case found is {100 * real:.0f} % of the limit, to first order {100 * linear:.0f} %"
+        elif "deviation" in known and found.asked.samples >= ENOUGH and not by_position(of.reference):
+            real, linear = (float(known[key].values[k]) for key in ("deviation", "deviation_linear"))
+            what = (
+                f"the samples scatter {real / linear if linear > 0 else np.inf:.3g} times as much as first order says"
+            )
+        else:
+            continue
+        if max(real, linear) > 0 and not OTHERWISE * min(real, linear) > max(real, linear):
+            told[of.measure.name] = what
+    return told
+
+
+def _searched(found: Allocated, known: xr.Dataset, otherwise: Mapping[str, str]) -> Iterator[Finding]:
     """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
     units = attribute(known, "measure_units")
     for k, of in enumerate(found.study.linear.measures):
@@ -157,7 +194,7 @@ def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])
         shares = share_of(low, lower), share_of(high, upper)
         beyond = max(shares) - 1
-        if not beyond > CLOSE:
+        if not beyond > CLOSE or of.measure.name in otherwise:
             continue
         factor, unit = SHOWN.get(units[k], (1.0, units[k]))
         value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)

@@ -68,6 +68,11 @@ def cost_of(price: Price, t: float) -> float:
     return min(same, default=np.nan)
 
 
+def stated_cost(found: Allocated) -> float:
+    """What all costs as it is stated; NaN where a half width has no cost."""
+    return float(np.sum([cost_of(price, found.before[name]) for name, price in found.prices.items()]))
+
+
 def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     """The result with the numbers of the allocation. known: `tolerance` of the mechanism with the tolerances found."""
     arrays = {**_bought(found, known), **_rows(found, known), **_whole(found)}
@@ -82,7 +87,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
         "criterion": found.asked.criterion,
         "target": found.asked.target,
         "choices": found.way,
-        "proven": int(found.answer.proven),
+        "proven": int(found.answer.proven and not findings.contradicted(found, known)),
         "prices": [_plain(price) for price in found.prices.values()],
         "summary": figure_rows([*findings.summary(found, known, arrays), *summary_of(known)]),
         "findings": finding_rows([*own, *kept]),
@@ -164,10 +169,9 @@ def _rows(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
 def _whole(found: Allocated) -> Mapping[str, Any]:
     """What is of the whole."""
     answer = found.answer
-    before = [cost_of(price, found.before[name]) for name, price in found.prices.items()]
     arrays: dict[str, Any] = {
         "cost_total": np.array(answer.cost),
-        "cost_total_before": np.array(float(np.sum(before))),
+        "cost_total_before": np.array(stated_cost(found)),
         "cost_bound": np.array(answer.bound),
         "gap": np.array(answer.gap),
     }

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
-from trunnion.cycle.summary import extreme_beside_jump, model_notes
+from trunnion.cycle.summary import model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
+from trunnion.measures.figures import RULES, course_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
-from trunnion.studies.tolerance.linear import by_position
 from trunnion.studies.tolerance.sampling import CAUSES
-from trunnion.studies.tolerance.targets import limited, missed
+from trunnion.studies.tolerance.targets import limited, missed, scatters
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.first_order import ToleranceStudy
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "summary"]
 
 Array = NDArray[np.float64]
-OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that is told, and samples from which it is
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
 LOOKED = 72  # positions at which loads of pins are looked at
@@ -127,8 +126,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _impossible(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
-        time = of.reference.window.time
-        yield from extreme_beside_jump(study.run, of.measure, time, of.curve, "tolerance.beside_jump")
+        yield from _corner(outcome, of)
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
     if counted is not None:
@@ -253,6 +251,15 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
         yield finding_for("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
 
 
+def _corner(outcome: Outcome, of: Of) -> Iterator[Finding]:
+    """An extreme at a corner, with what the positions have of it, as `analyse` tabulates them."""
+    known, unit = of.reference, of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
+    if known.corner:
+        coarse = float(RULES[of.measure.rule](course_of(known, known.parts[0])))
+        where = f"measures.{of.measure.name}"
+        yield finding_for("tolerance.corner", where, figure=known.figure, coarse=coarse, unit=unit)
+
+
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """Plays whose part in the scatter is another if the pin keeps its place on the other link."""
     study, whole = outcome.study, float(of.total.deviation)
@@ -271,14 +278,13 @@ def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:
     """Measures whose samples scatter quite otherwise than first order says."""
     for i, of in enumerate(outcome.study.linear.measures):
-        linear, found = float(of.total.deviation), float(counted.arrays["deviation"][i])
-        if by_position(of.reference) or counted.done < ENOUGH or not np.isfinite(linear + found):
-            continue
-        if max(linear, found) > 0 and not 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE:
-            unit = of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
-            yield finding_for(
-                "first_order.scatter_differs", f"measures.{of.measure.name}", found=found, linear=linear, unit=unit
+        if differing := scatters(of, counted, i):
+            (found, linear), unit = (
+                differing,
+                of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values),
             )
+            where = f"measures.{of.measure.name}"
+            yield finding_for("first_order.scatter_differs", where, found=found, linear=linear, unit=unit)
 
 
 def _samples(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual
+from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import Reference, figure, shown, span
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.studies.tolerance.effects import Effects, FirstOrder
+from trunnion.studies.tolerance.kernel import at_corner
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
 
@@ -28,6 +29,7 @@ __all__ = ["Linear", "Of", "by_position", "linear", "searched"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
+STEP, STEP_OF_NONE = 1e-4, 1e-5  # of a number, and of the size of the mechanism for one that is 0: of a difference
 MOST_PAIRS = 720  # positions between which a peak-to-peak deviation is looked for
 
 
@@ -65,8 +67,13 @@ class Linear:
 
 def linear(kernel: NumpyKernel, plan: PositionPlan, effects: Effects, known: Mapping[str, Reference]) -> Linear:
     """First order of every measure about the nominal mechanism."""
-    courses, status = _courses(kernel, plan, effects, effects.values())
-    found = [_of(known[measure.name], effects, courses[measure.name]) for measure in kernel.measures]
+    values = effects.values()
+    courses, status = _courses(kernel, plan, effects, values)
+    found = []
+    for measure in kernel.measures:
+        one = known[measure.name]
+        steep = _at_corner(kernel, plan, effects, values, one)[1] if one.corner else None
+        found.append(_of(one, effects, courses[measure.name], steep))
     return Linear(effects, plan, found, status[0])
 
 
@@ -93,7 +100,37 @@ def _courses(
     return found, status
 
 
-def _of(known: Reference, effects: Effects, course: Course) -> Of:
+def _at_corner(
+    kernel: NumpyKernel, plan: PositionPlan, effects: Effects, values: Mapping[str, Number], known: Reference
+) -> tuple[Array, Array]:
+    """A figure at a corner of the course and its derivatives, (row,): central differences, as the corner moves too."""
+    alone = replace(kernel, measures=[known.measure])
+    step = _steps(effects)
+
+    def figures(way: float) -> Array:
+        moved = {path: primal(one) + way * step[:, None] * derivative(one) for path, one in values.items()}
+        course = _courses(alone, plan, effects, moved)[0][known.measure.name][0].real
+        return at_corner(alone, plan, moved, known, course[:, known.window.index])
+
+    middle, moving = figures(0.0), step > 0
+    if not np.any(moving):
+        return middle, 0.0 * step
+    change = figures(1.0) - figures(-1.0)
+    return middle, np.divide(change, 2 * step, out=np.zeros_like(change), where=moving)
+
+
+def _steps(effects: Effects) -> Array:
+    """By how much the number of each row is moved for a difference, (row,), whatever its tolerance; 0: not at all."""
+    run = effects.inputs.run
+    size = float(np.ravel(primal(run.system.size(run.values)))[0])
+    known = [abs(float(np.ravel(primal(run.values.get(row.seed, 0.0)))[0])) for row in effects.rows]
+    return np.array([
+        (STEP * value if value else STEP_OF_NONE * size) if row.seed else 0.0
+        for row, value in zip(effects.rows, known, strict=True)
+    ])  # fmt: skip
+
+
+def _of(known: Reference, effects: Effects, course: Course, steep_at_corner: Array | None = None) -> Of:
     measure, window = known.measure, known.window
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
     real, slope = _scalar(known, effects, course, parts)
@@ -104,6 +141,8 @@ def _of(known: Reference, effects: Effects, course: Course) -> Of:
     elif (known.against and measure.rule not in ("mean", "value")) or measure.kind == "path_error":
         place, steep = -1, np.full(len(real), np.nan)
         lead = FirstOrder(effects, whole.slope[:, _top(whole.total.upper)])
+    elif steep_at_corner is not None:
+        place, steep = -1, steep_at_corner
     else:
         value, steep = effects.slopes(figure(course, known), ())
         place = 0 if measure.rule == "value" and not measure.in_time else -1
@@ -188,6 +227,9 @@ def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner
 
     def ends(sign: float) -> Corner:
         def objective(values: Mapping[str, Number], effects: Effects) -> tuple[Array, Array]:
+            if known.corner:
+                figures, slope = _at_corner(kernel, plan, effects, values, known)
+                return figures - known.figure, slope
             courses, _ = _courses(alone, plan, effects, values)
             course = courses[of.measure.name]
             ends_of = span([part.real for part in course], known)

@@ -16,18 +16,20 @@ from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
 from trunnion.results.quantities import decimals_of, scale_of, signed
 from trunnion.results.sentences import finding_for
+from trunnion.studies.tolerance.linear import by_position
 
 if TYPE_CHECKING:
     from trunnion.studies.tolerance.linear import Of
     from trunnion.studies.tolerance.outcome import Outcome
     from trunnion.studies.tolerance.sampled import Sampled
 
-__all__ = ["MISSED", "against", "limited", "limits", "missed"]
+__all__ = ["ENOUGH", "MISSED", "OTHERWISE", "against", "limited", "limits", "missed", "scatters"]
 
 Array = NDArray[np.float64]
 MISSED = "limit.missed"  # with which the code of such a finding begins
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
 EQUAL = 1e-3  # parts of a worst case that are alike
+OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that first order does not explain, and samples for it
 HALF = 0.5  # of the room: a nominal figure that is further off its middle is to be brought there first
 
 
@@ -61,6 +63,16 @@ def against(of: Of) -> bool:
     return of.measure.kind == "path_error" or (of.reference.against and of.measure.rule != "value")
 
 
+def scatters(of: Of, counted: Sampled | None, i: int) -> tuple[float, float] | None:
+    """Standard deviations of the samples and of first order, where they differ so much that the latter means little."""
+    if counted is None or by_position(of.reference) or counted.done < ENOUGH:
+        return None
+    found, linear = float(counted.arrays["deviation"][i]), float(of.total.deviation)
+    if not np.isfinite(found + linear) or not max(found, linear) > 0:
+        return None
+    return None if 1 / OTHERWISE < found / max(linear, 1e-300) < OTHERWISE else (found, linear)
+
+
 # ---- what is missed -------------------------------------------------------------------------------------------
 
 
@@ -83,7 +95,7 @@ def missed(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
             phrases = {
                 "told": "; ".join([*parts, *short]),
                 "limits": say.limits(),
-                "remedy": _remedy(outcome, of, say),
+                "remedy": _remedy(outcome, of, say, scatters(of, counted, i) is not None),
             }
             figures = {"worst_lower": known[0], "worst_upper": known[1], **_sampled(counted, i)}
             yield finding_for(MISSED, f"measures.{of.measure.name}", phrases=phrases, **figures)
@@ -98,7 +110,8 @@ def _below(outcome: Outcome, counted: Sampled | None, target: float) -> Iterator
         if limited(of.measure) and float(counted.arrays["yield_high"][i]) < target:
             fine, say = False, _Words(outcome, of, counted, i)
             short = _short(counted, i, sure=True)[0]
-            phrases = {"told": short, "limits": say.limits(), "remedy": _remedy(outcome, of, say)}
+            remedy = _remedy(outcome, of, say, scatters(of, counted, i) is not None)
+            phrases = {"told": short, "limits": say.limits(), "remedy": remedy}
             figures = {"target_percent": 100 * target, **_sampled(counted, i)}
             yield finding_for(f"{MISSED}_yield", f"measures.{of.measure.name}", phrases=phrases, **figures)
     share, low, high = (float(counted.arrays[f"yield_all{end}"]) for end in ("", "_low", "_high"))
@@ -179,13 +192,18 @@ class _Words:
 # ---- what helps -----------------------------------------------------------------------------------------------
 
 
-def _remedy(outcome: Outcome, of: Of, say: _Words) -> str:
-    """What brings the measure within its limits: another nominal mechanism, other middles, or narrower tolerances."""
+def _remedy(outcome: Outcome, of: Of, say: _Words, otherwise: bool) -> str:
+    """What brings the measure within its limits: another nominal mechanism, other middles, or narrower tolerances.
+
+    otherwise: whether samples scatter otherwise than first order, which then does not tell what to narrow.
+    """
     lower, upper = limits(of)
     if lower > 0 or upper < 0:
         return (
             "the nominal value is outside the limits: change the mechanism or the limit, tolerances cannot correct it"
         )
+    if otherwise:
+        return "first order does not describe this measure: --method sobol tells what to narrow first"
     middle, fixed = _middle(outcome, of)
     if not np.isfinite(middle):
         return "there is no first-order result: change the nominal mechanism, or narrow the tolerances and sample again"
@@ -196,11 +214,11 @@ def _remedy(outcome: Outcome, of: Of, say: _Words) -> str:
     first = f"bring the nominal mechanism {say.say(-off)} nearer to the middle of the limits, and " if off else ""
     name, share, equals = _largest(outcome, of)
     priced = bool(outcome.study.run.system.mechanism.costs)
-    whole = "variance" if _by_variance(outcome) else "worst case"
+    whole = "variance" if outcome.target is not None else "worst case"
     narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the {whole}{equals}"
     if not priced:
         return f"{narrow}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
-    if not fixed:
+    if not fixed and outcome.target is None:
         return f"{narrow}; tolerances without a cost, which `trunnion allocate` keeps, exceed the limits by themselves"
     return f"{narrow}; `trunnion allocate` finds the cheapest tolerances"
 
@@ -225,18 +243,13 @@ def _off_middle(lower: float, upper: float, middle: float) -> float:
     return off if np.isfinite(room) and abs(off) > HALF * room else 0.0
 
 
-def _by_variance(outcome: Outcome) -> bool:
-    """Whether a yield is asked for where numbers vary together."""
-    return outcome.target is not None and outcome.study.effects.correlated
-
-
 def _largest(outcome: Outcome, of: Of) -> tuple[str, float, str]:
     """The number with the largest part in the worst case, its share, and what equal ones have together, if it is more.
 
-    Where a yield is asked for of correlated numbers, in the variance: the worst case knows no correlation.
+    Where a yield is asked for, in the variance: that decides it, and the worst case knows no correlation.
     """
     study = outcome.study
-    worst = np.nan_to_num(of.figure.covariances if _by_variance(outcome) else of.figure.spread.worst)
+    worst = np.nan_to_num(of.figure.covariances if outcome.target is not None else of.figure.spread.worst)
     top = int(np.argmax(worst))
     total = float(np.sum(worst))
     if not total > 0:

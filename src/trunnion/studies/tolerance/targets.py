@@ -203,7 +203,7 @@ def _remedy(outcome: Outcome, of: Of, say: _Words, otherwise: bool) -> str:
             "the nominal value is outside the limits: change the mechanism or the limit, tolerances cannot correct it"
         )
     if otherwise:
-        return "first order does not describe this measure: --method sobol tells what to narrow first"
+        return "first order does not describe this measure: use --method sobol to find what to narrow first"
     middle, fixed = _middle(outcome, of)
     if not np.isfinite(middle):
         return "there is no first-order result: change the nominal mechanism, or narrow the tolerances and sample again"

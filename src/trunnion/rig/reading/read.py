@@ -418,7 +418,7 @@ class _File:
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
         found = Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
-            lag=self.lag, cut=self.cut, dimensions=known_as, duration=duration,
+            lag=self.lag, cut=self.cut, dimensions=known_as, followed=tuple(part.setting.means), duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
             own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip

@@ -67,6 +67,8 @@ class Signal:
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
+    nothing: the reading that is stated as zero, what a reading of 1 more measures, SI, and the unit of the readings;
+    None where no number is stated, but an unloaded stretch.
     """
 
     channel: str
@@ -75,6 +77,7 @@ class Signal:
     turns: Array
     accuracy: Accuracy = Accuracy()
     read_in: tuple[str, float] = ("", 1.0)
+    nothing: tuple[float, float, str] | None = None
 
     @property
     def shown(self) -> tuple[str, float]:

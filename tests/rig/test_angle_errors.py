@@ -143,6 +143,24 @@ def test_a_channel_that_is_not_used_speaks_for_or_against_a_cause(tmp_path: Path
         assert "fit.misfit" not in told
 
 
+@pytest.mark.parametrize("length", ["85 mm", "85.5 mm"])
+def test_a_channel_that_is_not_used_is_judged_by_its_shape(tmp_path: Path, length: str) -> None:
+    """Its gain is known to 10 % only, which hides the wrong length; the course, of 0.1° noise, does not."""
+    data = braked(tmp_path, 0.0)
+    vague = replace(data.conditions[0].courses["psi"], accuracy=Accuracy(gain=0.1))
+    courses = {**data.conditions[0].courses, "psi": vague}
+    data = replace(data, conditions=(replace(data.conditions[0], courses=courses),))
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": length})
+    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    found = [one for one in result.trunnion.findings if one.code == "fit.unused_missed"]
+    assert bool(found) == (length != "85 mm")
+    for one in found:
+        true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.0855)))
+        scatter = np.degrees(float(vague.scatter.mean())) / np.sqrt(12)
+        assert np.degrees(one.figures["rms"]) == pytest.approx(np.hypot(true, scatter), rel=0.1)
+        assert np.degrees(one.figures["expected"]) == pytest.approx(scatter, rel=0.1)
+
+
 def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:
     """Half a step of 0.1° is √3 of its standard uncertainty: one error, which three files tell better than one."""
     files = []

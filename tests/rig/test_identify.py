@@ -431,6 +431,21 @@ def changed(data: Measurement, change: Callable[[Any], Any]) -> Measurement:
     return replace(data, conditions=tuple(found))
 
 
+def test_a_small_misfit_is_a_note_and_of_a_gross_one_nothing_leads_away(
+    four_bar: trunnion.Mechanism, torque: True_
+) -> None:
+    data = torque.measured(2, sensors=Sensors(noise=0.002))
+    wave = max(float(np.max(one["torque"])) for one in torque.courses) * np.cos(12 * np.pi * torque.phase)
+    told = []
+    for size in (0.0, 0.0008, 0.005, 1.0):
+        found = identify(four_bar, changed(data, lambda turns, size=size: turns + size * wave), [FRICTION])
+        codes, chance = {one.code for one in found.trunnion.findings}, float(found["chi_squared_chance"])
+        assert ("fit.doubtful" in codes) == (0.001 <= chance < 0.05)
+        told.append("note" if "fit.doubtful" in codes else "fit.misfit" in codes)
+    assert told == [False, "note", True, True]
+    assert not codes & {"sensor.off", "parameter.hardly_known", "parameter.sensor"}
+
+
 def test_infinite_readings_are_gaps_and_exact_data_no_misfit(four_bar: trunnion.Mechanism, torque: True_) -> None:
     exact = torque.measured(1, sensors=Sensors(0.0, 0.0, 0.0))
     gappy = changed(exact, lambda turns: np.where(np.arange(turns.shape[1]) < 3, np.inf, turns))

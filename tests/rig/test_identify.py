@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -180,6 +181,12 @@ def test_a_product_is_not_taken_apart(four_bar: trunnion.Mechanism, torque: True
     assert "neither alone" in text
     for kind in KINDS:
         assert figure(found, kind).get_size_inches()[0] > 3
+
+
+def test_a_product_has_the_unit_of_its_length(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    radii = [path for path in four_bar.parameters() if path.endswith("pin.radius")]
+    found = identify(four_bar, torque.measured(3, sensors=Sensors(noise=0.001)), {"mu": [FRICTION], "r": radii})
+    assert re.search(r"their product is determined, [\d.]+ ± [\d.]+ mm, neither alone", said(found, "warning"))
 
 
 def test_two_pins_are_told_by_the_course_but_not_by_the_efficiency(cardan: trunnion.Mechanism, shaft: True_) -> None:

@@ -334,7 +334,9 @@ def _known(judged: Assessment, group: InseparableUnknowns, names: Sequence[str],
     pair = len(names) == 2
     if pair:
         one = group.known[0]
-        result = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else "1")
+        with_unit = [unit for unit in units if unit not in ("", "1")]
+        of_product = with_unit[0] if one.form == "product" and len(with_unit) == 1 else "1"
+        result = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else of_product)
         if short:
             subject = f"their {one.form}" if one.form != "sum" else _formula(one, names, units)
             return f"{subject} = {result} is determined best"

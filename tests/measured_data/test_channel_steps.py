@@ -109,8 +109,14 @@ def test_an_angle_that_counts_backwards_is_named_once(tmp_path: Path, stated: An
         "data.angle.backwards" if known else "data.power.sign"
     ]
     if not known:
-        data = replace(data, conditions=tuple(replace(one, values={}) for one in data.conditions))
+        assert "or sign: in angle:" in next(one.remedy for one in data.findings if one.code == "data.power.sign")
+    bare = replace(data, conditions=tuple(replace(one, values={}, followed=()) for one in data.conditions))
     model = trunnion.Mechanism.model_validate(FOUR_BAR)
     for run in (trunnion.rig.compare, lambda *given: trunnion.rig.identify(*given, ["CD"])):
-        with pytest.raises(MechanismError, match="the angle runs backwards: -60 rpm measured, 60 rpm stated of A"):
-            run(model, data)
+        for one in (data, bare):
+            with pytest.raises(MechanismError, match="the angle runs backwards: -60 rpm measured, 60 rpm stated of A"):
+                run(model, one)
+    if not known:  # a model that turns so, and a rig that is driven both ways
+        assert "residual" in trunnion.rig.compare(model.with_values({"drivers.A.speed": "-60 rpm"}), data)
+        there = replace(data.conditions[0], name="forth", speed=2 * np.pi, values={"A.speed": 2 * np.pi})
+        assert "residual" in trunnion.rig.compare(model, replace(data, conditions=(*data.conditions, there)))

@@ -38,7 +38,7 @@ def test_spellings_in_use(text: str, factor: float) -> None:
         ("u/min", "rpm"), ("r/min", "rpm"), ("min-1", "rpm"), ("RPM", "rpm"), ("PS", "kW"), ("mil", "thou"),
         ("ton", "t for 1000 kg"), ("cd", ""), ("ha", ""), ("pA", "Pa"), ("a", "A for ampere"), ("b", ""), ("P", "Pa"),
         ("Nms", "N m s"), ("Ns", "N s"), ("N/Mm", "'mm'"), ("Nm/Grad", "deg"), ("m⁄s", ""), ("m\\s", ""),
-        ("hh:mm:ss", "write s"), ("dB", ""), ("g_0", "m/s^2"), ("light_year", ""),
+        ("hh:mm:ss", "write s"), ("dB", ""), ("g_0", "m/s^2"), ("light_year", ""), ("KNm", "kNm"), ("NM", "N m"),
     ],
 )  # fmt: skip
 def test_others_are_findings(text: str, remedy: str) -> None:

@@ -74,6 +74,34 @@ def test_a_shift_is_looked_for_in_an_angle_too(tmp_path: Path) -> None:
     assert found.figures["explains"] > 0.999
 
 
+def test_one_channel_alone_gives_entries_for_the_files_too(tmp_path: Path) -> None:
+    stated = mapping(tmp_path, {"a": 12.35, "b": -47.55})
+    (found,) = findings(tmp_path, stated, "psi")
+    assert (found.code, found.figures["cause"]) == ("compare.not_within", "shift")
+    sizes = [float(one) for one in re.findall(r": ([+-][\d.]+) deg", found.what)]
+    assert sizes == pytest.approx([12.35, -47.55], abs=0.02)
+    entries = yaml.safe_load(found.remedy.partition("files: ")[2])
+    assert not findings(tmp_path, {**stated, "files": entries}, "psi")
+
+
+@pytest.mark.parametrize(
+    "reads",
+    [{"unit": "mm", "zero": "20 mm"}, {"unit": "V", "gain": "1 V/mm", "zero": "20 V"},
+     {"unit": "V", "gain": "-1 V/mm", "sign": -1, "zero": "20 V"}],
+)  # fmt: skip
+def test_the_zero_of_a_motion_is_told_as_it_is_stated(tmp_path: Path, reads: dict[str, Any]) -> None:
+    stated = mapping(tmp_path, {"a": 0.0})
+    channels = {"x": {**CHANNELS["x"], **reads}}
+    (found,) = findings(tmp_path, {**stated, "channels": channels})
+    assert f"a constant offset of {'-20 mm' if reads['unit'] == 'mm' else '-0.02 m'}:" in found.what
+    assert "load" not in found.remedy
+    zero = found.remedy.partition("state zero: ")[2]
+    assert zero.endswith(f" {reads['unit']}")
+    assert float(zero.split()[0]) == pytest.approx(0.0, abs=0.01)
+    channels["x"]["zero"] = zero
+    assert not findings(tmp_path, {**stated, "channels": channels})
+
+
 LOADED = {**FOUR_BAR, "loads": {"brake": {"joint": "D", "resisting_torque": "20 N m", "useful": True}}}
 RATES = {"M": {"column": "M", "measures": "effort:A", "unit": "N m"}, "psi": CHANNELS["psi"]}
 
@@ -113,6 +141,24 @@ def test_a_channel_that_is_not_used_speaks_for_or_against_a_cause(tmp_path: Path
     else:
         assert told["fit.unused"].figures["channels"] == ["psi"]
         assert "fit.misfit" not in told
+
+
+@pytest.mark.parametrize("length", ["85 mm", "85.5 mm"])
+def test_a_channel_that_is_not_used_is_judged_by_its_shape(tmp_path: Path, length: str) -> None:
+    """Its gain is known to 10 % only, which hides the wrong length; the course, of 0.1° noise, does not."""
+    data = braked(tmp_path, 0.0)
+    vague = replace(data.conditions[0].courses["psi"], accuracy=Accuracy(gain=0.1))
+    courses = {**data.conditions[0].courses, "psi": vague}
+    data = replace(data, conditions=(replace(data.conditions[0], courses=courses),))
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": length})
+    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    found = [one for one in result.trunnion.findings if one.code == "fit.unused_missed"]
+    assert bool(found) == (length != "85 mm")
+    for one in found:
+        true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.0855)))
+        scatter = np.degrees(float(vague.scatter.mean())) / np.sqrt(12)
+        assert np.degrees(one.figures["rms"]) == pytest.approx(np.hypot(true, scatter), rel=0.1)
+        assert np.degrees(one.figures["expected"]) == pytest.approx(scatter, rel=0.1)
 
 
 def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -236,6 +237,16 @@ def test_other_friction_is_not_put_on_a_sensor():
     assert result.verdict.sel(channel="torque").values == Verdict.NOT
     assert result.efficiency_within.values[0] == 0
     assert said(result, "efficiency", "does not agree within U", "identify")
+
+
+def test_an_offset_that_friction_explains_less_well_is_not_talked_away():
+    accurate = Accuracy(zero=0.1)
+    settings = ({"A.speed": 4.0}, {"A.speed": 6.0})
+    result = compare(measured(settings=settings, accuracy=accurate, wrong=wrong_in("torque", lambda true: true + 1.5)))
+    (found,) = (one for one in result.trunnion.findings if one.where == "channels.torque")
+    assert re.search(r"it explains 100 %, other friction \d\d %", found.what)
+    assert "hardly" not in found.remedy
+    assert "`trunnion identify` fits zero and friction" in found.remedy
 
 
 def test_an_offset_that_changes_with_the_condition_is_the_models():

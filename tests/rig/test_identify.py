@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -180,6 +181,12 @@ def test_a_product_is_not_taken_apart(four_bar: trunnion.Mechanism, torque: True
     assert "neither alone" in text
     for kind in KINDS:
         assert figure(found, kind).get_size_inches()[0] > 3
+
+
+def test_a_product_has_the_unit_of_its_length(four_bar: trunnion.Mechanism, torque: True_) -> None:
+    radii = [path for path in four_bar.parameters() if path.endswith("pin.radius")]
+    found = identify(four_bar, torque.measured(3, sensors=Sensors(noise=0.001)), {"mu": [FRICTION], "r": radii})
+    assert re.search(r"their product is determined, [\d.]+ ± [\d.]+ mm, neither alone", said(found, "warning"))
 
 
 def test_two_pins_are_told_by_the_course_but_not_by_the_efficiency(cardan: trunnion.Mechanism, shaft: True_) -> None:
@@ -429,6 +436,21 @@ def changed(data: Measurement, change: Callable[[Any], Any]) -> Measurement:
         courses = {name: replace(course, turns=change(course.turns)) for name, course in one.courses.items()}
         found.append(replace(one, courses=courses))
     return replace(data, conditions=tuple(found))
+
+
+def test_a_small_misfit_is_a_note_and_of_a_gross_one_nothing_leads_away(
+    four_bar: trunnion.Mechanism, torque: True_
+) -> None:
+    data = torque.measured(2, sensors=Sensors(noise=0.002))
+    wave = max(float(np.max(one["torque"])) for one in torque.courses) * np.cos(12 * np.pi * torque.phase)
+    told = []
+    for size in (0.0, 0.0008, 0.005, 1.0):
+        found = identify(four_bar, changed(data, lambda turns, size=size: turns + size * wave), [FRICTION])
+        codes, chance = {one["code"] for one in json.loads(found.attrs["findings"])}, float(found["chi_squared_chance"])
+        assert ("fit.doubtful" in codes) == (0.001 <= chance < 0.05)
+        told.append("note" if "fit.doubtful" in codes else "fit.misfit" in codes)
+    assert told == [False, "note", True, True]
+    assert not codes & {"sensor.off", "parameter.hardly_known", "parameter.sensor"}
 
 
 def test_infinite_readings_are_gaps_and_exact_data_no_misfit(four_bar: trunnion.Mechanism, torque: True_) -> None:

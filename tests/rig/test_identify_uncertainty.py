@@ -96,6 +96,30 @@ def test_freedom_of_the_lack_of_fit_of_turns_with_one_far_off() -> None:
     assert found.test.freedom == pytest.approx(2 * 0.5**2 / (np.var(shares, ddof=1) * (1 + 1 / n)), rel=1e-9)
 
 
+def test_variance_of_a_mean_of_the_turns_that_have_a_value() -> None:
+    """s²/m with s² of the m turns that are there, wherever the others are missing."""
+    turns = FAR + np.random.default_rng(4).normal(size=(9, 1))
+    there = turns[[0, 2, 3, 7]]
+    turns[[1, 4, 5, 6, 8]] = np.nan
+    found = spread_of(constant([turns]), np.array([there.mean()]))
+    assert found.parts["scatter"][0, 0] == pytest.approx(float(np.var(there, ddof=1)) / 4, rel=1e-9)
+
+
+@pytest.mark.parametrize("length", [1, 20])
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+def test_lack_of_fit_of_a_true_model_is_one_where_values_are_missing(share: float, length: int) -> None:
+    """White noise about a constant, a share of its values lost singly or in bursts: χ² is 1 in the mean of 60 draws."""
+    random, found = np.random.default_rng(12), []
+    for _ in range(60):
+        turns = FAR + random.normal(size=(15, 180))
+        starts = random.random(size=turns.size) < share / length
+        lost = np.convolve(starts, np.ones(length), "full")[: turns.size] > 0
+        turns[lost.reshape(turns.shape)] = np.nan
+        found.append(spread_of(constant([turns]), np.array([np.nanmean(turns)])).test)
+    assert np.mean([one.reduced for one in found]) == pytest.approx(1.0, abs=0.04)
+    assert not any(one.misfit for one in found)
+
+
 @pytest.mark.parametrize("count", [2, 3])
 def test_a_misfit_that_conditions_share_is_not_independent(count: int) -> None:
     """The same wave left over in each of C conditions tells C times the variance of waves a share of a turn apart."""

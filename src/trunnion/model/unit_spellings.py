@@ -68,6 +68,7 @@ _MEANT: Final = {
     "kn": "write kN for a force, km/h for a speed", "kt": "write km/h for a speed, kg or t for a mass",
     "g_n": "write m/s^2", "g_0": "write m/s^2", "zoll": "write in", "umdr": _SPEED, "nms": "write N m s",
     "ns": "write N s for a momentum, ns for a time", "std": "write h", "sekunden": "write s", "grd": _DEGREES,
+    "knm": "write kNm", "nm": "write N m for a torque, nm for a length",
 }  # fmt: skip
 _PHRASES: Final = {  # whole units, without their spaces
     re.compile(r"[uUrR](pm|PM)?/[Mm]in\.?|[Mm]in(-1|⁻¹)|[1I]?/[Mm]in\.?"): _SPEED,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -201,6 +201,17 @@ def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> No
         raise MechanismError(found)
 
 
+def _refuse_followed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:
+    """MechanismError where all conditions that take the speed of the driver from the data turn against the model's."""
+    driver = next(iter(mechanism.drivers), "")
+    path = f"drivers.{driver}.speed"
+    if path in mechanism.parameter_set.entries:
+        stated = float(mechanism.parameters()[path])
+        rows = [(one, stated) for one in conditions if {path, f"{driver}.speed"} & set(one.followed)]
+        if all(one.speed * stated < 0 for one, _ in rows):
+            refuse_backwards(driver, rows)
+
+
 def _degrees(angle: float) -> str:
     return f"{np.degrees(angle) + 0.0:.10g} deg"
 
@@ -216,8 +227,10 @@ def _beside(turning: bool, course: Array, measured: Array) -> Array:
 def check_settings(mechanism: Mechanism, measurement: Measurement) -> None:
     """MechanismError where a condition states a number in a unit that the model's number cannot have.
 
+    Also where all speeds that are taken from the data are against that of the model: its angle runs backwards.
     Names that the model does not have, and numbers without a unit, which are SI, are passed over.
     """
+    _refuse_followed(mechanism, measurement.conditions)
     findings: dict[tuple[str, str], Finding] = {}
     stated = {name for one in measurement.conditions for name in one.dimensions}
     kinds: dict[str, Kind | None] = {}

@@ -215,9 +215,14 @@ IDENTIFY = {
     "fit.unused": Sentence(NOTE, "no parameter acts on {channels}: not used in the fit"),
     "fit.unused_missed": Sentence(
         WARNING,
-        "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} about the mean, where its "
-        "standard uncertainty is {known_told}",
+        "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} {of}, where its {by} is "
+        "{known_told}",
         "check the lengths of the model and the zero of the angle, or identify a length that acts on it",
+    ),
+    "fit.doubtful": Sentence(
+        NOTE,
+        "the residuals are larger than expected from the scatter: reduced χ² {reduced_told}, p-value {chance_told}",
+        "a true model has this note in 5 % of cases; see the residuals, and check the lengths of the model",
     ),
     "fit.conditions_disagree": Sentence(
         NOTE,

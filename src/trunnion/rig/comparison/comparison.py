@@ -20,7 +20,10 @@ __all__ = ["ChannelComparison", "Compared", "Efficient", "unmeasured"]
 
 @dataclass(frozen=True, eq=False)
 class ChannelComparison:
-    """One channel in one condition: what was measured, what the model has, what it comes to."""
+    """One channel in one condition: what was measured, what the model has, what it comes to.
+
+    friction: what other friction would explain by its course; NaN where it was not tried.
+    """
 
     course: Signal
     model: NDArray[np.float64]
@@ -28,6 +31,7 @@ class ChannelComparison:
     judged: SignalAssessment
     cause: Cause | None
     others: tuple[Cause, ...] = ()
+    friction: float = np.nan
 
     @property
     def within(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,16 +11,17 @@ import numpy as np
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, difference
-from trunnion.rig.comparison.error_sources import KINDS, STATED, Cause, beyond_stated
-from trunnion.rig.comparison.wording import extent, in_which, percent, said
+from trunnion.rig.comparison.error_sources import KINDS, NEAR, STATED, Cause, beyond_stated
+from trunnion.rig.comparison.wording import extent, in_which, percent, said, turned
 from trunnion.rig.reading.arcs import concentration
 from trunnion.rig.reading.log import few_digits
+from trunnion.rig.reading.measurement import Condition, zeros_of_files
 from trunnion.rig.reading.units_taken import read_as
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
 
-__all__ = ["AGREE", "explained", "hides_friction"]
+__all__ = ["AGREE", "corrected", "explained", "hides_friction"]
 
 Members = Sequence[tuple["Compared", "ChannelComparison"]]
 STANDS_OUT = 2.0  # times the median of the conditions
@@ -28,12 +30,12 @@ AGREE = np.radians(1.0)  # shifts that differ by less are one
 FAR = 0.5  # of a gain: told as a factor from here on
 
 
-def explained(name: str, measures: str, kind: str, members: Members, of: int) -> Finding:
-    """A channel that is not within, with what would explain it."""
-    where = in_which([one.condition.name for one, _ in members], of)
+def explained(name: str, measures: str, kind: str, members: Members, conditions: Sequence[Condition]) -> Finding:
+    """A channel that is not within, with what would explain it; conditions: all that have it."""
+    where = in_which([one.condition.name for one, _ in members], len(conditions))
     worst = min(pair.judged.within for _, pair in members)
     rms = max(pair.judged.rms for _, pair in members)
-    unit = members[0][1].course.unit
+    unit, size = _told_in(name, members)
     offset = all(pair.judged.verdict is Verdict.OFFSET for _, pair in members)
     if offset and kind == "zero":
         story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
@@ -44,7 +46,12 @@ def explained(name: str, measures: str, kind: str, members: Members, of: int) ->
             corrected_percent=100 * after,
         )  # fmt: skip
     remedy = "see the residual over the cycle; `trunnion identify` fits parameters of the model to the data"
-    phrases = {"cases": where, "rms_told": f"{said(rms, unit)}{_most(members)}", "explained": "", "remedy": remedy}
+    phrases = {
+        "cases": where,
+        "rms_told": f"{said(rms / size, unit)}{_most(members)}",
+        "explained": "",
+        "remedy": remedy,
+    }
     figures: dict[str, Any] = {"within_percent": 100 * worst, "rms": rms, "several": len(members) > 1, "cause": kind}
     if not kind:
         phrases["explained"], place = _where(members)
@@ -53,6 +60,9 @@ def explained(name: str, measures: str, kind: str, members: Members, of: int) ->
         sizes = [_size(pair, kind) for _, pair in members]
         least = min(cause.explains for cause in sizes)
         story, phrases["remedy"] = _story(name, measures, kind, sizes, members)
+        if kind == "shift":
+            entries = _entries(sizes, members, conditions)
+            phrases["remedy"] += f"; if it is the zero, {entries}" * bool(entries)
         alike = {other.kind for _, pair in members for other in pair.others} - {kind}
         also = f"; {_others(alike, members)} would explain as much" if alike else ""
         beside = _offset_beside(members) if kind == "friction" and "zero" not in alike else ""
@@ -135,23 +145,26 @@ def _size(pair: ChannelComparison, kind: str) -> Cause:
     return Cause("zero", judged.bias, (judged.bias / judged.rms) ** 2)
 
 
+ACT = "dimensions, friction and loads"
 REMEDIES = {
     "flat": "check the sensor, its cable, and the column in the mapping",
     "mirror": "state angle: {sign: -1} in the mapping, or remove it, and check the zero of the angle",
     "sign": "state sign: -1 for the channel in the mapping, or remove it",
     "zero": "check the zero of the channel, and whether the model lacks a load",
-    "gain": "check gain and unit of the channel, and dimensions, friction and loads of the model",
+    "gain": f"check gain and unit of the channel, and {ACT} of the model",
     "shift": "check the zero of the angle, also of single files, and delays of the channel",
     "friction": "`trunnion identify` fits the friction of the model; a zero that is corrected instead hides it",
-    "zero and gain": "check zero and gain of the channel, and dimensions, friction and loads of the model",
+    "zero and gain": f"check zero and gain of the channel, and {ACT} of the model",
 }
 BEYOND = {
     "zero": "that is hardly the zero: check friction and loads of the model, which act alike, and fit them with "
     "`trunnion identify`; a zero that is corrected instead hides them",
-    "gain": "that is hardly the sensor: check unit and range of its amplifier in these files, and dimensions, friction "
-    "and loads of the model",
+    "gain": f"that is hardly the sensor: check unit and range of its amplifier in these files, and {ACT} of the model",
 }
-MODEL = "it differs between conditions: check dimensions, friction and loads of the model, not the sensor"
+UNLIKE_FRICTION = (
+    "check the zero of the channel, and loads of the model, which act alike; `trunnion identify` fits zero and friction"
+)
+MODEL = f"it differs between conditions: check {ACT} of the model, not the sensor"
 
 
 def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members: Members) -> tuple[str, str]:
@@ -170,7 +183,8 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
         alike = pair.judged.correlation
         story = "a wrong sign" + (f", correlation {alike:+.3f}," if np.isfinite(alike) else "")
     elif kind == "zero":
-        story = f"a constant offset of {extent(values, unit)}{_remarks(_beyond(sizes, members))}"
+        offset = _offset_of(name, values, members)
+        story = f"a constant offset of {offset}{_remarks(_beyond(sizes, members), _friction(sizes, members))}"
     elif kind == "gain":
         story = f"a gain {_times(values)}" if _times(values) else f"a gain error of {_percent(values)}"
         story += _remarks(read_as([1 + one for one in values], *pair.course.shown), _beyond(sizes, members))
@@ -186,8 +200,86 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
     else:
         story = f"an offset of {extent(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
     if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members):
-        return story, MODEL
-    return story, BEYOND[kind] if kind in BEYOND and _beyond(sizes, members) else REMEDIES[kind]
+        remedy = MODEL
+    elif kind == "zero" and _of_motion(name, members):
+        remedy = _zero(values, members)
+    elif kind == "zero" and _friction(sizes, members):
+        remedy = UNLIKE_FRICTION
+    else:
+        remedy = BEYOND[kind] if kind in BEYOND and _beyond(sizes, members) else REMEDIES[kind]
+    return story, remedy.replace(ACT, "dimensions") if _of_motion(name, members) else remedy
+
+
+def _of_motion(name: str, members: Members) -> bool:
+    """Whether a channel measures a motion, on which neither friction nor loads act."""
+    return members[0][0].model.measures[name].of_motion
+
+
+def _told_in(name: str, members: Members) -> tuple[str, float]:
+    """Unit in which figures of a channel are told, and its factor to SI: of a motion that of its readings."""
+    course = members[0][1].course
+    return course.shown if _of_motion(name, members) else (course.unit, 1.0)
+
+
+def _precise(value: float, wide: float) -> str:
+    """A number with the digits that its uncertainty leaves, but three at least."""
+    digits = math.floor(math.log10(abs(value) or 1.0)) - math.floor(math.log10(wide)) + 1 if wide > 0 else 3
+    return f"{value + 0.0:+.{min(max(digits, 3), 10)}g}"
+
+
+def _unsure(values: Sequence[float], members: Members) -> float:
+    """How far an offset is not known: by its U, or by what it differs between conditions."""
+    known = [pair.judged.bias_expanded for _, pair in members]
+    return max(*(one for one in known if math.isfinite(one)), max(values) - min(values), 0.0)
+
+
+def _offset_of(name: str, values: Sequence[float], members: Members) -> str:
+    """An offset in words: of a motion with all digits that are known of it."""
+    unit, size = _told_in(name, members)
+    if not _of_motion(name, members) or unit == "rad":
+        return extent(values, unit)
+    low, high = (_precise(one / size, _unsure(values, members) / size) for one in (min(values), max(values)))
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
+
+
+def _zero(values: Sequence[float], members: Members) -> str:
+    """What to do about the zero of a channel of a motion."""
+    known = {pair.course.nothing for _, pair in members}
+    stated = known.pop() if len(known) == 1 else None
+    if stated is None:
+        return "check the zero of the channel"
+    reading, slope, unit = stated
+    told = _precise(reading + float(np.mean(values)) / slope, _unsure(values, members) / abs(slope))
+    return f"check the zero of the channel; if it is off, state zero: {told.removeprefix('+')} {unit}".rstrip()
+
+
+def _friction(sizes: Sequence[Cause], members: Members) -> str:
+    """What friction explains by its course, where that is clearly less than an offset beyond that stated does."""
+    if not _beyond(sizes, members) or any("friction" in {one.kind for one in pair.others} for _, pair in members):
+        return ""
+    rows = [(one.explains - pair.friction, one, pair) for one, (_, pair) in zip(sizes, members, strict=True)]
+    if not all(gap > NEAR for gap, _, _ in rows):  # NaN: friction was not tried
+        return ""
+    _, least, pair = min(rows, key=lambda row: row[0])
+    return f"it explains {percent(least.explains)}, other friction {percent(pair.friction)}"
+
+
+def corrected(conditions: Sequence[Condition], ahead: Sequence[float], unit: str) -> str:
+    """What corrects zeros of the angle that are ahead, rad by condition: the zero that all share, or of each file."""
+    alike = max(ahead) - min(ahead) == 0
+    if alike and not all(one.own_zero for one in conditions):
+        return f"add {turned(ahead[0], unit)} to angle: zero: in the mapping"
+    entries = zeros_of_files(conditions, ahead)
+    return f"correct the zero of each file: files: [{entries}]" if entries else "correct the zero of each file"
+
+
+def _entries(sizes: Sequence[Cause], members: Members, conditions: Sequence[Condition]) -> str:
+    """What corrects the angle if one channel alone tells of it: empty where not all conditions are off."""
+    if len(members) < len(conditions):
+        return ""
+    spans = [cause.size * one.model.span for cause, (one, _) in zip(sizes, members, strict=True)]
+    alike = max(spans) - min(spans) <= AGREE
+    return corrected(conditions, [float(np.mean(spans))] * len(spans) if alike else spans, members[0][0].model.unit)
 
 
 def _differ(kind: str, sizes: Sequence[Cause], members: Members) -> bool:
@@ -219,9 +311,7 @@ def _percent(values: Sequence[float]) -> str:
 def _ahead(shares: Sequence[float], found: Sequence[Compared]) -> str:
     spans = [share * one.model.span for share, one in zip(shares, found, strict=True)]
     if max(spans) - min(spans) > AGREE:
-        told = [
-            f"{one.condition.name}: {said(span, one.model.unit, True)}" for one, span in zip(found, spans, strict=True)
-        ]
+        told = [f"{one.condition.name}: {turned(span, one.model.unit)}" for one, span in zip(found, spans, strict=True)]
         return f"an error of the crank angle ({'; '.join(told)})"
     late = [-share * one.model.run.cycle.duration * 1e3 for share, one in zip(shares, found, strict=True)]
     angle, delay = extent(spans, found[0].model.unit), extent(late, "ms", False)

@@ -19,10 +19,9 @@ from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
-from trunnion.rig.comparison.explanations import AGREE, explained, hides_friction
-from trunnion.rig.comparison.wording import extent, in_which, said
+from trunnion.rig.comparison.explanations import AGREE, corrected, explained, hides_friction
+from trunnion.rig.comparison.wording import extent, in_which, said, turned
 from trunnion.rig.modelled import apart
-from trunnion.rig.reading.measurement import zeros_of_files
 
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
@@ -113,7 +112,7 @@ def _of_channel(name: str, measures: str, found: Sequence[Compared]) -> Iterator
                 of_offset = verdict is Verdict.OFFSET and kind != "sign" and not hides_friction(pair)
                 by_cause.setdefault("zero" if of_offset else kind, []).append((one, pair))
     for kind, members in by_cause.items():
-        yield explained(name, measures, kind, members, len(cases))
+        yield explained(name, measures, kind, members, [one.condition for one, _ in cases])
     yield from _biased(name, cases)
     unknown = [len(pair.course.turns) for _, pair in cases if pair.judged.verdict is Verdict.UNKNOWN]
     once = "measured in one turn only"
@@ -239,14 +238,10 @@ def _shifts(found: Sequence[Compared]) -> Iterator[Finding]:
     conditions, alike = [one.condition for one in found], _alike(every)
     off = [conditions[k] for k in ahead]
     told = f"of {extent(every, unit)} in the crank angle"
-    remedy = f"add {said(mean, unit, True)} to angle: zero: in the mapping"
-    own = all(one.own_zero for one in off)
     if not alike:
-        rows = (f"{one.name}: {said(size, unit, True)}" for one, size in zip(off, every, strict=True))
+        rows = (f"{one.name}: {turned(size, unit)}" for one, size in zip(off, every, strict=True))
         told = f"of the crank angle ({'; '.join(rows)})"
-    if not alike or own:
-        entries = zeros_of_files(conditions, [mean if alike else ahead.get(k, 0.0) for k in range(len(found))])
-        remedy = f"correct the zero of each file: files: [{entries}]" if entries else "correct the zero of each file"
+    remedy = corrected(conditions, [mean if alike else ahead.get(k, 0.0) for k in range(len(found))], unit)
     phrases = {
         "channels": ", ".join(dict.fromkeys(name for name, _, _ in cases)), "range": told, "remedy": remedy,
         "cases": in_which([one.name for one in off], len(found)),

@@ -154,7 +154,8 @@ def _pair(
     random = uncertainty_of(course).random[where]
     noise = float(np.nanmean(random**2)) / judged.rms**2 if np.isfinite(random).any() and judged.rms > 0 else 0.0
     cause, others = best(found, noise)
-    return replace(pair, cause=cause, others=tuple(others))
+    friction = next((one.explains for one in found if one.kind == "friction"), np.nan)
+    return replace(pair, cause=cause, others=tuple(others), friction=friction)
 
 
 VAGUE = 0.5  # expanded uncertainty from which an efficiency is none

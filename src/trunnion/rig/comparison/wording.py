@@ -7,13 +7,19 @@ from collections.abc import Sequence
 
 from trunnion.errors import counted
 
-__all__ = ["extent", "in_which", "percent", "said"]
+__all__ = ["extent", "in_which", "percent", "said", "turned"]
 
 
 def said(value: float, unit: str, signed: bool = False) -> str:
     """A number with its unit; angles in degrees."""
     factor, shown = (180 / math.pi, "deg") if unit == "rad" else (1.0, "" if unit == "1" else unit)
     return f"{value * factor + 0.0:{'+' if signed else ''}.3g} {shown}".strip()
+
+
+def turned(value: float, unit: str) -> str:
+    """By how much the crank angle is off: from 1° on to 0.01°."""
+    degrees = math.degrees(value)
+    return f"{round(degrees, 2):+.6g} deg" if unit == "rad" and abs(degrees) >= 1 else said(value, unit, True)
 
 
 def extent(values: Sequence[float], unit: str, signed: bool = True) -> str:

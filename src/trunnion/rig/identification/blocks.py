@@ -80,6 +80,15 @@ class Block:
         return np.nan_to_num(self.turns - self.mean)
 
     @cached_property
+    def spread(self) -> Array:
+        """Deviations, (turn, position), larger by √((turns − 1)/(m − 1)) where only m turns have a value; 0 of one.
+
+        The sum of their squares is then (turns − 1) variances of one turn, wherever values are missing.
+        """
+        missing = np.sqrt((len(self.turns) - 1) / np.maximum(self.count - 1, 1))
+        return np.asarray(self.deviations * missing)
+
+    @cached_property
     def repeats(self) -> bool:
         """Whether it tells how much turns scatter."""
         return bool(self.turns.shape[0] > 1 and np.any(self.deviations != 0))

@@ -34,6 +34,7 @@ MOST_NAMED = 3
 SMALL = 0.2  # of the largest: what a condition has of an error to be named with it
 MOST_TOLD = 4
 FEW = 5.0  # degrees of freedom
+DOUBTFUL = 0.05  # a chance below which a misfit is spoken of
 FACTOR = 0.5  # of a gain: told as a factor from here on
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
@@ -90,6 +91,9 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
             "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
         )
         yield from _causes(judged)
+    elif test.chance < DOUBTFUL:
+        phrases = {"chance_told": f"{100 * test.chance:.2g} %", "reduced_told": _times(test.reduced)}
+        yield finding_for("fit.doubtful", "fit", phrases=phrases, reduced=test.reduced, chance=test.chance)
     if any(one.severity is Severity.ERROR for one in _speeds(judged)):
         return  # which is mended first
     odd = outstanding(judged) if test.misfit else None
@@ -129,10 +133,15 @@ def _unused(judged: Assessment) -> Iterator[Finding]:
     fine = [name for name in dict.fromkeys(block.channel for block in unused.blocks) if name not in missing]
     if fine:
         yield finding_for("fit.unused", "channels", channels=fine)
-    units = {block.channel: block.course.unit for block in unused.blocks}
-    for name, (rms, known) in missing.items():
-        phrases = {"rms_told": said(rms, units[name]), "known_told": said(known, units[name])}
-        yield finding_for("fit.unused_missed", f"channels.{name}", phrases=phrases, rms=rms, expected=known)
+    units = {block.channel: block.course.shown for block in unused.blocks}
+    for name, one in missing.items():
+        unit, size = units[name]
+        phrases = {
+            "rms_told": said(one.rms / size, unit), "known_told": said(one.expected / size, unit),
+            "of": "once its zero and gain are fitted" if one.shape else "about the mean",
+            "by": "scatter" if one.shape else "standard uncertainty",
+        }  # fmt: skip
+        yield finding_for("fit.unused_missed", f"channels.{name}", phrases=phrases, rms=one.rms, expected=one.expected)
 
 
 def _stands_out(odd: Outstanding) -> Finding:
@@ -325,7 +334,9 @@ def _known(judged: Assessment, group: InseparableUnknowns, names: Sequence[str],
     pair = len(names) == 2
     if pair:
         one = group.known[0]
-        result = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else "1")
+        with_unit = [unit for unit in units if unit not in ("", "1")]
+        of_product = with_unit[0] if one.form == "product" and len(with_unit) == 1 else "1"
+        result = amount(one.value, one.uncertainty, _leading(one, units) if one.form == "sum" else of_product)
         if short:
             subject = f"their {one.form}" if one.form != "sum" else _formula(one, names, units)
             return f"{subject} = {result} is determined best"
@@ -392,7 +403,7 @@ def _limits(judged: Assessment) -> Iterator[Finding]:
             continue
         size = max(abs(judged.estimate[p]), unknown.size)
         half = quantile(judged.found.spread.freedom[p]) * judged.deviation[p]
-        if size > 0 and half > size:
+        if size > 0 and half > size and not judged.found.spread.test.gross:
             value = judged.estimate[p]
             phrases = {"told": amount(value, half, unknown.unit)}
             yield finding_for("parameter.hardly_known", where, phrases=phrases, value=value, half=half)
@@ -401,6 +412,8 @@ def _limits(judged: Assessment) -> Iterator[Finding]:
 def _sensors(judged: Assessment) -> Iterator[Finding]:
     """Which sensor limits what is known, and whether one is off by more than was stated of it."""
     problem = judged.problem
+    if judged.found.spread.test.gross:  # then they stand for what the model lacks
+        return
     names, shares = judged.budget
     for p, unknown in enumerate(problem.model.unknowns):
         for source, part in zip(names, shares[p], strict=True):

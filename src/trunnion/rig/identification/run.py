@@ -97,6 +97,8 @@ def identify(
     unused = UnusedChannels(model, [])
     if channels is None:
         model, blocks, unused = _telling(model, blocks)
+        late = [float(np.hypot(one.cut / (one.speed or np.inf), one.lag)) for one in measurement.conditions]
+        unused = replace(unused, late=late)
     at = np.array([one.start for one in model.unknowns])
     speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(measurement.conditions)]
     refuse_backwards(next(iter(stated.drivers), ""), speeds)

@@ -101,7 +101,7 @@ def _parts(problem: FitProblem, x: Array, k: int, inverse: Array) -> Array:
     """What each position of each turn of a block adds to the estimates, (unknown and sensor, turn, position)."""
     block = problem.blocks[k]
     columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k))
-    return np.asarray((block.deviations / np.maximum(block.count, 1)) * columns[:, None, :])
+    return np.asarray(block.spread / np.sqrt(len(block.turns) * np.maximum(block.count, 1)) * columns[:, None, :])
 
 
 def _reach(block: Block) -> int:
@@ -141,7 +141,7 @@ def correlation_factors(problem: FitProblem, x: Array) -> dict[str, float]:
             mask = problem.masks[k]
             columns = np.nan_to_num(problem.said(x, k)[1][:, mask] / np.sqrt(problem.variances[k][mask]))
             basis = _basis(columns)
-            turns = block.deviations[:, mask] / np.sqrt(problem.variances[k][mask])
+            turns = block.spread[:, mask] / np.sqrt(problem.variances[k][mask])
             actual += float(np.sum((turns @ basis) ** 2))
             white += basis.shape[1] * (len(turns) - 1)
         found[channel] = max(actual / white, 0.05) if white else 1.0
@@ -365,10 +365,10 @@ def lack_of_fit(problem: FitProblem, x: Array) -> Test:
 
 def _weighed(problem: FitProblem, x: Array, k: int) -> tuple[float, Array, float]:
     """Sum over the frequencies of the residual, that of each turn, and the least variance it has, of normal noise."""
-    block, mask = problem.blocks[k], problem.masks[k]
+    block = problem.blocks[k]
+    mask, count = problem.masks[k] & (block.count > 1), len(block.turns)
     gap = np.where(mask, problem.misses(x, k, block.mean), 0.0)
-    turns = np.where(mask, block.deviations, 0.0)
-    count = len(turns)
+    turns = np.where(mask, block.spread * np.sqrt(count / np.maximum(block.count, 1)), 0.0)  # fewer: a larger variance
     powers = _powers(turns) / (count - 1)  # the mean has that of one turn over their number
     steps = np.count_nonzero(mask) * block.unresolved**2
     scatter = _smooth(np.sum(powers, axis=0) / count) + steps

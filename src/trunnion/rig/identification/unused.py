@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,46 +12,93 @@ from numpy.typing import NDArray
 from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.signals import Model
 
-__all__ = ["UnusedChannels"]
+__all__ = ["Missed", "UnusedChannels"]
 
 Array = NDArray[np.float64]
+FEWEST = 12  # positions that have a shape
 MISSES = 2.0  # standard uncertainties, as rms, from which a channel does not agree
 HALF = 0.5  # of its mean square that a shift of the angle has to take away
 ACTS = 0.05  # of it, that the shift has to change
+FLAT = 1e-6  # of a course of the model, that it has to vary to have a shape
+
+
+class Missed(NamedTuple):
+    """A channel that the model misses: RMS of its residual and what is expected of it.
+
+    shape: of what is left once zero and gain are fitted, against the scatter alone.
+    """
+
+    rms: float
+    expected: float
+    shape: bool
 
 
 @dataclass(frozen=True)
 class UnusedChannels:
-    """The channels that are not fitted, with the model of what they measure."""
+    """The channels that are not fitted, with the model of what they measure.
+
+    late: standard uncertainty, s, of when the angle is passed, by condition.
+    """
 
     model: Model
     blocks: Sequence[Block]
+    late: Sequence[float] = ()
 
-    def off(self, at: Array, block: Block, ahead: float = 0.0) -> tuple[float, float]:
-        """RMS of a residual without its mean, which may be the sensor's zero, and of its standard uncertainty.
-
-        at: the unknowns; ahead: by which the angle of the condition is ahead of the model, rad.
-        """
+    def _gap(self, at: Array, block: Block, ahead: float) -> tuple[Model, Array, Array]:
+        """The model, what it says and the residual, where the angle of a condition is ahead of it by so much, rad."""
         model, k = self.model, block.condition
         if ahead:
             first, last, _ = model.driven(k, at)
             phases = list(model.phases)
             phases[k] = (phases[k] + ahead / (last - first)) % 1.0
             model = replace(model, phases=tuple(phases))
-        gap = block.mean - model.courses(at).said[k][block.channel].value
+        said = model.courses(at).said[k][block.channel].value[: block.turns.shape[1]]
+        gap = block.mean - said
         if model.measures[block.channel].turning(model.run.system):
             gap = (gap + np.pi) % (2 * np.pi) - np.pi
-        known = block.course.uncertainty
-        gap, known = gap[np.isfinite(gap)], known[np.isfinite(known)]
-        return (float(np.std(gap)) if gap.size else np.nan, float(np.sqrt(np.mean(known**2))) if known.size else np.nan)
+        return model, said, gap
 
-    def missing(self, at: Array) -> dict[str, tuple[float, float]]:
-        """By channel that does not agree: RMS of the residual and of its uncertainty, of the worst condition."""
-        found: dict[str, tuple[float, float]] = {}
-        for block in self.blocks:
-            rms, known = self.off(at, block)
-            if rms > max(MISSES * known, found.get(block.channel, (0.0, 0.0))[0]):
-                found[block.channel] = rms, known
+    def off(self, at: Array, block: Block, ahead: float = 0.0) -> tuple[float, float]:
+        """RMS of a residual without its mean, which may be the sensor's zero, and of its standard uncertainty.
+
+        at: the unknowns; ahead: by which the angle of the condition is ahead of the model, rad.
+        """
+        gap, course = self._gap(at, block, ahead)[2], block.course
+        random = (course.scatter**2 / np.maximum(course.count, 1))[np.isfinite(course.scatter)]
+        gap = gap[np.isfinite(gap)]
+        if not gap.size or not random.size:
+            return np.nan, np.nan
+        gain = course.accuracy.gain * float(np.nanstd(course.mean))
+        return float(np.std(gap)), float(np.sqrt(np.mean(random) + course.unresolved**2 + gain**2))
+
+    def shape(self, at: Array, block: Block, ahead: float = 0.0) -> tuple[float, float]:
+        """RMS of a residual once zero, gain and the angle within its uncertainty are fitted, and of the scatter.
+
+        What is left tells of an error of the model that the stated accuracy hides; of an angle no gain is fitted. NaN
+        if not known.
+        """
+        model, said, gap = self._gap(at, block, ahead)
+        slope = model.rate(block.condition, said) * self.late[block.condition]
+        there = np.isfinite(gap) & np.isfinite(slope)
+        said, slope, gap = said[there], slope[there], gap[there]
+        if not block.repeats or said.size < FEWEST or np.ptp(said) <= FLAT * np.max(np.abs(said)):
+            return np.nan, np.nan
+        expected = np.sqrt(np.mean((block.variance / np.maximum(block.count, 1))[there]) + block.unresolved**2)
+        around = said - np.mean(said)
+        around *= not model.measures[block.channel].turning(model.run.system)
+        columns = np.column_stack([np.ones(said.size), around / (np.max(np.abs(around)) or 1.0), slope])
+        best = np.linalg.lstsq(np.vstack([columns, [0.0, 0.0, expected]]), np.append(gap, 0.0), rcond=None)[0]
+        return float(np.sqrt(np.mean((gap - columns @ best) ** 2))), float(expected)
+
+    def missing(self, at: Array) -> dict[str, Missed]:
+        """By channel that does not agree, the worst condition: as it is stated, else by its shape."""
+        found: dict[str, Missed] = {}
+        for shape, figures in ((False, self.off), (True, self.shape)):
+            for block in self.blocks:
+                rms, known = figures(at, block)
+                before = found.get(block.channel)
+                if rms > MISSES * known and (before is None or (before.shape == shape and rms > before.rms)):
+                    found[block.channel] = Missed(rms, known, shape)
         return found
 
     def refute(self, at: Array, ahead: Array) -> bool:
@@ -60,6 +108,8 @@ class UnusedChannels:
                 continue
             (before, known), (after, _) = self.off(at, block), self.off(at, block, float(ahead[block.condition]))
             acts = abs(after**2 - before**2) > ACTS * before**2
-            if acts and after > MISSES * known and after**2 > HALF * before**2:
-                return True
+            if acts and after**2 > HALF * before**2:
+                left, scatter = self.shape(at, block, float(ahead[block.condition]))
+                if after > MISSES * known or left > MISSES * scatter:
+                    return True
         return False

@@ -67,6 +67,8 @@ class Signal:
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
+    nothing: the reading that is stated as zero, what a reading of 1 more measures, SI, and the unit of the readings;
+    None where no number is stated, but an unloaded stretch.
     """
 
     channel: str
@@ -75,6 +77,7 @@ class Signal:
     turns: Array
     accuracy: Accuracy = Accuracy()
     read_in: tuple[str, float] = ("", 1.0)
+    nothing: tuple[float, float, str] | None = None
 
     @property
     def shown(self) -> tuple[str, float]:
@@ -133,7 +136,8 @@ class Condition:
     start, cycle: coordinate of the driver at phase 0, and how far it goes in a cycle, rad; NaN where that is not known.
     lag: standard uncertainty, s, of when the coordinate is passed, of all channels together, by the sampling of pulses;
     cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
-    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI.
+    dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI; followed: those of
+    `values` that are the mean of what was measured.
     duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
     known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
     of_start: whether it is no cycle but a motion from its start, of which `duration` is what is followed, s, NaN for
@@ -151,6 +155,7 @@ class Condition:
     lag: float = 0.0
     cut: float = 0.0
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
+    followed: Sequence[str] = ()
     duration: float = float("nan")
     zero: float = float("nan")
     own_zero: bool = False

@@ -32,7 +32,7 @@ from trunnion.rig.reading.log import Account, counted, few_digits, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
 from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
-from trunnion.rig.reading.sensor_quantity import dimensions
+from trunnion.rig.reading.sensor_quantity import Amount, dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
 from trunnion.rig.reading.starts import repeated, valued, with_values
@@ -393,7 +393,10 @@ class _File:
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
+            nothing = None
+            if isinstance(channel.zero, Amount):
+                nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
+            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
@@ -418,7 +421,7 @@ class _File:
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
         found = Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
-            lag=self.lag, cut=self.cut, dimensions=known_as, duration=duration,
+            lag=self.lag, cut=self.cut, dimensions=known_as, followed=tuple(part.setting.means), duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
             own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip

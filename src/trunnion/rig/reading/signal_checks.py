@@ -122,7 +122,8 @@ def signs(
                 "data.power.sign",
                 f"channels.{likely}",
                 f"{what} ({power.mean():.4g} W), {other}",
-                f"write sign: {-channels[likely].sign}",
+                f"write sign: {-channels[likely].sign}"
+                + ("" if rate else "; or sign: in angle:, if that runs backwards"),
             )
             suspects.append(likely)
         gives = gives or bool(power.size and np.mean(power > 0) > MOST) or effort in suspects

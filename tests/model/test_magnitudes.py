@@ -109,3 +109,8 @@ def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) ->
     for example in Path("examples").glob("*.yaml"):
         told += [one for one in read(example).checked if "plain number where" in one.what or "forgotten" in one.what]
     assert told == []
+
+
+def test_a_dimension_may_be_called_as_a_limit(tmp_path: Path) -> None:
+    (tmp_path / "linkage.yaml").write_text(LINKAGE.replace("AB", "lower"), encoding="utf-8")
+    assert read(tmp_path / "linkage.yaml").with_values({"lower": "31 mm"}).parameters()["dimensions.lower"] == 0.031

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from trunnion import read
+from trunnion import MechanismError, read
 from trunnion.errors import Severity
 
 LINKAGE = """\
@@ -114,3 +114,31 @@ def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) ->
 def test_a_dimension_may_be_called_as_a_limit(tmp_path: Path) -> None:
     (tmp_path / "linkage.yaml").write_text(LINKAGE.replace("AB", "lower"), encoding="utf-8")
     assert read(tmp_path / "linkage.yaml").with_values({"lower": "31 mm"}).parameters()["dimensions.lower"] == 0.031
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where"),
+    [
+        ("stiffness: 8", "stifness: 8", "springs.work.stifness"),
+        ("S: {type: prismatic, links: [ground, ram], friction: 0}",
+         "S: {type: prismatic, links: [ground, ram], friction: off}", "joints.S.friction.coefficient"),
+        ("friction: 0.1}", "friction: off}", "joint_defaults.friction.coefficient"),
+    ],
+)  # fmt: skip
+def test_one_slip_is_one_error(tmp_path: Path, old: str, new: str, where: str) -> None:
+    assert CLAMP.count(old) == 1
+    (tmp_path / "clamp.yaml").write_text(CLAMP.replace(old, new), encoding="utf-8")
+    with pytest.raises(MechanismError) as caught:
+        read(tmp_path / "clamp.yaml")
+    assert [one.where for one in caught.value.findings] == [where]
+
+
+def test_a_default_that_no_joint_follows_is_told(tmp_path: Path) -> None:
+    """A fit is the pin's own clearance."""
+    fitted = re.sub(r"(revolute, links: \[.*?\])", r"\1, pin: {fit: 12 mm H7/f7}", CLAMP)
+    fitted = fitted.replace("pin: {radius: 6 mm}", "pin: {clearance: 0 mm}")
+    assert fitted.count("fit:") == 3
+    one_left = fitted.replace("pin: {fit: 12 mm H7/f7}", "pin: {radius: 6 mm}", 1)
+    for text, told in ((fitted, ["joint_defaults.pin.clearance"]), (one_left, [])):
+        (tmp_path / "clamp.yaml").write_text(text, encoding="utf-8")
+        assert [one.where for one in read(tmp_path / "clamp.yaml").checked] == told

@@ -225,7 +225,7 @@ CYCLE: dict[str, Sentence] = {
     "seat.unsettled": Sentence(
         WARNING,
         "the seat did not converge in {rounds} iterations {at}: it still changes by {change:.2g} times the clearance, "
-        "because the load depends more on the seat than its own size",
+        "for the load turns as the pin moves: as of work that is touched with the pin on one side of its hole alone",
         "the pin floats there: treat it as loss of contact",
     ),
     "seat.held": Sentence(

@@ -26,6 +26,17 @@ def wheel(motor: dict[str, Any] | None = None, drag: float = 0.6, grease: float 
 LINEAR = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150}
 
 
+def two_wheels(motor: dict[str, Any], **driver: Any) -> Mechanism:
+    """That flywheel, whose joint has a constant loss, and another one beside it that runs down."""
+    data = wheel(motor, drag=0.0, **driver).data()
+    links = {**data["links"], "disc": {"points": {"W": [0, 0]}, "inertia": 0.05}}
+    links["ground"] = {"points": {"A": [0, 0], "W": [1, 1]}}
+    joints = {**data["joints"], "W": {"type": "revolute", "links": ["ground", "disc"], "losses": {"constant": 0.3}}}
+    joints["A"] = {**joints["A"], "losses": {"constant": 0.6}}
+    drivers = {**data["drivers"], "W": {"speed": 100, "free": True, "initial": {"speed": 5}}}
+    return Mechanism(**{**data, "links": links, "joints": joints, "drivers": drivers})
+
+
 def three_posts() -> Mechanism:
     """Library of benchmark problems of IFToMM, A02: three posts and two couplers, slender rods of 1 m and 1 kg."""
     rod = {"mass": 1, "inertia": 1 / 12, "centre": [0.5, 0]}

@@ -20,7 +20,7 @@ from trunnion.solve.run import prepare
 
 EXAMPLES = DURANGO.parent
 STEPS = 1000
-OF_THE_CYCLE = {"power_residual", "efficiency_reverse"}  # and what decides of locking, and strokes
+OF_THE_CYCLE = {"power_residual", "efficiency_reverse"}  # rounding; and what decides of locking, and strokes
 
 
 @pytest.fixture(autouse=True)
@@ -77,6 +77,12 @@ def test_a_store_has_the_positions_and_what_is_said_at_the_end(suffix: str, tmp_
             np.testing.assert_allclose(found[name], expected[name], 1e-9, 1e-9 * peak, err_msg=str(name))
     assert found["joint_rotation"].attrs == expected["joint_rotation"].attrs
     same_figures(found, whole)
+    residual, *powers = (
+        np.nanmax(np.abs(found[f"{name}_power" if name != "residual" else "power_residual"]))
+        for name in ("residual", "drive", "useful", "friction")
+    )
+    (told,) = (one.value for one in summary_of(found) if one.name == "power_residual")
+    assert told == pytest.approx(residual / max(powers), rel=1e-12)  # of all positions, not of those of a block
 
 
 def same_figures(found: Described, whole: Described) -> None:

@@ -211,6 +211,24 @@ def test_what_has_no_mass_has_no_acceleration() -> None:
     assert caught.value.findings[0].where == "drivers.A"
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.06])
+def test_a_start_where_no_mass_moves_is_refused(friction: float) -> None:
+    """A piston that is the only mass, at its dead centre; not with a rotor, nor beside the dead centre."""
+    data = read(EXAMPLES / "flywheel-press.yaml").data()
+    for link in ("crank", "rod"):
+        data["links"][link] = {"points": data["links"][link]["points"]}
+    data["joint_defaults"], data["loads"] = {"friction": friction}, {}
+    motor = {"kind": "constant", "effort": 50}
+
+    def begun(start: float, **more: float) -> None:
+        simulate(Mechanism(**{**data, "drivers": {"O": {"speed": 10, "start": start, "motor": motor | more}}}), 1e-4, 1)
+
+    with pytest.raises(MechanismError, match="nothing moves that has a mass"):
+        begun(np.pi / 2)
+    begun(np.pi / 2, inertia=0.02)
+    begun(np.pi / 2 + 0.3)
+
+
 def test_it_turns_round_before_the_end_of_its_range() -> None:
     """A pendulum in a range that it nearly reaches: its period is that of the whole swing, by the elliptic integral."""
     data: dict[str, Any] = {
@@ -229,6 +247,37 @@ def test_it_turns_round_before_the_end_of_its_range() -> None:
     result = simulate(Mechanism(**data), period, 1, 1e-10)
     assert not result.trunnion.findings
     assert float(result["drive_coordinate"].values[0, 1]) == pytest.approx(-np.pi / 2 + 0.5, abs=1e-7)
+
+
+def test_the_largest_values_of_the_summary_are_those_between_the_rows() -> None:
+    """Of a press, where its work begins; the same by a hundred thousand rows, of which none is there exactly."""
+    press = read(EXAMPLES / "flywheel-press.yaml")
+    few = {one.name: one for one in simulate(press, 1.0, 20).trunnion.summary}
+    many = simulate(press, 1.0, 100_000)
+    effort = many["drive_effort"].values[0]
+    most = int(np.argmax(np.abs(effort)))
+    assert few["O.effort_max"].value == pytest.approx(effort[most], rel=1e-4)
+    assert few["O.effort_max"].value >= effort[most]
+    assert float(few["O.effort_max"].place.split()[1]) == pytest.approx(many["time"].values[most], abs=1e-4)
+    for joint, size in zip("OPQS", np.sqrt(np.sum(many["reaction_force"].values ** 2, axis=1)), strict=True):
+        assert few[f"{joint}.reaction_max"].value == pytest.approx(np.max(size), rel=1e-4)
+
+
+def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
+    """ω² = 2 g (1 − cos 0.5) at the bottom, a quarter of a period from the start."""
+    bob = {"points": {"A": [0, 0]}, "mass": 1, "centre": [1, 0]}
+    data: dict[str, Any] = {
+        "gravity": [0, -9.81],
+        "links": {"ground": {"points": {"A": [0, 0]}}, "bob": bob},
+        "joints": {"A": {"type": "revolute", "links": ["ground", "bob"]}},
+        "drivers": {"A": {"speed": 1, "free": True, "initial": {"coordinate": -np.pi / 2 + 0.5}}},
+    }
+    quarter = ellipk(np.sin(0.25) ** 2) / np.sqrt(9.81)
+    figure = next(
+        one for one in simulate(Mechanism(**data), 1.7 * quarter, 2).trunnion.summary if "speed_max" in one.name
+    )
+    assert figure.value == pytest.approx(-np.sqrt(2 * 9.81 * (1 - np.cos(0.5))), rel=1e-7)
+    assert figure.place == f"at {quarter:.4g} s"
 
 
 @pytest.mark.parametrize("options", [{"duration": -1.0}, {"duration": 1.0, "steps": 0}, {"tolerance": 1.0}])

@@ -104,4 +104,6 @@ def test_friction_is_set_as_a_file_states_it(program: Run) -> None:
     assert swept.code == 0
     several = program("analyse", PRESS, "--set", "friction=0.2")
     assert several.code == 2
-    assert "joints.K.friction.coefficient" in several.err or "joint_defaults.friction.coefficient" in several.err
+    assert "joint_defaults.friction" in several.err
+    assert "O.friction" in several.err
+    assert program("analyse", PRESS, "--steps", 12, "--set", "O.friction=0.2").code == 0

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
 from manual.conftest import Run
+from timed import LINEAR, two_wheels
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PRESS = EXAMPLES / "flywheel-press.yaml"
@@ -41,6 +43,13 @@ def test_no_steady_cycle_is_a_finding_with_its_cause(program: Run) -> None:
     assert "O does not start" in err
 
 
+def test_a_press_that_stalls_is_an_error(program: Run) -> None:
+    code, out, err = program("simulate", PRESS, "--set", "force=1000kN", "--set", "breakdown_effort=20Nm", "--time=2s")
+    assert code == 1
+    assert "error: drivers.O: O stalls at 1.129 s, at 235.6°, with the motor on: 87.69 N m act on it" in out + err
+    assert "flywheel" in out + err
+
+
 @pytest.mark.parametrize("name", ["b.spectrum.csv", "b.impacts.csv", "b.events.csv --steady", "b.png --kind orbit"])
 def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found(
     program: Run, tmp_path: Path, name: str
@@ -49,3 +58,25 @@ def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found
     assert code == 2
     assert "there is no table" in err or "no joint of this motion is in play" in err
     assert not list(tmp_path.glob("b.*"))
+
+
+def test_several_drivers_that_may_stick_have_no_steady_cycle(program: Run, tmp_path: Path) -> None:
+    (tmp_path / "two.yaml").write_text(yaml.safe_dump(two_wheels(LINEAR).data()))
+    code, _, err = program("simulate", "two.yaml", "--steady", "--time=1s")
+    assert code == 2
+    assert "joints.A: it may stick while others slide" in err
+    assert "smooth at rest" in err
+
+
+def play_and_clutch() -> dict[str, object]:
+    data = yaml.safe_load((EXAMPLES / "worn-gudgeon-pin.yaml").read_text())
+    motor = {"kind": "constant", "effort": 9, "inertia": 0.01, "clutch": 5}
+    data["drivers"]["O"]["motor"] = motor
+    return dict(data)
+
+
+def test_a_clutch_beside_joints_in_play_is_refused_with_what_to_remove(program: Run, tmp_path: Path) -> None:
+    (tmp_path / "played.yaml").write_text(yaml.safe_dump(play_and_clutch()))
+    code, _, err = program("simulate", "played.yaml", "--time=1ms")
+    assert code == 2
+    assert "remove it, or the contact of the joints in play" in err

@@ -185,6 +185,17 @@ def test_a_figure_of_nothing_and_of_many() -> None:
 
 
 @pytest.mark.slow
+def test_measures_stand_in_millimetres_and_degrees() -> None:
+    measures = {"height": {"point": "coupler.E", "axis": "y", "as": "maximum"},
+                "swing": {"angle": "rocker", "as": "maximum"}}  # fmt: skip
+    model = trunnion.Mechanism(**{**trunnion.read(FOUR_BAR).data(), "measures": measures})
+    result = trunnion.sweep(model, {"AB": [1.9, 2.0]}, steps=24, measures=["height", "swing"])
+    (one,) = tables(result, ["height", "swing"])
+    assert one.head[1:3] == ["height [mm]", "swing [deg]"]
+    for row, height, swing in zip(one.rows, result["height"].values, result["swing"].values, strict=True):
+        assert [float(cell) for cell in row[1:3]] == pytest.approx([1e3 * height, np.degrees(swing)], rel=1e-5)
+
+
 def test_long_tables_are_thinned() -> None:
     mechanism = trunnion.read(FOUR_BAR)
     _, _, shown, left = tables(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))[0]

@@ -104,6 +104,8 @@ CASES = [
     ("10 rad/s", "0", 26, "drivers.A.speed", "the speed is 0", "however small"),
     ("10 rad/s", "10 rad/s, range: [1, 1]", 26, "drivers.A.range", "begins and ends at 1", "extent"),
     ("B: [AB, 0]", "B: [0, 0]", 10, "links.crank.points", "'A' and 'B' of the link 'crank' are at one", "move"),
+    ("10 rad/s", "10 rad/s, motor: {kind: induction, breakdown_effort: 9, breakdown_slip: 0.2, synchronous_speed: 1, "
+     "power: 5 kW}", 26, "drivers.A.motor.power", "the key 'power' is unknown", "breakdown_slip = s (k + √(k² − 1))"),
     (", force: [0, -1 kN]", "", 28, "loads.work", "this load is empty", "force or a moment"),
     ("link: coupler, at: C", "at: coupler.C", 28, "loads.work", "neither or both", "link: coupler, at: C"),
     ("AB: 2 m", "AB: ±2 mm", 4, "dimensions.AB", "a tolerance without a value", "tolerances: {"),
@@ -203,6 +205,35 @@ def test_python_raises_the_same_findings_without_lines(findings_of: FindingsOf) 
     assert ("links.ground.mas", "the key 'mas' is unknown") in {(one.where, one.what) for one in found}
     assert any(one.what == "there is no link 'crank'" for one in found)
     assert all(one.line is None and not one.file for one in found)
+
+
+@pytest.mark.parametrize(
+    ("section", "entry"),
+    [
+        ("joint_defaults", {"pin": {"diameter": 0.015}, "friction": 0.1}),
+        (
+            "springs",
+            {"s": {"between": ["ground.A", "coupler.C"], "stifness": 10.0, "only": "push", "free_length": 9.0}},
+        ),
+    ],
+)
+def test_a_mistyped_key_is_told_without_what_follows(section: str, entry: dict[str, object]) -> None:
+    """The rest is checked as if the key that was meant stood there."""
+    data = YAML(typ="safe").load(FOURBAR) | {section: entry}
+    with pytest.raises(MechanismError) as error:
+        Mechanism(**data)
+    (found,) = error.value.findings
+    assert "did you mean" in found.remedy
+
+
+def test_a_motor_stated_by_its_power_is_told_what_to_state() -> None:
+    """And no unit of a power is expected there."""
+    data = YAML(typ="safe").load(FOURBAR)
+    data["drivers"]["A"]["motor"] = {"kind": "induction", "power": "5 kW"}
+    with pytest.raises(MechanismError) as error:
+        Mechanism(**data)
+    (found,) = (one for one in error.value.findings if one.where.endswith("motor.power"))
+    assert "did you mean 'breakdown_effort'" in found.remedy
 
 
 def test_doubts_are_kept_apart_from_errors(findings_of: FindingsOf, tmp_path) -> None:  # type: ignore[no-untyped-def]

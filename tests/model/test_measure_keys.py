@@ -229,3 +229,16 @@ def test_in_space_an_angle_has_an_axis() -> None:
         with_measure(mechanism, transmission_error="B")
     with pytest.raises(MechanismError, match="add axis: x, y or z"):
         with_measure(mechanism, angle="rocker")
+
+
+def test_place_and_window_of_a_measure_can_be_set(varied: Mechanism) -> None:
+    """Also where the file states none; what is no window says so."""
+    bare = with_measure(varied, effort="A")
+    for text in ("10 deg, 50 deg", "[10 deg, 50 deg]"):
+        values = bare.with_values({"measures.one.over": text}).parameters()
+        assert [values[f"measures.one.over.{end}"] for end in ("from", "to")] == pytest.approx([10 * DEG, 50 * DEG])
+    assert bare.with_values({"measures.one.at": "10 deg"}).parameters()["measures.one.at"] == pytest.approx(10 * DEG)
+    for wrong in ("10 deg", 3.0):
+        with pytest.raises(MechanismError) as caught:
+            bare.with_values({"measures.one.over": wrong})
+        assert caught.value.findings[0].where == "measures.one.over"

@@ -149,6 +149,18 @@ def test_two_drivers_and_no_driver() -> None:
     assert figures.design(build(five_bar()), 36).grashof == ""
 
 
+def test_a_driver_between_two_moving_links_has_no_type() -> None:
+    """And says so; its range of assembly is that of its own motion."""
+    data = model(four_bar())
+    data["drivers"] = {"B": {"range": ["60 deg", "70 deg"], "speed": 1.0}}
+    rows = {row.name: row for row in figures.report_figures(Mechanism(**data), 36)}
+    assert rows["transmission_angle"].value is None
+    assert "B drives two moving links" in rows["transmission_angle"].note
+    assert "grashof" not in rows
+    assert rows["limits"].aspect
+    assert "transmission_angle" not in {row.name for row in figures.report_figures(build(four_bar()), 36)}
+
+
 def test_design_with_gaps_returns_and_no_mass() -> None:
     """What has no answer is left out: a drive that turns back has no flywheel, a link without mass no balance."""
     gaps = Mechanism(**model(four_bar(2.0, 1.5, 1.5, 4.0)))

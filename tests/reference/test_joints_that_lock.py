@@ -238,12 +238,14 @@ def test_all_free_drivers_come_to_rest() -> None:
     assert [(kind, of) for kind, of, *_ in events(data)] == [("stick", "W"), ("stick", "A"), ("rest", "A")]
     assert events(data)[-1][2] == pytest.approx(done, abs=1e-8)
     assert data.resting.values.tolist() == [int(time > done) for time in data.time.values]
-    told = findings(data)["simulate.all_rest"]
-    assert told["joint"] == "A"
+    told = findings(data)["simulate.all_stall"]
+    assert (told["joint"], told["drivers"]) == ("A", ["A"])
     assert told["share"] == pytest.approx(0.45 / 0.6, rel=1e-9)
     ways = {one.name: one.value for one in summary_of(data) if one.name.endswith(("run_down", "run_down_way"))}
     assert ways["W.run_down"] == pytest.approx(done, abs=1e-8)
     assert ways["W.run_down_way"] == pytest.approx(0.5 * 3.0 * 3.0 * 0.05 / 0.6, rel=1e-8)
+    switched = simulate(wheels({"kind": "constant", "effort": 0.45, "off_from": 1.5}), 3.0, 3)
+    assert "simulate.all_rest" in findings(switched)
 
 
 def test_nothing_starts() -> None:

@@ -61,3 +61,18 @@ def test_sweeps_and_tolerances_tell_it_too() -> None:
     for measure, expected in (("effort:O", []), ("maximum:effort:O", [("warning", one.figures)])):
         found = trunnion.tolerance(model, [measure], methods=("linear",), steps=180).trunnion.findings
         assert [(f.severity, f.figures) for f in found if f.code == "tolerance.beside_jump"] == expected
+
+
+def test_play_and_allocations_tell_it_too() -> None:
+    """Of the extreme of an effort, with the same bound."""
+    _, (one,) = told(PRESS["loads"]["cut"]["force"][0], 180)
+    joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": {"radius": "25 mm", "clearance": "20 um"}}}
+    measures = {"torque": {"effort": "O", "as": "maximum", "limit": "±50 N m"}}
+    more = {
+        "tolerances": {"rod.points.Q.x": "±0.05 mm"},
+        "costs": {"rod.points.Q.x": {"model": "power", "B": 1, "k": 1}},
+    }
+    model = trunnion.Mechanism.model_validate({**PRESS, "joints": joints, "measures": measures, **more})
+    for result in (trunnion.play(model, steps=180), trunnion.allocate(model, steps=180, samples=0)):
+        (found,) = (one for one in result.trunnion.findings if one.code.endswith("beside_jump"))
+        assert (found.severity, found.figures) == ("warning", one.figures)

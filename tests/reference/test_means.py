@@ -311,3 +311,14 @@ def test_root_mean_square_of_an_effort() -> None:
     result = trunnion.analyse(crank, 12)
     (row,) = (row for row in summary_of(result) if row.aspect == "RMS")
     assert row.value == pytest.approx(2.0 * 9.81 * 0.3 / np.sqrt(2), rel=1e-9)
+
+
+def test_a_load_that_begins_elsewhere_with_pins_in_seats_takes_more_rounds() -> None:
+    """Against the powers of 14 400 positions, whose one step at the jump is what they may be off by."""
+    loads = {"work": {**PRESS["loads"]["work"], "resisting_force": "1 kN * between(S.slide, 150 mm, 152 mm)"}}
+    joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": {"clearance": "0.2 mm"}, "seat": {"xi": 0}}}
+    mechanism = Mechanism(**{"trunnion": 1, "gravity": [0, 0], **PRESS, "joints": joints, "loads": loads})
+    result = trunnion.analyse(mechanism, 14_400)
+    ratio = float(result["useful_power"].mean() / result["drive_power"].sum("driver").mean())
+    assert result["efficiency_error"] < 1e-3
+    assert float(result["efficiency"]) == pytest.approx(ratio, abs=2e-5)

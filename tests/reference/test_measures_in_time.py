@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import trunnion
-from timed import LINEAR, slider_crank, wheel
+from timed import LINEAR, slider_crank, two_wheels, wheel
 from trunnion.dynamics.batch import figures_in_time
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
@@ -110,6 +110,16 @@ def test_the_summary_of_a_simulation_has_the_same_figures() -> None:
         ("fluctuation", "fluctuation"),
     ):
         assert figures[f"A.{key}"] == pytest.approx(own[name][0], rel=1e-7, abs=1e-9)
+
+
+def test_a_start_beside_another_free_driver_is_that_of_the_wheel_alone() -> None:
+    """Joints that stick one by one are followed by other means."""
+    measures = {"start": MEASURE}
+    alone, beside = stated(wheel(LINEAR), measures=measures), stated(two_wheels(LINEAR), measures=measures)
+    motors = {"drivers.A.motor.stall_effort": [4.0, 5.0]}
+    wanted, found = (trunnion.sweep(one, motors, 24, measures=["start"])["start"].values for one in (alone, beside))
+    assert np.all(np.isfinite(wanted))
+    np.testing.assert_allclose(found, wanted, rtol=1e-7)
 
 
 # ---- what is refused or left out ------------------------------------------------------------------------------

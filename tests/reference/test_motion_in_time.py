@@ -88,6 +88,18 @@ def test_an_induction_motor_runs_up_by_kloss() -> None:
         assert 1 - at(result, "drive_rate", time) / (50 * np.pi) == pytest.approx(slip, rel=1e-9)
 
 
+def test_an_induction_motor_by_its_data_sheet_carries_its_rated_torque_at_its_rated_speed() -> None:
+    """T_k = k P/ω_N and s_k = s_N (k + √(k² − 1)): 5.5 kW, 1455 rpm of 1500 rpm, breakdown ratio 2.8."""
+    motor = {
+        "kind": "induction",
+        "breakdown_effort": 101.0716,
+        "breakdown_slip": 0.1624602,
+        "synchronous_speed": 50 * np.pi,
+    }
+    result = simulate(wheel(motor, drag=5500 / (1455 * np.pi / 30), initial={"speed": 140.0}), 1.0, 1, 1e-10)
+    assert at(result, "drive_rate", 1.0) == pytest.approx(1455 * np.pi / 30, rel=1e-5)
+
+
 def test_a_motor_too_weak_does_not_start() -> None:
     result = simulate(wheel({**LINEAR, "stall_effort": 0.5}), 1.0, 10)
     (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.stays_at_rest"]
@@ -95,6 +107,26 @@ def test_a_motor_too_weak_does_not_start() -> None:
     assert finding.figures["needed"] == pytest.approx(0.6)
     assert np.all(result["drive_rate"].values == 0.0)
     assert np.all(result["resting"].values == 1)
+
+
+def test_a_motor_too_weak_stalls() -> None:
+    """It gets slower by (0.6 − 0.5) N m/J and stops for good; a motor switched off, braked, or of no torque by then
+    does not stall, nor does one that breaks away again."""
+
+    constant = {"kind": "constant", "effort": 0.5}
+
+    def codes(**motor: Any) -> dict[str, dict[str, Any]]:
+        own = {"kind": "table", "over": "time", **motor} if "points" in motor else constant | motor
+        result = simulate(wheel(own, initial={"speed": 2.0}), 2.0, 4, 1e-11)
+        return {one.code: one.figures for one in result.trunnion.findings}
+
+    (figures,) = codes().values()
+    wanted = {"time": 1.0, "coordinate": 1.0, "place": "rad", "given": 0.5, "needed": 0.6, "unit": "N m", "driver": "A"}
+    assert figures == {key: one if isinstance(one, str) else pytest.approx(one) for key, one in wanted.items()}
+    assert list(codes()) == ["simulate.stalls"]
+    assert list(codes(off_from=0.5)) == list(codes(brake=0.1, brake_from=0.5)) == ["simulate.rests"]
+    assert list(codes(points=[[0, 0.5], [1.4, 0.5], [1.5, 0]])) == ["simulate.rests"]
+    assert not codes(points=[[0, 0.5], [1.4, 0.5], [1.5, 1]])
 
 
 def test_a_gear_a_rotor_and_a_loss() -> None:

@@ -278,6 +278,19 @@ def test_limit() -> None:
     assert (finding["code"], finding["figures"]["limit"]) == ("limit.kept", pytest.approx(1.0))
 
 
+@pytest.mark.parametrize("place", [{"at": "30 deg"}, {"as": "maximum"}])
+def test_limit_of_one_place(place: dict[str, str]) -> None:
+    """The worst case there decides, on either side of it."""
+    data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", **place}}}
+    told = trunnion.play(trunnion.Mechanism(**data), steps=72).trunnion.findings
+    (worst,) = (np.rad2deg(one.figures["worst"]) for one in told if "worst" in one.figures)
+    for factor, code in ((0.999, "limit.exceeded_there"), (1.001, "limit.kept")):
+        data["measures"]["swing"]["limit"] = f"{factor * worst} deg"
+        result = trunnion.play(trunnion.Mechanism(**data), steps=72)
+        assert [one.code for one in result.trunnion.findings if one.where == "measures.swing.limit"] == [code]
+        assert bool(json.loads(result.attrs["missed"])) == (factor < 1)
+
+
 def test_dead_centres_have_no_answer_and_say_so() -> None:
     data = four_bar("C").data()
     data["links"]["crank"]["points"]["B"] = ["65 mm", 0]  # no crank any more

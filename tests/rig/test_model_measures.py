@@ -63,9 +63,9 @@ VERBS = {
 @pytest.mark.parametrize("name", NAMED)
 @pytest.mark.parametrize("verb", VERBS)
 def test_what_cannot_be_followed_is_named(verb: str, name: str) -> None:
-    """A statistic, a place or a window is no course; of an unknown name those that there are are told."""
+    """A statistic, a place or a window is no course; an unknown name is answered by the nearest one."""
     with pytest.raises(MechanismError) as caught:
         VERBS[verb](name)
     told = " ".join(str(one) for one in caught.value.findings)
     assert name in told
-    assert ("the model's measures are turned" if name == "turn" else "the model gives it") in told
+    assert ("did you mean 'turned'" if name == "turn" else "the model gives it") in told

@@ -16,6 +16,7 @@ from trunnion.results.attributes import findings_of
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.views.allocation.allocation import prices
 from trunnion.views.allocation.cost import trade_off
+from trunnion.views.allocation.tables import headed
 from trunnion.views.tolerance.readings import readings
 from trunnion.views.tolerance.report import report
 from trunnion.views.tolerance.tables import tables
@@ -169,3 +170,51 @@ def test_costs_of_formulas_are_a_line_and_a_play_has_no_sign() -> None:
     assert panels["dimensions.k"].get_xlabel().startswith("±")
     steps = trade_off(result, [(0.5, 3.0), (1.0, 1.0), (2.0, 1.0)], stepped=True)
     assert steps.axes[0].lines[0].get_drawstyle() == "steps-post"
+
+
+def test_equal_parts_are_told_together_and_a_play_is_within_its_radius() -> None:
+    """At 0° the rod and the ram have 30 µm, three pins 20 µm each, the crank 10 µm."""
+    tip = {"point": "ram.T", "axis": "x", "at": "0 deg", "limit": "±0.05 mm"}
+    dimensions = {"r": "60 mm ± 0.01 mm", "k": "200 mm ± 0.015 mm"}
+    model = slider(dimensions=dimensions, tolerances={}, measures={"tip": tip})
+    result = trunnion.tolerance(model, methods=["linear"], steps=12)
+    (found,) = coded(result, "limit.missed")
+    assert "'dimensions.k', 30 % of" in found.remedy
+    assert "joints.O.clearance, joints.P.clearance, joints.Q.clearance, which are equal, together 60 %" in found.remedy
+    rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
+    told = {row[0]: row[1].replace("\u00a0", " ") for row in rows}
+    assert (told["k"], told["O.clearance"]) == ("±0.015 mm", "within 0.02 mm")
+
+
+def test_fresh_samples_of_an_allocation_are_told() -> None:
+    """Processes are so few that more is bought than is required."""
+    options = {"fine": {"tolerance": "5 um", "cost": 2}, "rough": {"tolerance": "1 mm", "cost": 1}}
+    model = slider(
+        costs={"k": {"options": options}}, measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.25 mm"}}
+    )
+    result = trunnion.allocate(model, criterion="yield", target=0.9, samples=400, steps=12)
+    (found,) = coded(result, "yield.spare")
+    assert found.figures["low"] == float(result["yield_checked_low"]) > 0.9
+    assert "yield of fresh samples" in headed(result)
+
+
+def test_a_sensitivity_is_by_the_unit_of_the_tolerance() -> None:
+    dimensions = {**SLIDER["dimensions"], "F": "250 kN ± 5 kN"}
+    loads = {"work": {"joint": "S", "resisting_force": "F"}}
+    more = {"tolerances": {}, "measures": {"torque": {"effort": "O", "at": "60 deg"}}}
+    result = trunnion.tolerance(slider(dimensions=dimensions, loads=loads, **more), methods=["linear"], steps=12)
+    rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
+    (row,) = [[cell.replace("\u00a0", " ") for cell in one] for one in rows if one[0] == "F"]
+    torque, half = float(result["nominal"][0]), 5 / 250
+    assert row[1] == "±5 kN"
+    assert row[2].endswith("/kN")
+    assert float(row[3].split()[0]) == pytest.approx(abs(torque) * half * 1e-3, abs=1e-4)  # kN m
+    assert float(row[2].split()[0].replace("−", "-")) == pytest.approx(torque / 250e3, rel=1e-3)
+
+
+def test_a_yield_and_its_interval_have_the_same_digits() -> None:
+    tight = slider(measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.25 mm"}})
+    (found,) = coded(trunnion.tolerance(tight, samples=300, steps=12), "limit.missed")
+    told = re.search(r"yield ([\d.]+) % \(95 % interval ([\d.]+) to ([\d.]+) %\)", found.what)
+    assert told
+    assert len({len(one.partition(".")[2]) for one in told.groups()}) == 1

@@ -262,7 +262,7 @@ def test_every_class_of_the_page_has_a_style_and_print_its_rules():
     printed = web_text("compare.css").partition("@media print")[2]
     for rule in ("display: table-header-group", "break-inside: avoid"):
         assert rule in printed
-    assert "max-width: 100%" in web_text("compare.css")
+    assert re.search(r"\.courses img \{[^}]*max-width: 100%", web_text("report.css"))
 
 
 # ---- files and the verb ---------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from test_report import Page
 
 from trunnion import Mechanism, analyse
 from trunnion.results.attributes import summary_of
+from trunnion.views.common.page import inputs_of
 from trunnion.views.cycle.plots import PLOTS, READY, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
@@ -84,6 +85,9 @@ def test_input_data_are_told_as_they_were_written(slider_crank):
     texts = [row["text"] for row in json.loads(slider_crank.attrs["inputs"])]
     assert "1500 rpm" in texts
     assert "1500 rpm" in words
+    rows = [{"path": "links.a.x", "value": -0.044, "unit": "m", "text": text} for text in ("-dx", "-44 mm")]
+    ((_, lines),) = inputs_of(slider_crank.assign_attrs(inputs=json.dumps(rows)))
+    assert [line["text"].replace("\u00a0", " ") for line in lines] == ["-dx = −44.00 mm", "-44 mm"]
 
 
 def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():

@@ -11,10 +11,11 @@ __all__ = ["show_structure"]
 
 def show_structure(found: Check, name: str, drivers: int) -> None:
     """Mobility, structural formula, modules with the ways to assemble them, and pairs of gears, a line each."""
-    rank = "unknown, no position can be assembled," if found.rank_mobility is None else str(found.rank_mobility)
+    rank = found.rank_mobility
+    by_rank = "by rank unknown: no position can be assembled" if rank is None else f"{rank} by rank"
     screen = console()
     screen.print(name, style="bold", markup=False)
-    screen.print(f"mobility {found.mobility} by formula, {rank} by rank; drivers: {drivers}", markup=False)
+    screen.print(f"mobility {found.mobility} by formula, {by_rank}; drivers: {drivers}", markup=False)
     screen.print(f"formula  {found.formula or '(no moving link)'}", markup=False)
     for number, (module, count) in enumerate(zip(found.plan.modules, found.assemblies, strict=True)):
         ways = "" if module.rank == 1 else f", {count} assembly {'mode' if count == 1 else 'modes'}"

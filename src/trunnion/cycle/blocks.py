@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.model_measures import values_at
 from trunnion.cycle.positions import check_steps, positions, stretch
-from trunnion.cycle.summary import books, dataset_of, figures
+from trunnion.cycle.summary import BALANCED, balance, books, dataset_of, figures, peak
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
 from trunnion.results.export import in_parts, saving
@@ -63,6 +63,7 @@ def written(
     extremes: dict[str, Figure] = {}
     count = np.zeros(len(Status), np.int64)
     tails: tuple[dict[str, Any], ...] = {}, {}
+    powers = {name: np.zeros(1) for name in BALANCED if name in first.arrays}  # the largest so far
     with ExitStack() as stack:
         files = [stack.enter_context(saving(path, **(saved or {}), in_parts=True)) for path in out]
         for low in range(0, steps, BLOCK):
@@ -72,12 +73,13 @@ def written(
             block = replace(block, means=first.means, ideal=first.ideal)
             values = values_at(run, measured.measures, time, first.method, tails[1])
             own = replace(measured, values=values, valid=np.ones(len(time), bool))
+            powers = {name: np.maximum(row, peak(block.arrays[name])) for name, row in powers.items()}
             count += np.bincount(block.arrays["status"].astype(np.intp), minlength=len(count))
             for figure in (*figures(run, block), *own.summary()):
                 extremes[figure.name] = _further(extremes.get(figure.name, figure), figure)
             if some.stop == steps:
                 unseen = [code for code in Status if count[code] and not np.any(first.arrays["status"] == code)]
-                attributes |= _concluded(Result(attributes, _none), extremes, count, unseen)
+                attributes |= _concluded(Result(attributes, _none), extremes, balance(powers), count, unseen)
             part = dataset_of(run, block, own, attributes, kept)
             for add in files:
                 add(part)
@@ -100,17 +102,23 @@ def _further(one: Figure, other: Figure) -> Figure:
 
 
 def _concluded(
-    looked: Result, extremes: Mapping[str, Figure], count: NDArray[np.int64], unseen: Sequence[Status]
+    looked: Result,
+    extremes: Mapping[str, Figure],
+    residual: float,
+    count: NDArray[np.int64],
+    unseen: Sequence[Status],
 ) -> dict[str, Any]:
     """Summary and findings over all blocks.
 
-    looked: the result at some positions; count: positions by status; unseen: statuses of positions at which it has not
-    looked.
+    looked: the result at some positions; residual: of the power balance; count: positions by status; unseen: statuses
+    of positions at which it has not looked.
     """
     told = []
     for figure in summary_of(looked):
         if figure.aspect in ("minimum", "maximum", MORE_THAN) or figure.aspect.startswith("largest"):
             figure = extremes.get(figure.name, figure)
+        if figure.name == "power_residual" and figure.value is not None:
+            figure = replace(figure, value=residual)
         if figure.name == "positions_solved":
             figure = replace(figure, value=float(np.sum(count[: Status.NOT_CONVERGED])), aspect=f"of {np.sum(count)}")
         told.append(figure)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.results.variables import VARIABLES
 from trunnion.solve.backward import Backward
 from trunnion.solve.compiled import Figure, Lanes, pays
 from trunnion.solve.compiled_vectors import VectorKernel
@@ -28,7 +29,9 @@ ENGINES = ("auto", "numpy", "compiled")
 WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
 FOLLOWED = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
 PROBED = 64  # positions at which it is seen whether margins are followed
-UNDEFINED = ("efficiency_instant", "locking_margin")  # variables that may have no finite value in a solved position
+SEATED = 2.0  # times as soon does it pay with pins in seats: NumPy takes six times as long, compiling three times
+# variables that may have no finite value in a solved position
+UNDEFINED = ("efficiency_instant", "locking_margin", "contact_position")
 
 
 class _Flags(NamedTuple):
@@ -73,7 +76,8 @@ class CycleKernel:
         self._flags = {name: _Flags(array.flags.writeable, bool(array.strides[-1])) for name, array in arrays.items()}
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
-            numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
+            one = {path: value[:, :1] if np.ndim(value) == 2 else value for path, value in values.items()}
+            numbers = self._cells(run.solve(np.zeros(1), one, FrictionMethod()))
         wanted = (cell for cell, number in numbers.items() if self._wanted(cell, number))
         self._names = {f"{name}{list(place)}": (name, place) for name, place in wanted}
         self._kernel = VectorKernel(
@@ -106,8 +110,9 @@ class CycleKernel:
         return rows, columns
 
     def _wanted(self, cell: Cell, number: Number) -> bool:
-        """Whether a cell is read, and not 0 whatever the values are, as the arrays are before."""
-        return self._flags[cell[0]].read and not (isinstance(number, (int, float)) and number == 0)
+        """Whether a cell is read, and not 0 whatever the values are, as most arrays are before."""
+        none = isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part != "seats"
+        return self._flags[cell[0]].read and not none
 
     def _cells(self, back: Backward) -> Mapping[Cell, Number]:
         """The number of every cell, of one walk; those of the last one are remembered, for figures ask one by one."""
@@ -122,18 +127,17 @@ class CycleKernel:
 
 
 def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
-    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or seats need NumPy.
+    """Whether the compiled engine is to be tried. MechanismError if there is no such engine.
 
     method: of friction, where a locking margin is asked for at each position.
     """
     if engine not in ENGINES:
         raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
-    if engine == "compiled" and run.seats:
-        what = "pins in seats follow the load: that is not compiled"
-        raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
-    if engine != "auto" or run.seats:
+    if engine != "auto":
         return engine == "compiled"
-    weight = 1.0 if method is None or positions * FOLLOWED < WORTH_COMPILING else _weight(run, method)
+    weight = SEATED if run.seats else 1.0
+    if method is not None and positions * FOLLOWED >= WORTH_COMPILING:
+        weight *= _weight(run, method)
     return pays(int(positions * weight), WORTH_COMPILING)
 
 

@@ -11,6 +11,7 @@ on. It is empirical, and has a unit.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, Status
 from trunnion.results.sentences import finding_for
 from trunnion.solve.eccentricity_rate import FINE as LANES
+from trunnion.solve.memory import CHUNK
 from trunnion.solve.seating import NO_LOAD, ROUNDS, TOLERANCE, Seated, loads_of
 from trunnion.solve.seats import GivenSeat
 from trunnion.solve.system import Dial
@@ -130,14 +132,17 @@ def _turned(run: Run, back: Backward, seat: GivenSeat, time: NDArray[np.float64]
         peak = float(np.nanmax(_size(load), initial=0.0))
         if peak <= NO_LOAD * largest:
             continue
-        for place, _ in _passages(load, peak, periodic=False, near=np.inf):
-            k = min(int(place), len(time) - 2)
-            if k == place:  # there is no load here, with nothing to look at more closely
-                yield float(time[k])
-                continue
-            fine = np.linspace(time[k], time[k + 1], PARTS + 1)
-            for one, _ in _passages(_loads_at(run.ideal(fine), seat, fine)[number], peak, periodic=False):
-                yield float(np.interp(one, np.arange(len(fine)), fine))
+        places = [place for place, _ in _passages(load, peak, periodic=False, near=np.inf)]
+        # where there is no load there is nothing to look at more closely
+        yield from (float(time[int(place)]) for place in places if place == min(int(place), len(time) - 2))
+        wide = np.array([k for place in places if (k := min(int(place), len(time) - 2)) != place], np.intp)
+        if not len(wide):
+            continue
+        fine = np.linspace(time[wide], time[wide + 1], PARTS + 1, axis=-1)  # (passage, time)
+        close = _loads_at(run.ideal(fine.ravel()), seat, fine.ravel())[number].reshape(-1, *fine.shape)
+        for k, times in enumerate(fine):
+            for one, _ in _passages(close[:, k], peak, periodic=False):
+                yield float(np.interp(one, np.arange(len(times)), times))
 
 
 def _loads_at(back: Backward, seat: GivenSeat, time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -173,25 +178,40 @@ def _lifted(forces: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArra
 
 
 def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The figure of Earles and Wu of every joint: of its reaction without play, in space of the force on an end."""
-    if run.system.mechanism.space == "planar":
-        return _earles_wu(arrays["reaction_force"] - arrays["reaction_force_change"], time, run.cycle.periodic)
-    ends = [_earles_wu(arrays["end_force"][:, end], time, run.cycle.periodic) for end in (0, 1)]
-    return np.fmax(*ends)
+    """The figure of Earles and Wu of every joint: of its reaction without play, in space of the force on an end.
+
+    NaN of fewer than three positions, and at the ends of a cycle that does not close: there the load has no rate.
+    """
+    count = len(time)
+    found = np.full((len(run.system.joints), count), np.nan)
+    for low in range(0, count if count > 2 else 0, CHUNK):
+        inner = slice(low, min(low + CHUNK, count))
+        if run.system.mechanism.space == "planar":
+            ends = [_with_neighbours(arrays["reaction_force"], inner)]
+            ends[0] -= _with_neighbours(arrays["reaction_force_change"], inner)
+        else:
+            ends = [_with_neighbours(arrays["end_force"][:, end], inner) for end in (0, 1)]
+        found[:, inner] = functools.reduce(np.fmax, (_earles_wu(force, time[1] - time[0]) for force in ends))
+    if not run.cycle.periodic:
+        found[:, [0, -1]] = np.nan
+    return found
 
 
-def _earles_wu(force: NDArray[np.float64], time: NDArray[np.float64], periodic: bool) -> NDArray[np.float64]:
-    """|F × Ḟ|/|F|³, rad/(N s), of every joint, by central differences over the positions; NaN of a single one."""
-    if len(time) < 3:
-        return np.full((len(force), len(time)), np.nan)
-    before, after = np.roll(force, 1, axis=-1), np.roll(force, -1, axis=-1)
-    if not periodic:  # the ends have no rate
-        before[..., 0] = after[..., -1] = np.nan
-    rate = (after - before) / (2 * (time[1] - time[0]))
+def _with_neighbours(force: NDArray[np.float64], inner: slice) -> NDArray[np.float64]:
+    """A copy of some positions with the one before and the one after, in a cycle."""
+    count = force.shape[-1]
+    before, after = (force[..., k : k + 1] for k in ((inner.start - 1) % count, inner.stop % count))
+    return np.concatenate([before, force[..., inner], after], axis=-1)
+
+
+def _earles_wu(force: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """|F × Ḟ|/|F|³, rad/(N s), of every joint between the first position and the last, by central differences."""
+    before, force, after = force[..., :-2], force[..., 1:-1], force[..., 2:]
+    rate = (after - before) / (2 * step)
     size = np.sum(force * force, axis=1)
     along = np.sum(force * rate, axis=1)
     with np.errstate(all="ignore"):
-        across = np.sqrt(np.maximum(np.sum(rate * rate, axis=1) - along**2 / size, 0.0))
+        across = np.sqrt(np.sum((rate - force * (along / size)[:, None]) ** 2, axis=1))
         # no rate tells a jump, of the load or of a friction: there the second difference is no smaller than the first
         bends = np.sum((after - 2 * force + before) ** 2, axis=1) > 0.25 * np.sum((after - before) ** 2, axis=1)
         jumps = (np.sum(after * before, axis=1) < 0) | bends

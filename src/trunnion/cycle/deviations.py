@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.plane import point
 from trunnion.algebra.space import point_of
+from trunnion.cycle.fill import Into
 from trunnion.joints.clearance import describing
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.results.figure import Figure
+from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
-from trunnion.solve.seating import Seated
-from trunnion.solve.seats import GivenSeat
+from trunnion.solve.seating import loads_of
+from trunnion.solve.seats import GivenSeat, seats
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
@@ -39,48 +41,43 @@ DIFFERENCES = {
 COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotation"}
 
 
-def fill_seats(arrays: Arrays, found: Sequence[GivenSeat], seated: Seated, window: slice) -> None:
+def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
     """Seats, end forces and places of contact of one chunk."""
-    walk = seated.back.walk
-    joints = list(walk.system.joints)
-    for seat in found:
+    walk = back.walk
+    joints, axes = list(walk.system.joints), walk.system.mechanism.coordinates
+    for seat in seats(walk.system, walk.values):
         i = joints.index(seat.joint)
-        offsets = seat.play.model.offsets(seated.offsets, f"seats.{seat.joint}") or []
-        _fill_ends(arrays["seat_offset"][i], seat, offsets, window)
-        _fill_ends(arrays["end_force"][i], seat, seated.loads[seat.joint], window, shared=True)
-        _describe(arrays, i, window, walk, seat)
-        _fill_contacts(arrays, i, window, walk, seat)
-    arrays["seat_rounds"][window] = seated.rounds
-    arrays["seat_travel"][window] = seated.told
-    arrays["seat_change"][window] = seated.change
+        offsets = seat.play.model.offsets(walk.values, f"seats.{seat.joint}") or []
+        ends = _ends(seat, offsets)
+        for name, vectors in (("seat_offset", ends), ("end_force", _ends(seat, loads_of(back, seat), shared=True))):
+            for end, vector in vectors.items():
+                for axis, number in enumerate(vector[:axes]):
+                    arrays[name][i, end, axis, window] = number
+        _describe(arrays, i, window, walk, seat, ends)
+        _fill_contacts(arrays, i, window, walk, seat, ends)
 
 
-def _fill_ends(
-    array: NDArray[np.float64], seat: GivenSeat, vectors: Sequence[Vector], window: slice, shared: bool = False
-) -> None:
+def _ends(seat: GivenSeat, vectors: Sequence[Vector], shared: bool = False) -> dict[int, list[Number]]:
     """Vectors of the ends at end 1 and 2; what is along the axis belongs to both, a force by halves."""
-    for place in {key[0] for end in seat.play.model.ends for key in end} - {"3"}:
-        array[int(place) - 1, :, window] = 0.0
-    for end, vector in zip(seat.play.model.ends, vectors, strict=True):
-        for key, number in zip(end, vector, strict=True):
-            place, axis = key.split(".")
-            if place == "3":
-                array[:, AXES.index(axis), window] = 0.5 * number if shared else number
-            else:
-                array[int(place) - 1, AXES.index(axis), window] = number
+    keys = [key.split(".") for end in seat.play.model.ends for key in end]
+    found: dict[int, list[Number]] = {int(place) - 1: [0.0, 0.0, 0.0] for place, _ in keys if place != "3"}
+    for (place, axis), number in zip(keys, (number for vector in vectors for number in vector), strict=True):
+        for end in found if place == "3" else (int(place) - 1,):
+            found[end][AXES.index(axis)] = 0.5 * number if shared and place == "3" else number
+    return found
 
 
-def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: GivenSeat) -> None:
+def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> None:
     """β and ξ of a pin or guide; of a ball there are none."""
-    ends = arrays["seat_offset"][i, :, :, window]
-    if len(seat.play.model.ends[0]) == 3:
+    model = seat.play.model
+    if len(model.ends[0]) == 3:
         return
-    if len(seat.play.model.ends) == 1:
-        beta, xi = np.zeros(()), np.arctan2(ends[0, 1], ends[0, 0])
-    elif len(seat.play.model.ends[0]) == 1 and len(seat.play.model.ends) == 2:  # a guide of the plane, from its normal
-        beta, xi = describing(*((end[1], np.zeros_like(end[1])) for end in ends))
-    else:
-        beta, xi = describing(*((end[0], end[1]) for end in ends))
+    beta: Number = 0.0
+    if len(model.ends) == 1:
+        xi = np.arctan2(ends[0][1], ends[0][0])
+    else:  # a guide of the plane is told from its normal
+        guide = len(model.ends[0]) == 1 and len(model.ends) == 2
+        beta, xi = describing(*((ends[end][1], 0.0) if guide else (ends[end][0], ends[end][1]) for end in (0, 1)))
     arrays["seat_beta"][i, window], arrays["seat_xi"][i, window] = beta, xi
     if walk.system.turns(seat.joint):
         one, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
@@ -88,37 +85,36 @@ def _describe(arrays: Arrays, i: int, window: slice, walk: Forward, seat: GivenS
         arrays["seat_xi_pin"][i, window] = wrapped(xi + turn)
 
 
-def _fill_contacts(arrays: Arrays, i: int, window: slice, walk: Forward, seat: GivenSeat) -> None:
+def _fill_contacts(
+    arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]
+) -> None:
     """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
     frame = walk.hole(seat.joint)
     own = clearance(seat.joint, walk.values)
     radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (own if own is not None else 0.0)
-    spatial = walk.system.mechanism.space == "spatial"
-    guide = seat.play.model.size is not None and seat.play.model.size[0] == "guide"
-    half = 0.5 * seat.play.length if seat.play.model.size is not None else 0.0
-    for end in range(2):
-        offset = arrays["seat_offset"][i, end, :, window]
-        across = offset if len(seat.play.model.ends[0]) == 3 else offset[:2]
-        size = np.sqrt(np.sum(across**2, axis=0))
+    spatial, model = walk.system.mechanism.space == "spatial", seat.play.model
+    guide = model.size is not None and model.size[0] == "guide"
+    half = 0.5 * seat.play.length if model.size is not None else 0.0
+    for end, offset in ends.items():
+        x, y, z = offset if len(model.ends[0]) == 3 else (offset[0], offset[1], 0.0)
+        size = np.sqrt(x * x + y * y + z * z)
         share = np.where(size > 0, radius / np.where(size > 0, size, 1.0), np.nan)
         along = half if end else -half
         local: tuple[Number, Number, Number]
         if guide:
             local = (0.0, 0.0, along) if spatial else (along, 0.0, 0.0)
-        elif len(across) == 3:
-            local = (share * across[0], share * across[1], share * across[2])
+        elif len(model.ends[0]) == 3:
+            local = (share * x, share * y, share * z)
         else:
-            local = (share * across[0], share * across[1], along)
+            local = (share * x, share * y, along)
         place = point_of(frame, local) if spatial else point(frame, local[0], local[1])
         for axis, number in enumerate(place):
             arrays["contact_position"][i, end, axis, window] = number
-        if len(seat.play.model.ends) == 1:  # the other end is the same
-            break
 
 
 def wrapped(angle: Number) -> Number:
     """An angle in (−π, π]."""
-    return angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi))
+    return angle + 2 * np.pi * np.floor((np.pi - angle) / (2 * np.pi))
 
 
 def fill_errors(arrays: Arrays, ideal: Arrays, joints: Sequence[tuple[int, int]], window: slice) -> None:

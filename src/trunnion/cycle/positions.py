@@ -12,7 +12,7 @@ from trunnion.algebra.quadrature import Effort
 from trunnion.algebra.unwrap import Tail
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
-from trunnion.cycle.deviations import COMPARED, fill_errors, fill_seats
+from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.kept import needed
 from trunnion.cycle.means import AVERAGED, MOST_SUPPOSED, SUPPOSED, Means, means_of, still, unknown
 from trunnion.cycle.near_locking import LOOKED
@@ -22,11 +22,12 @@ from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers,
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import Lanes, around, lanes
+from trunnion.solve.compiled_seats import CompiledLooks, SeatKernels, Travelling, as_inputs
+from trunnion.solve.eccentricity_rate import Lanes, around, lanes, part_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import settle
+from trunnion.solve.seating import Seats, by_numpy, seats_of, settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
@@ -34,7 +35,9 @@ __all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"
 
 
 MOST_STEPS = 100_000_000
+SEATED_AT_ONCE = 1 << 17  # positions whose seats the compiled engine settles together
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
+COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks for more, as a jump does that seats move
 
 
 def check_steps(steps: int) -> None:
@@ -49,7 +52,7 @@ class Positions:
 
     means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
     one walk that they all came of, where it was one and pins lie in no seats; ideal_arrays: what the means of the ideal
-    mechanism are made of.
+    mechanism are made of; compiled: whether the compiled engine found them.
     """
 
     arrays: Arrays
@@ -63,6 +66,7 @@ class Positions:
     losses: list[contact_loss.Loss]
     walked: Backward | None = None
     ideal_arrays: Arrays = field(default_factory=dict)
+    compiled: bool = False
 
 
 def positions(
@@ -93,7 +97,7 @@ def positions(
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     return replace(
         found,
-        means=_means(run, found.arrays, quick),
+        means=_means(run, found.arrays, quick, compiled=found.compiled and bool(run.seats)),
         ideal=_means(run, found.ideal_arrays, quick, ideal=True) if run.erring else None,
     )
 
@@ -118,11 +122,11 @@ def stretch(
     arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts, wanted)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    done = compiles(engine, run, max(steps, among), method) and _fill_compiled(
+    compiled = compiles(engine, run, max(steps, among), method) and _fill_compiled(
         arrays, ideal, run, time, method, causes, engine == "auto"
     )
     back = None
-    for low in range(0, 0 if done else steps, CHUNK):
+    for low in range(0, 0 if compiled else steps, CHUNK):
         window = slice(low, min(low + CHUNK, steps))
         if run.erring:
             back = _fill_as_built(arrays, ideal, run, time, window, method, causes)
@@ -138,17 +142,17 @@ def stretch(
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     meant = still(ideal) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal)
+    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal, compiled)
 
 
-def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
+def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False, compiled: bool = False) -> Means:
     """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
     if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return still(arrays)
-    return run.once(("means", method, ideal), lambda: _averaged(run, method, ideal))
+    return run.once(("means", method, ideal, compiled), lambda: _averaged(run, method, ideal, compiled))
 
 
-def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
+def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> Means:
     """Means over the cycle, which do not depend on the positions that are asked for."""
     of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
     if ideal or not run.seats:
@@ -159,16 +163,21 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
 
     def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
         seen = around(time.ravel(), run.cycle)
-        found = settle(run, seen, method, run.ideal(seen.times, method))
+        found = settle(run, seen, method, CompiledLooks(_seat_kernels(run, method), seen.times) if compiled else None)
         valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
+        powers = _powers(found.back, time)
+        if np.all(valid):
+            return powers
         # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows in a short one
         meant = _powers(run.ideal(time.ravel(), method=method), time)
-        powers = {name: np.where(valid, array, meant[name]) for name, array in _powers(found.back, time).items()}
+        powers = {name: np.where(valid, array, meant[name]) for name, array in powers.items()}
         return {**powers, SUPPOSED: np.where(valid, 0.0, np.abs(np.sum(meant["drive_power"], axis=0)))}
 
     between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
     means = means_of(of, seated, between, SEATED)[0]
-    return means if means.supposed <= MOST_SUPPOSED else unknown(means)
+    if means.supposed > MOST_SUPPOSED:
+        return unknown(means)
+    return means_of(of, seated, between, FINER)[0] if means.efficiency_error > COARSE else means
 
 
 def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:
@@ -217,19 +226,26 @@ def _fill_as_built(
     for name, array in ideal.items():
         array[..., window] = scratch[name]
     if run.seats:
-        seated = settle(run, seen, method, meant)
+        seated = settle(run, seen, method, by_numpy(run, seen, method, meant))
         back = seated.back
-        causes.note_seats(seated.offsets, seated.sticks, window.start)
         fill_chunk(arrays, back, part, window, causes)
-        fill_seats(arrays, run.seats, seated, window)
-        status = arrays["status"][window]
-        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
+        _note_seats(arrays, seated, window, causes)
     else:
         back = run.solve(part, method=method)
         fill_chunk(arrays, back, part, window, causes)
     fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
     return back
+
+
+def _note_seats(arrays: Arrays, seated: Seats, window: slice, causes: diagnosis.Causes) -> None:
+    """What the iteration came to in one chunk, beside the walk with the pins in their seats."""
+    causes.note_seats(seated.offsets, seated.sticks, window.start)
+    arrays["seat_rounds"][window] = seated.rounds
+    arrays["seat_travel"][window] = seated.told
+    arrays["seat_change"][window] = seated.change
+    status = arrays["status"][window]
+    np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
 
 
 def _fill_compiled(
@@ -242,41 +258,97 @@ def _fill_compiled(
     or_not: bool,
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
+    if run.seats:
+        return _fill_seated(arrays, ideal, run, time, method, causes, or_not)
     try:
         own = _kernel(run, run.values, time, arrays, method)
     except MechanismError:
         if or_not:
             return False
         raise
-    _fill_rest(arrays, own.fill(arrays, run.values, time)[1], run.solve, time, method, causes)
+    left = own.fill(arrays, run.values, time)[1]
+    _fill_rest(arrays, left, lambda lanes: run.solve(time[lanes], method=method), time, causes)
     if run.erring:
-        quick, system = replace(method, margin_up_to=0.0), run.system
-        labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-        meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
-        other = _kernel(run, run.ideal_values, time, meant, quick)
-        _fill_rest(meant, other.fill(meant, run.ideal_values, time)[1], run.ideal, time, quick)
-        ideal |= {name: meant[name] for name in ideal}
-        fill_errors(arrays, meant, link_numbers(system), slice(None))
-        blank(arrays, arrays["status"].astype(np.int8), slice(None))
+        _fill_beside_ideal(arrays, ideal, run, time, slice(0, len(time)), method)
     return True
 
 
+def _fill_beside_ideal(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    window: slice,
+    method: FrictionMethod,
+) -> None:
+    """The ideal mechanism at some positions, compiled, and what differs from it."""
+    quick, system, part = replace(method, margin_up_to=0.0), run.system, time[window]
+    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
+    meant = results.allocate(labels, len(part), absent, wanted={*IDEAL, *COMPARED})
+    left = _kernel(run, run.ideal_values, part, meant, quick).fill(meant, run.ideal_values, part)[1]
+    _fill_rest(meant, left, lambda lanes: run.ideal(part[lanes], quick), part)
+    for name, array in ideal.items():
+        array[..., window] = meant[name]
+    fill_errors(arrays, meant, link_numbers(system), window)
+    blank(arrays, arrays["status"][window].astype(np.int8), window)
+
+
+def _fill_seated(
+    arrays: Arrays,
+    ideal: Arrays,
+    run: Run,
+    time: NDArray[np.float64],
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+    or_not: bool,
+) -> bool:
+    """The same with pins in seats, as many positions at a time as memory should hold twice."""
+    quick = replace(method, margin_up_to=0.0)
+    for low in range(0, len(time), SEATED_AT_ONCE):
+        window = slice(low, min(low + SEATED_AT_ONCE, len(time)))
+        part, some = time[window], {name: array[..., window] for name, array in arrays.items()}
+        seen = lanes(part, run.cycle)
+        try:
+            seats = seats_of(run, seen, CompiledLooks(_seat_kernels(run, quick), seen.times))
+            inputs = {**run.values, **as_inputs(seats.offsets, seats.moving)}
+            own = _kernel(run, inputs, part, some, method)
+        except MechanismError:
+            if or_not:
+                return False
+            raise
+
+        def solved(places: NDArray[np.intp], seats: Seats = seats, low: int = low) -> Backward:
+            own = places - low
+            offsets = {path: numbers[own] for path, numbers in seats.offsets.items()}
+            return run.at(time[places], offsets, method, travel=part_of(seats.moving, own, whole=True))
+
+        _fill_rest(arrays, own.fill(some, inputs, part)[1] + low, solved, time, causes)
+        _note_seats(arrays, seats, window, causes)
+        _fill_beside_ideal(arrays, ideal, run, time, window, method)
+    return True
+
+
+def _seat_kernels(run: Run, method: FrictionMethod) -> SeatKernels:
+    """The compiled kernels by which pins settle in their seats, made once."""
+    return run.once(("seats", method), lambda: SeatKernels(run, method))
+
+
 def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:
-    """The compiled kernel of some variables, made once."""
+    """The compiled kernel of some variables, made once for numbers of one kind."""
     read = tuple(name for name, array in arrays.items() if array.strides[-1])
-    key = "compiled", values is run.values, method, read
-    return run.once(key, lambda: CycleKernel(run, values, time, arrays, write, method))
+    of = Travelling(run.system, run.values, run.cycle, run.chosen) if len(values) > len(run.values) else run
+    key = "compiled", values is run.values, len(values), method, read
+    return run.once(key, lambda: CycleKernel(of, values, time, arrays, write, method))
 
 
 def _fill_rest(
     arrays: Arrays,
     left: NDArray[np.intp],
-    solve: Callable[..., Backward],
+    solve: Callable[[NDArray[np.intp]], Backward],
     time: NDArray[np.float64],
-    method: FrictionMethod,
     causes: diagnosis.Causes | None = None,
 ) -> None:
-    """Those positions that the compiled engine leaves to NumPy."""
+    """Those positions that the compiled engine leaves to NumPy. solve: the walk of some of them."""
     for low in range(0, len(left), CHUNK):
         lanes = left[low : low + CHUNK]
-        fill_lanes(arrays, solve(time[lanes], method=method), time[lanes], (lanes,), causes)
+        fill_lanes(arrays, solve(lanes), time[lanes], (lanes,), causes)

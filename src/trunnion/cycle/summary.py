@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +14,9 @@ from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import MOST_SUPPOSED, Means
-from trunnion.cycle.positions import Positions, positions
+from trunnion.cycle.positions import Positions
 from trunnion.cycle.scene import DRAWN
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Finding, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
@@ -37,6 +36,7 @@ from trunnion.solve.system import Dial, System, felt, rubbing
 if TYPE_CHECKING:
     import xarray as xr
 
+    from trunnion.measures.measures import Measure
     from trunnion.solve.run import Run
 
 from trunnion.cycle.model_measures import Watched, positions_told, watched
@@ -44,13 +44,17 @@ from trunnion.cycle.variables import fill_of
 from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
+    "BALANCED",
+    "balance",
     "beside_jumps",
     "books",
     "dataset_of",
     "effort_units",
+    "extreme_beside_jump",
     "figures",
     "inputs",
     "model_notes",
+    "peak",
     "references",
     "result_of",
     "scene_of",
@@ -59,6 +63,7 @@ __all__ = [
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
+EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FEWEST = 12  # positions among which a jump can be told from a slope
 JUMP, STEADY = (
     0.2,
@@ -131,7 +136,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at, near),
         *_missed_peaks(run.system, at),
-        *_beside_jumps(run, at),
+        *beside_jumps(run, at.time, at.arrays),
         *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
@@ -229,28 +234,44 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
             yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
 
 
-def beside_jumps(run: Run, steps: int) -> Iterator[Finding]:
-    """Largest efforts of a cycle that are beside a jump, for studies that look at more than one mechanism."""
-    with suppress(MechanismError):  # of seats that over-constrained links cannot take
-        yield from _beside_jumps(run, positions(run, steps, margin=False, averaged=False))
-
-
-def _beside_jumps(run: Run, at: Positions) -> Iterator[Finding]:
+def beside_jumps(run: Run, time: NDArray[np.float64], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
     """Efforts that are largest beside a jump, of a load or of friction: how much more it may be at the jump itself."""
-    time, status, dial = at.time, at.arrays["status"], at.dial
-    if len(time) < FEWEST or not len(run.edges):
-        return
     for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
-        size = np.abs(np.where(status < Status.NOT_CONVERGED, at.arrays["drive_effort"][i], np.nan))
-        if not np.any(np.isfinite(size)):
-            continue
-        k = int(np.nanargmax(size))
-        for side in (-1, 1) if 1 < k < len(time) - 2 else ():
+        size = np.abs(np.where(arrays["status"] < Status.NOT_CONVERGED, arrays["drive_effort"][i], np.nan))
+        if found := _beside_jump(run, time, size):
+            k, more = found
+            at = run.system.dial(run.values, time).at(k)
+            yield finding_for("effort.beside_jump", f"drivers.{name}", at=at, more=more, unit=unit)
+
+
+def extreme_beside_jump(
+    run: Run, measure: Measure, time: NDArray[np.float64], course: NDArray[np.float64], code: str
+) -> Iterator[Finding]:
+    """The same of an extreme of an effort that is measured, in the words of a code of `sentences`."""
+    if measure.kind != "effort" or measure.statistic not in EXTREMES:
+        return
+    size = {"maximum": course, "minimum": -course}.get(measure.statistic, np.abs(course))
+    if found := _beside_jump(run, time, size):
+        k, more = found
+        at, unit = run.system.dial(run.values, time).at(k), measure.unit(run.system)
+        yield finding_for(code, f"measures.{measure.name}", at=at, more=more, unit=unit)
+
+
+def _beside_jump(run: Run, time: NDArray[np.float64], size: NDArray[np.float64]) -> tuple[int, float] | None:
+    """Place of the largest of a course, (position,), if it is beside a jump, and how much more it may be at the jump.
+
+    The jump is looked for last: most courses have none.
+    """
+    if len(time) < FEWEST or not np.any(np.isfinite(size)):
+        return None
+    k, scale = int(np.nanargmax(size)), float(np.nanmax(np.abs(size)))
+    for side in (-1, 1) if 1 < k < len(time) - 2 else ():
+        beyond, more = size[k] - size[k + side], size[k] - size[k - side]
+        if beyond > JUMP * scale and STEADY * scale < more < beyond:
             low, high = sorted((time[k], time[k + side]))
-            beyond, more = size[k] - size[k + side], size[k] - size[k - side]
-            jumps = np.any((run.edges >= low) & (run.edges <= high)) and beyond > JUMP * size[k]
-            if jumps and STEADY * size[k] < more < beyond:
-                yield finding_for("effort.beside_jump", f"drivers.{name}", at=dial.at(k), more=more, unit=unit)
+            if np.any(np.mod(run.edges - low, run.cycle.duration) <= high - low):
+                return k, float(more)
+    return None
 
 
 def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
@@ -381,7 +402,7 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
 
 def _rounding(arrays: Arrays, variable: str) -> float:
     """What is no more than rounding of the reactions or of the drive."""
-    return 1e-11 * max(_peak(arrays[variable]), _peak(arrays["drive_effort"]), 1e-300)
+    return 1e-11 * max(peak(arrays[variable]), peak(arrays["drive_effort"]), 1e-300)
 
 
 def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
@@ -430,15 +451,18 @@ def _why(means: Means, arrays: Arrays) -> str:
     return "the driver does no net work"
 
 
+# the power balance: what is left over, and what that is held against
+BALANCED = ("power_residual", "drive_power", "useful_power", "friction_power", "spring_power")
+
+
 def balance(arrays: Arrays) -> float:
     """Largest power residual over the largest power that any driver, or else any load, has."""
-    residual = _peak(arrays["power_residual"])
-    kinds = ("drive_power", "useful_power", "friction_power", "spring_power")
-    highest = max(_peak(arrays[name]) for name in kinds if name in arrays)
+    residual, *powers = (peak(arrays[name]) for name in BALANCED if name in arrays)
+    highest = max(powers)
     return residual / highest if highest > 0 else residual
 
 
-def _peak(values: NDArray[np.float64]) -> float:
+def peak(values: NDArray[np.float64]) -> float:
     """Largest magnitude, without a copy of the values."""
     return float(max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)))
 

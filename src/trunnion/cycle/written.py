@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.cycle import diagnosis
+from trunnion.cycle.deviations import fill_seats
 from trunnion.cycle.fill import Into, fill_power
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
@@ -69,6 +70,8 @@ def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
     fill.forces(arrays, back, window)
     _fill_settled(arrays, back, window)
     fill_power(arrays, back, time, window)
+    if "seat_offset" in arrays:
+        fill_seats(arrays, back, window)
     if CONDITIONS in arrays:
         for i, (group, pose) in enumerate(zip(back.walk.system.groups, back.walk.poses, strict=True)):
             arrays[CONDITIONS][i, window] = group.condition(pose)

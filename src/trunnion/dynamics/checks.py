@@ -133,12 +133,14 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
 
 def _clutches(mechanism: Mechanism, free: list[str]) -> Iterator[Finding]:
     """Clutches beside several free coordinates."""
-    beside = "joints are in play" if len(free) < 2 else f"{len(free)} coordinates are free"
+    beside, remedy = f"{len(free)} coordinates are free", "remove it, or let this driver alone be free"
+    if len(free) < 2:
+        beside, remedy = "joints are in play", "remove it, or the contact of the joints in play"
     for name in free:
         motor = mechanism.drivers[name].motor
         if motor is not None and motor.clutch is not None:
             what = f"a clutch that may slip is solved with one free coordinate, and {beside}"
-            yield Finding(what, f"drivers.{name}.motor.clutch", "remove it, or let this driver alone be free")
+            yield Finding(what, f"drivers.{name}.motor.clutch", remedy)
 
 
 def _smooth() -> list[str]:

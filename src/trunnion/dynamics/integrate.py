@@ -35,7 +35,7 @@ __all__ = ["Integration"]
 Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
-CREEPING, CREPT = 400, 1e-9  # steps that get on by less of the duration: it does not get on
+CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
@@ -203,7 +203,7 @@ class Integration:
         while solver.status == "running":
             before, row = float(solver.t), np.array(solver.y)
             marks.append(before)
-            if len(marks) > CREEPING and before - marks[-CREEPING] < CREPT * self.duration:
+            if any(len(marks) > k and before - marks[-k] < crept * self.duration for k, crept in CREEPING):
                 return self._failed(before, row, sense, now, "")
             near = self._near(row, between, self._next(solver, until), rate, before)
             solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
 from trunnion.dynamics.contact_motion import Impact
+from trunnion.dynamics.course import OVER_TIME, Courses
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
@@ -84,20 +85,26 @@ class Books(NamedTuple):
 class Found(NamedTuple):
     """A motion with its books: what works and energies differ by at every row, J, and the energy turned over, J.
 
-    impacts: of joints in play; share: the largest difference of the energy turned over, 0 where it is rounding.
+    between: books at other times, s; impacts: of joints in play; share: the largest difference of the energy turned
+    over, 0 where it is rounding.
     """
 
     solution: Solution
     books: Books
     residual: Array
     turned_over: float
+    between: Callable[[Array], Books]
     impacts: Sequence[Impact] = ()
 
     @classmethod
-    def of(cls, motion: FreeMotion, solution: Solution, books: Books, impacts: Sequence[Impact] = ()) -> Found:
-        """The motion with its energy account."""
+    def of(
+        cls, motion: FreeMotion, solution: Solution, time: Array, between: Callable[[Array], Books],
+        impacts: Sequence[Impact] = (),
+    ) -> Found:  # fmt: skip
+        """The motion with its energy account. time: s, of its rows."""
+        books = between(time)
         residual, turned_over = _energy(books)
-        return cls(solution, books, residual, max(turned_over, _turned_over(motion, solution)), impacts)
+        return cls(solution, books, residual, max(turned_over, _turned_over(motion, solution)), between, impacts)
 
     @property
     def share(self) -> float:
@@ -108,7 +115,7 @@ class Found(NamedTuple):
 
 def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Result:
     """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out."""
-    solution, books, residual, turned_over, impacts = found
+    solution, books, impacts = found.solution, found.books, found.impacts
     run = stated or motion.run
     _note_switches(motion, solution)
     mechanism, system = run.system.mechanism, run.system
@@ -126,7 +133,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
             "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
             **(_named_contacts(motion, impacts) if stated else {}),
-            "summary": figure_rows(_summary(motion, solution, books, residual, turned_over, run, impacts)),
+            "summary": figure_rows(_summary(motion, found, run)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
             "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
@@ -136,20 +143,20 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
 
     def build() -> xr.Dataset:
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
-        found = described(books.arrays, known) | described(_own(motion, run, solution, books, residual), MOTION)
+        given = described(books.arrays, known) | described(_own(motion, run, solution, books, found.residual), MOTION)
         labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
         coordinates = {"time": books.time}
         if stated is not None and books.touches is not None:
             labels["contact"] = list(motion.contacts.labels)
-            found |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
+            given |= described(books.touches.arrays(books.works[-1]), CONTACT) | described(
                 impact_arrays(impacts), IMPACT
             )
             rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
             if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
                 along["frequency"] = FREQUENCY
                 coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
-                found |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
-        return dataset_of("motion", found, labels, attributes, described(coordinates, along))
+                given |= described({"contact_force_amplitude": amplitude}, SPECTRUM)
+        return dataset_of("motion", given, labels, attributes, described(coordinates, along))
 
     return Result(attributes, build)
 
@@ -243,6 +250,8 @@ def _turned_over(motion: FreeMotion, solution: Solution) -> float:
 
 DIFFERS = 0.01  # of a restitution: a difference that is worth a note
 FEW = 2  # contacts that begin slowly, of which nothing is said
+PARTS = 16  # of the interval between two rows in which the largest reaction is looked for
+RATE, EFFORT = OVER_TIME["rate"], OVER_TIME["effort"]
 ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
@@ -304,19 +313,37 @@ def _rests(motion: FreeMotion, solution: Solution, name: str, effort: str) -> It
     if not (rests and solution.stretches and solution.stretches[-1].resting):
         return
     last, stays = solution.stretches[-1], all(one.resting for one in solution.stretches)
-    more: dict[str, Any] = {} if stays else {"times": len(rests), "time": rests[-1].time}
+    on = _on(motion, solution)
+    more: dict[str, Any] = {} if stays else {"time": rests[-1].time, **({} if on else {"times": len(rests)})}
     if motion.resisted:
         at = solution.layout.moment(np.array([last.begin]), solution.at(np.array([last.begin]))[0], now=last.now)
         shares = np.abs(np.asarray(motion.accelerate(at._replace(onsets=last.onsets, senses=last.senses)).shares)[:, 0])
         worst = int(np.argmax(shares))
-        code = "none_starts" if stays else "all_rest"
+        code = "none_starts" if stays else "all_stall" if on else "all_rest"
         joint = motion.resisted[worst]
+        more |= {"drivers": on} if code == "all_stall" else {}
         yield finding_for(f"simulate.{code}", f"joints.{joint}", joint=joint, share=float(shares[worst]), **more)
         return
     given, needed = _holding(motion, solution, last)
     figures: dict[str, Any] = {"driver": name, "given": given, "needed": needed, "unit": effort}
-    code = "stays_at_rest" if stays else "rests"
+    code = "stays_at_rest" if stays else "stalls" if on else "rests"
+    if code == "stalls":
+        place = float(solution.at(np.array([last.begin]))[0][0, 0])
+        turns = motion.system.turns(motion.names[0])
+        more |= {"coordinate": place % (2 * np.pi) if turns else place, "place": "rad" if turns else "m"}
     yield finding_for(f"simulate.{code}", f"drivers.{name}", **figures, **more)
+
+
+def _on(motion: FreeMotion, solution: Solution) -> list[str]:
+    """The free drivers whose motor still acts at the end, through its clutch if it has one, and is not braked."""
+    last, time = solution.stretches[-1], np.array([solution.end])
+    at = solution.layout.moment(time, solution.at(time)[0], now=last.now)
+    found = []
+    for i, (name, drive) in enumerate(motion.drives.items()):
+        effort = drive.seen(last.now, last.slips).shaft(time, at.rate[i], at.integral[i], last.now)
+        if np.any(effort != 0.0) and not drive.braking(last.now):
+            found.append(name)
+    return found
 
 
 def _of_contacts(motion: FreeMotion, run: Run, impacts: Sequence[Impact]) -> Iterator[Finding]:
@@ -356,54 +383,77 @@ def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
-def _summary(
-    motion: FreeMotion,
-    solution: Solution,
-    books: Books,
-    residual: Array,
-    turned_over: float,
-    run: Run,
-    impacts: Sequence[Impact],
-) -> Sequence[Figure]:
+def _summary(motion: FreeMotion, own: Found, run: Run) -> Sequence[Figure]:
     """The figures that one looks at first."""
     found: list[Figure] = []
-    names = list(run.system.mechanism.drivers)
+    solution, books, impacts, names = own.solution, own.books, own.impacts, list(run.system.mechanism.drivers)
     for i, name in enumerate(_shown(motion, run)):
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
-        rate, what = books.at.rate[i], "speed"
-        unit = "rad/s" if turns else "m/s"
+        rate, unit = books.at.rate[i], "rad/s" if turns else "m/s"
         if not np.any(np.isfinite(rate)) or not np.any(np.isfinite(books.works[0])):
             continue
-        most = int(np.nanargmax(np.abs(rate)))
-        found.append(Figure(f"{name}.speed_max", f"{what} of {name}", rate[most], unit, "largest", _at(books, most)))
+        course = Courses.of_solution(motion, solution, i)
+        found.append(_largest(f"{name}.speed_max", f"speed of {name}", unit, books.time, rate, course.extreme(RATE)))
         last = np.flatnonzero(np.isfinite(rate))[-1]
-        found.append(Figure(f"{name}.speed_end", f"{what} of {name}", rate[last], unit, "at the end", _at(books, last)))
+        found.append(Figure(f"{name}.speed_end", f"speed of {name}", rate[last], unit, "at the end",
+                            _at(books.time[last])))  # fmt: skip
         efforts = books.arrays["drive_effort"][names.index(name)]
         noun = "drive torque" if turns else "drive force"
         # of others it is rounding; where nothing has inertia at a dead centre there is none
         if motion.system.mechanism.drivers[name].motor is not None and np.any(np.isfinite(efforts)):
-            most = int(np.nanargmax(np.abs(efforts)))
-            found.append(
-                Figure(f"{name}.effort_max", f"{noun} of {name}", efforts[most], effort, "largest", _at(books, most))
-            )
-        found += steady_figures(motion, solution, i)
-    for i, joint in enumerate(run.system.joints):
-        size = np.sqrt(np.sum(books.arrays["reaction_force"][i] ** 2, axis=0))
-        if np.any(size > 0):
-            most = int(np.nanargmax(size))
-            found.append(Figure(f"{joint}.reaction_max", f"reaction in {joint}", size[most], "N", "largest",
-                                _at(books, most)))  # fmt: skip
+            found.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, books.time, efforts,
+                                  course.extreme(EFFORT)))  # fmt: skip
+        found += steady_figures(motion, solution, i, course)
+    found += _reactions(own, list(run.system.joints))
     found += impact_figures(motion.contacts.labels, impacts, solution.end)
     if not np.any(np.isfinite(books.works[0])):  # it does not begin
         return found
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
     for key, works in _works(solution, books).items():
-        if np.nanmax(np.abs(works)) > ROUNDING * turned_over:
+        if np.nanmax(np.abs(works)) > ROUNDING * own.turned_over:
             found.append(Figure(f"work_{key}", WORDS[key], works[done], "J"))
-    worst = float(np.nanmax(np.abs(residual)))
+    worst = float(np.nanmax(np.abs(own.residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))
     return found
 
 
-def _at(books: Books, row: int) -> str:
-    return f"at {books.time[row]:.4g} s"
+def _largest(
+    name: str, subject: str, unit: str, time: Array, rows: Array, between: tuple[float, float] = (0.0, 0.0)
+) -> Figure:
+    """What is farthest from 0 at the rows, or between them, where a value and its time, s, are given."""
+    most = int(np.nanargmax(np.abs(rows)))
+    value, when = rows[most], time[most]
+    if np.isfinite(between[0]) and abs(between[0]) > abs(value):
+        value, when = between
+    return Figure(name, subject, value, unit, "largest", _at(when))
+
+
+def _reactions(own: Found, joints: Sequence[str]) -> Iterator[Figure]:
+    """The largest reactions: of the rows and both sides of the ends of steps, where forces jump; then beside it."""
+    ends = np.array([one.end for one in own.solution.stretches])
+    ends = ends[:: max(1, len(ends) // LOOKED)]
+    time, sizes = own.books.time, _sizes(own.books)
+    time, sizes = _joined(time, sizes, own, np.append(ends, np.nextafter(ends, np.inf)))
+    loaded = [(i, int(np.nanargmax(size))) for i, size in enumerate(sizes) if np.any(size > 0)]
+    near = [(float(time[max(most - 1, 0)]), float(time[min(most + 1, len(time) - 1)])) for _, most in loaded]
+    finer = [np.linspace(low, high, 2 * PARTS + 1) for low, high in near]
+    time, sizes = _joined(time, sizes, own, np.concatenate([ends[:0], *finer]))
+    for i, _ in loaded:
+        yield _largest(f"{joints[i]}.reaction_max", f"reaction in {joints[i]}", "N", time, sizes[i])
+
+
+def _sizes(books: Books) -> Array:
+    """The sizes of the reactions, N, (joint, time)."""
+    return np.asarray(np.sqrt(np.sum(books.arrays["reaction_force"] ** 2, axis=1)))
+
+
+def _joined(time: Array, sizes: Array, own: Found, more: Array) -> tuple[Array, Array]:
+    """Times and sizes of reactions in their order, with those of more times."""
+    more = np.setdiff1d(more[(more >= time[0]) & (more <= time[-1])], time)
+    every = np.append(time, more)
+    order = np.argsort(every)
+    return every[order], np.concatenate([sizes, _sizes(own.between(more))], axis=1)[:, order] if len(more) else sizes
+
+
+def _at(time: float) -> str:
+    return f"at {time:.4g} s"

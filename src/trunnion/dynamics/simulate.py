@@ -19,8 +19,8 @@ from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
-from trunnion.dynamics.rates import Seeing, Walks
-from trunnion.dynamics.result import Found, result_of
+from trunnion.dynamics.rates import Layout, Seeing, Walks
+from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import initial_row, load_times, places
 from trunnion.dynamics.state import FreeMotion
@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 MOST_STEPS = 1_000_000
 ACCOUNT, MISSED = 1e-8, 10.0  # what the energy account may miss, of the energy turned over; times the tolerance
 HELPS = 0.3  # of what the account missed: a finer motion that misses more is the last
+BESIDE, MASSLESS = 0.1, 1e-15  # rad, or of the size: how far from the start more inertia may be; a share that is none
 FINER = 2  # motions with a tenth of the tolerance of the last, at most, that are tried where it misses more
 
 
@@ -103,7 +104,7 @@ def simulated(
     def found(tolerance: float) -> Found:
         motion.begin(None)
         solution = _run(integration_of(motion, known, duration, tolerance, progress, rates), row.copy())
-        return Found.of(motion, solution, Filling(motion, solution, time).books())
+        return Found.of(motion, solution, time, lambda when: Filling(motion, solution, when).books())
 
     return result_of(motion, _balanced(found, tolerance))
 
@@ -151,7 +152,11 @@ def _with_play(
     def found(tolerance: float) -> Found:
         integration = integrating(duration, tolerance, progress=progress, times=times)
         solution = _run(integration, row.copy())
-        return Found.of(motion, solution, Filling(motion, solution, time, bare).books(), integration.finished())
+
+        def between(when: Array) -> Books:
+            return Filling(motion, solution, when, bare).books()
+
+        return Found.of(motion, solution, time, between, integration.finished())
 
     return result_of(motion, _balanced(found, max(fine, FINEST)), run)
 
@@ -174,10 +179,19 @@ def _run(integration: Integration, row: Array) -> Solution:
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:
-    """MechanismError for a start outside the range of the one free driver."""
+    """MechanismError for a start outside the range of the one free driver, or where nothing moves that has a mass."""
     if not limits[0] <= row[0] <= limits[1]:
         what = f"begins at {row[0]:g} (SI), outside its range from {limits[0]:g} to {limits[1]:g}"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin within the range"))
+    if len(motion.names) != 1:
+        return
+    rows = np.repeat(row[:, None], 2, axis=1)
+    rows[0, 1] += BESIDE * (1.0 if motion.system.turns(motion.names[0]) else motion.system.size(motion.values))
+    there, beside = np.abs(motion.inertia(Layout.of(motion).moment(np.zeros(2), rows))[0, 0])
+    if there < MASSLESS * beside:
+        what = "begins where nothing moves that has a mass, as at a dead centre, so that it has no acceleration there"
+        remedy = "state the inertia of the link or the rotor that it turns, or begin elsewhere"
+        raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", remedy))
 
 
 def _check_step(step: float | None, duration: float, mechanism: Mechanism) -> None:

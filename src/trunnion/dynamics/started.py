@@ -12,7 +12,7 @@ from trunnion.results.figure import Figure
 __all__ = ["steady_figures"]
 
 
-def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figure]:
+def steady_figures(motion: FreeMotion, solution: Solution, i: int, course: Courses) -> list[Figure]:
     """Mean speed, starting time and coefficient of fluctuation of a free coordinate, see `course.FIGURES`; or its
     run-down.
 
@@ -25,7 +25,7 @@ def steady_figures(motion: FreeMotion, solution: Solution, i: int) -> list[Figur
         return _run_down(motion, solution, i)
     if not motion.system.turns(name):
         return []
-    figures = {key: float(value[0]) for key, value in Courses.of_solution(motion, solution, i).figures().items()}
+    figures = {key: float(value[0]) for key, value in course.figures().items()}
     steady, started = figures["steady_speed"], figures["starting_time"]
     if not np.isfinite(steady):
         return []

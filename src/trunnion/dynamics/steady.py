@@ -13,7 +13,7 @@ from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.repeated import Repeated, motion_law
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.steady_cycle import INDIFFERENT, SteadyCycle, refuse_unsteady, steady_cycle
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
 from trunnion.results.figure import Figure
@@ -37,6 +37,10 @@ def steady(
     """
     refuse_unsteady(mechanism)
     motion = FreeMotion.of(prepare(mechanism))
+    if motion.resisted:
+        what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
+        remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
+        raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])
     found = steady_cycle(motion, duration, tolerance, progress)
     each = Repeated.of(motion, found.solution)
     moving = mechanism.with_motions({name: motion_law(one) for name, one in zip(motion.names, each, strict=True)})

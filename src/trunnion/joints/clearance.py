@@ -161,7 +161,8 @@ def describing(first: Vector, second: Vector) -> tuple[Number, Number]:
     β is the angle from c₂ to c₁; from c₂ × (c₁ − c₂), so that β near 0 keeps the digits of the offsets.
     """
     (x1, y1), (x2, y2) = first, second
-    beta = np.arctan2(x2 * (y1 - y2) - y2 * (x1 - x2) + 0.0, x1 * x2 + y1 * y2)  # −0 would make −π of π
+    sine = x2 * (y1 - y2) - y2 * (x1 - x2)
+    beta = np.arctan2(np.where(sine == 0, 0.0, sine), x1 * x2 + y1 * y2)  # −0 would make −π of π
     xi = np.arctan2(y2, x2) + 0.5 * beta
     return beta, np.where(xi > np.pi, xi - 2 * np.pi, np.where(xi <= -np.pi, xi + 2 * np.pi, xi))
 

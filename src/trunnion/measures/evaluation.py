@@ -84,7 +84,7 @@ def courses_of(
         return kernel.courses(run.values, time)
     seen = lanes(time, run.cycle)
     with np.errstate(all="ignore"):
-        seated = settle(run, seen, kernel.method, run.ideal(seen.times, kernel.friction))
+        seated = settle(run, seen, kernel.method)
         status = status_of(seated.back, time.shape)
         np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
         found = {

@@ -11,7 +11,9 @@ from trunnion.model.quantity import Quantity
 __all__ = ["assign"]
 
 
-def assign(data: dict[str, Any], location: Location, value: float | str | Quantity, coordinates: int) -> None:
+def assign(
+    data: dict[str, Any], location: Location, value: float | str | Quantity | list[str], coordinates: int
+) -> None:
     """Put a value at its place in plain data, making the groups on the way and writing short forms out."""
     holder: Any = data
     for key, following in pairwise(location):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import types
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -33,6 +34,13 @@ _MEANINGS: Mapping[str, tuple[str, str]] = {
     "too_long": ("has more than the {max_length} entries it can have", "remove what is too much"),
 }
 
+# of a motor: how its keys begin on a data sheet, and what is stated instead
+_OF_DATA_SHEETS = ("power", "rated", "nominal", "slip", "breakdown_ratio", "voltage", "poles")
+DATA_SHEET = (
+    "kind: induction takes breakdown_effort = k P/ω and breakdown_slip = s (k + √(k² − 1)), with the rated power P, "
+    "speed ω and slip s and the breakdown ratio k of the data sheet; see docs/how-to/simulate.md"
+)
+
 
 def schema_findings(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> list[Finding]:
     """One finding for each thing that pydantic found, with its path."""
@@ -59,6 +67,8 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = context["what"], context["remedy"]
     elif kind == "extra_forbidden":
         what, remedy = f"the key '{key[:80]}' is unknown", nearest(key, _fields(model, location[:-1]))
+        if location[-2:-1] == ("motor",) and key.startswith(_OF_DATA_SHEETS):
+            remedy = DATA_SHEET
     elif kind == "string_pattern_mismatch":  # the only texts with a pattern
         what = f"'{error['input'][:40]}' is not the name of an assembly mode"
         remedy = "write way-1, way-2, … as `check` lists them"
@@ -140,14 +150,21 @@ def _classes(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def repair(error: ValidationError, data: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
-    """The data without what could not be read, to check the rest; and the names of the entries lost with it."""
+def repair(
+    error: ValidationError, data: Mapping[str, Any], told: Sequence[Finding]
+) -> tuple[dict[str, Any], frozenset[str]]:
+    """The data without what could not be read, to check the rest; and the names of the entries lost with it.
+
+    told: `schema_findings`; an unknown key with one that was meant counts as that one.
+    """
     mended = {key: _mutable(value) for key, value in data.items()}
     lost: set[str] = set()
-    for one in reversed(list(_errors(error))):  # from the end, so that places in lists stay right
+    # from the end, so that places in lists stay right
+    for one, finding in reversed(list(zip(_errors(error), told, strict=True))):
         location = _plain(one["loc"])
         if one["type"] == "extra_forbidden":
-            _at(mended, location, lambda holder, key: holder.pop(key))
+            meant = re.fullmatch(r"did you mean '([^']*)'.*", finding.remedy)
+            _at(mended, location, partial(_renamed, name=meant and meant[1]))
         elif one["type"] == "quantity":
             _at(mended, location, _unreadable)
         else:
@@ -162,6 +179,12 @@ def _mutable(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _mutable(item) for key, item in value.items()}
     return [_mutable(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def _renamed(holder: Any, key: int | str, name: str | None) -> None:
+    value = holder.pop(key)
+    if name and name not in holder:
+        holder[name] = value
 
 
 def _unreadable(holder: Any, key: int | str) -> None:

@@ -85,7 +85,7 @@ class Mechanism(Numbers):
         except ValidationError as error:
             findings = schema_findings(error, Mechanism, data)
             try:  # what can still be checked without the unreadable entries is, so that all is said in one go
-                mended, lost = repair(error, data)
+                mended, lost = repair(error, data, findings)
                 super().__init__(**mended)
             except ValidationError:
                 raise MechanismError(findings) from None
@@ -217,7 +217,8 @@ class Mechanism(Numbers):
 
         So are the choices `over_constraint`, `fits`, `joint_defaults.friction.model`, `joint_defaults.seat` and the
         last two of a joint. Sizes, seat and misalignment of a joint, the error of a number and its tolerance, such as
-        `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet. `measures.NAME.limit` is one text.
+        `tolerances.AB` or one key of it, `tolerances.AB.cp`, need not be stated yet, nor `at` and `over` of a measure.
+        `measures.NAME.limit` is one text, and so is `measures.NAME.over`, such as "10 deg, 50 deg".
         """
         data = self.data()
         self._replace(values, data)
@@ -226,7 +227,10 @@ class Mechanism(Numbers):
     def _replace(self, values: Mapping[str, float | str], data: dict[str, Any]) -> None:
         """Put values into plain data of this mechanism, or of one whose numbers have the same names."""
         for name, value in values.items():
-            assign(data, self._location(name), value, self.coordinates)
+            location = self._location(name)
+            window = isinstance(value, str) and location[0] == "measures" and location[-1] == "over"
+            put: Any = [end.strip() for end in str(value).strip("[] ").split(",")] if window else value
+            assign(data, location, put, self.coordinates)
             keep_limits(self, name, value, data)
 
     def path_of(self, name: str) -> str:
@@ -265,13 +269,13 @@ class Mechanism(Numbers):
         return None
 
     def _limits(self, name: str) -> Location | None:
-        """Where the limits of a measure or of a tolerance, or another key of a tolerance, stand; None if not meant."""
+        """Where limits or place of a measure, limits or another key of a tolerance stand; None if not meant."""
         section, _, rest = name.partition(".")
-        if section == "measures" and rest.removesuffix(".limit") in self.measures and rest.endswith(".limit"):
-            return (section, rest.removesuffix(".limit"), "limit")
+        of, _, key = rest.rpartition(".")
+        if section == "measures" and of in self.measures and key in ("limit", "at", "over"):
+            return (section, of, key)
         if section != "tolerances":
             return None
-        of, _, key = rest.rpartition(".")
         if key not in Variation.model_fields or not of:
             of, key = rest, "limits"
         try:

@@ -13,7 +13,17 @@ SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
 _PLAIN = re.compile(r"[^\W\d](?:[\w. +/-]*\w)?")  # what YAML takes for a text as it stands, in braces too
 # words in common use for those of a model file: too unlike them to be found by their letters
-MEANT = {"rectangular": "uniform", "gauss": "normal", "gaussian": "normal", "diameter": "radius"}
+MEANT = {
+    "rectangular": "uniform",
+    "gauss": "normal",
+    "gaussian": "normal",
+    "diameter": "radius",
+    "power": "breakdown_effort",
+}
+REMARKS = {
+    "radius": ", half the diameter",
+    "breakdown_effort": ", some 2.5 times the rated power over the rated speed in rad/s",
+}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
 
 
@@ -28,7 +38,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     names = list(dict.fromkeys(known))
     folded = {one.casefold(): one for one in reversed(names)}
     if (meant := MEANT.get(name.casefold())) in names:
-        return f"did you mean '{meant}'{', half the diameter' * (meant == 'radius')}?"
+        return f"did you mean '{meant}'{REMARKS.get(meant, '')}?"
     close = [folded[one] for one in get_close_matches(name.casefold()[:80], folded, n=3, cutoff=0.6)]
     if close:
         return "did you mean " + " or ".join(f"'{one}'" for one in close) + "?"

@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterable
 
 __all__ = [
-    "between", "drawn_in", "joined", "number", "parts", "prefixed", "quantity", "readable", "scale_of", "scaled",
-    "signed",
+    "between", "decimals_of", "drawn_in", "joined", "number", "parts", "prefixed", "quantity", "readable", "scale_of",
+    "scaled", "signed",
 ]  # fmt: skip
 
 PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
@@ -103,6 +103,11 @@ def scale_of(nominal: float, parts_of: Iterable[float], unit: str) -> tuple[floa
     known = [abs(one) for one in parts_of if math.isfinite(one) and one != 0]
     spread = max(known, default=abs(nominal))
     return scaled(max(spread, min(abs(nominal), 1e3 * spread)), unit)
+
+
+def decimals_of(small: float) -> int:
+    """Of a share in per cent, so that a part of this size shows two digits."""
+    return min(max(1 - math.floor(math.log10(100 * small)), 1), 8) if small > 0 else 1
 
 
 def signed(value: float, factor: float, shown: str, sign: str = "+", digits: int = 4) -> str:

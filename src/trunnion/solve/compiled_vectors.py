@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.solve.compiled import Array, CompiledKernel, Lanes
+from trunnion.solve.compiled import Array, CompiledKernel, Lanes, lanes_of
 from trunnion.solve.system import Values, law_of, rubbing
 
 if TYPE_CHECKING:
@@ -71,7 +71,8 @@ class VectorKernel(CompiledKernel):
             return
         # rows too short for a vector: all lanes as one row, which ends with itself again where it is too short too
         row = np.resize(np.arange(samples * positions), max(samples * positions, vector_width()))
-        lanes = {path: _of_lanes(value, row // positions) for path, value in values.items()}
+        lanes = {path: lanes_of(value, row // positions, row % positions) for path, value in values.items()}
+        lanes = {path: value[None, :] if np.ndim(value) else value for path, value in lanes.items()}
         times = np.ascontiguousarray(np.broadcast_to(time, (samples, positions)).ravel()[row])
         flat = _empty(list(found.curves), (1, len(row)))
         self._filled(lanes, times, flat)
@@ -160,14 +161,6 @@ def _empty(names: list[str], shape: tuple[int, ...]) -> Lanes:
 
 def arrays_of(found: Lanes) -> list[NDArray[Any]]:
     return [*found.curves.values(), found.status, found.doubtful]
-
-
-def _of_lanes(value: Any, samples: NDArray[np.intp]) -> Any:
-    """A number in the sample of each lane, as a row of lanes."""
-    if not np.ndim(value):
-        return value
-    flat = np.ravel(np.asarray(value, float))
-    return flat[samples][None, :] if len(flat) > 1 else float(flat[0])
 
 
 def literals(values: Values) -> dict[str, Any]:

@@ -11,7 +11,7 @@ small as well.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,20 +21,21 @@ from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, zipped
 from trunnion.solve import forward as kinematics
-from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Travel
-from trunnion.solve.system import Cycle
+from trunnion.solve.system import Cycle, Values
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Lanes", "around", "lanes", "part_of", "travel"]
+__all__ = ["Lanes", "Moved", "around", "lanes", "moved", "part_of", "travel"]
 
 BEND = 0.005  # rad: change of the angle that a seat turns from one lane to the next; more is no even turning
+ALIKE = 1e-6  # by which the ways of the seats on both sides of a lane may differ by rounding
 QUICK = 0.1  # rad from one lane to the next, likewise
 FINE = 1440  # positions of a cycle whose neighbours are near enough for differences, and no nearer than that
 
 Lane = NDArray[np.intp]
+Offsets = Mapping[str, NDArray[np.float64]]
 
 
 class Lanes(NamedTuple):
@@ -80,42 +81,52 @@ def _within(times: NDArray[np.float64], cycle: Cycle) -> NDArray[np.float64]:
 
 
 def travel(
-    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]], start: Backward, held: Backward | None = None
+    run: Run, seen: Lanes, offsets: Offsets, ideal: Mapping[str, Any], look: Callable[..., Mapping[str, Moved]]
 ) -> tuple[dict[str, Travel], NDArray[np.bool_]]:
     """How every link also moves at the positions of the lanes, and at which of them accelerations tell it.
 
-    offsets: of the pins at all lanes; start: the ideal mechanism there; held: a walk there with pins held near these
-    offsets, if there was one. Accelerations are told only between lanes where all seats travel evenly; else the links
-    have those of pins that are held.
+    offsets: of the pins at all lanes; ideal: motion of every link of the ideal mechanism there; look: `moved`, or what
+    stands for it, `(time, offsets, rates)`. Accelerations are told only between lanes where all seats travel evenly;
+    else the links have those of pins that are held.
     """
     rates, even = _rates(run, seen, offsets)
     if not rates:
         return {}, np.ones(len(seen.own), bool)
-    inside = {path: numbers[seen.inner] for path, numbers in offsets.items()}
-    values = {**run.values, **inside}
     time = seen.times[seen.inner]
     with np.errstate(all="ignore"):
-        lain = {**run.values, **offsets}
-        walk = held.walk if held else kinematics.forward(run.system, lain, run.chosen.assembly, seen.times)
-        seeded = {**values, **{path: Dual(inside[path], rate) for path, rate in rates.items()}}
-        added = _travelling(run, seeded, time)
+        moving = look(time, {path: numbers[seen.inner] for path, numbers in offsets.items()}, rates)
     own = seen.own - seen.step
     one, two = _pairs(even, own, seen.step)
     span = time[two] - time[one]
     there = span > 0
     found: dict[str, Travel] = {}
-    for link, extra in added.items():
-        meant, motion = start.walk.motions[link], walk.motions[link]
-        play = zipped(
-            lambda a, b, c: sliced(a, seen.inner) + b - sliced(c, seen.inner), motion.twist, extra, meant.twist
-        )
+    for link, (twist, acceleration, extra) in moving.items():
+        meant = ideal[link]
+        play = zipped(lambda a, b, c: a + b - sliced(c, seen.inner), twist, extra, meant.twist)
         change = each(play, functools.partial(_difference, one=one, two=two, span=np.where(there, span, 1.0)))
         second = zipped(
-            lambda a, b, c: np.where(there, sliced(a, seen.own) + b, sliced(c, seen.own)),
-            meant.acceleration, change, motion.acceleration,
+            lambda a, b, c: np.where(there, sliced(a, seen.own) + b, sliced(c, own)),
+            meant.acceleration, change, acceleration,
         )  # fmt: skip
         found[link] = Travel(each(extra, lambda number: sliced(number, own)), second)
     return found, there
+
+
+class Moved(NamedTuple):
+    """How a link moves with its pins held, and the twist that the travel of the seats adds."""
+
+    twist: Any
+    acceleration: Any
+    extra: Any
+
+
+def moved(run: Run, values: Values, rates: Mapping[str, Number], time: Number) -> dict[str, Moved]:
+    """How every link moves with the pins at the offsets among the values, and what the rates of these add."""
+    walk = kinematics.forward(run.system, values, run.chosen.assembly, time)
+    added = _travelling(run, {**values, **{path: Dual(values[path], rate) for path, rate in rates.items()}}, time)
+    return {
+        link: Moved(walk.motions[link].twist, walk.motions[link].acceleration, extra) for link, extra in added.items()
+    }
 
 
 def sliced(number: Number, lanes: Any) -> Number:
@@ -127,7 +138,7 @@ def _difference(number: Number, one: Lane, two: Lane, span: NDArray[np.float64])
     return (sliced(number, two) - sliced(number, one)) / span
 
 
-def _travelling(run: Run, values: Mapping[str, Number], time: NDArray[np.float64]) -> dict[str, Any]:
+def _travelling(run: Run, values: Values, time: Number) -> dict[str, Any]:
     """Twist of every link by the ε parts of the values; poses alone are worked out."""
     system = run.system
     walk = kinematics.start(system, values)
@@ -144,31 +155,32 @@ def _travelling(run: Run, values: Mapping[str, Number], time: NDArray[np.float64
     return found
 
 
-def _rates(
-    run: Run, seen: Lanes, offsets: Mapping[str, NDArray[np.float64]]
-) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
+def _rates(run: Run, seen: Lanes, offsets: Offsets) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
     """How fast the seats travel at the inner lanes, m/s, and at which of them all seats do so evenly.
 
     A seat that jumps, since its load turns round or a friction does, or that turns too quickly for differences,
     bends by more than BEND from a lane to the next and the one after; so does one that is known on one side alone.
     There the rate is taken on the side on which all turn least, and is 0 where that is more than QUICK.
     """
-    inner = np.arange(len(seen.times))[seen.inner]
-    before, after = inner - seen.step, inner + seen.step
+    count, step = len(seen.times), seen.step
+    sides = slice(0, count - 2 * step), seen.inner, slice(2 * step, count)
+    before, inner, after = (np.arange(count)[side] for side in sides)
     ends = [[f"seats.{seat.joint}.{key}" for key in end] for seat in run.seats for end in seat.play.model.ends]
     bend = back = ahead = np.zeros(len(inner))
     for paths in ends:
-        was, is_, will = ([offsets[path][side] for path in paths] for side in (before, inner, after))
+        was, is_, will = ([offsets[path][side] for path in paths] for side in sides)
         # a pin whose load is not known lies in the middle: from there to its wall is a jump, not a way
-        size = np.max([np.sqrt(np.sum(np.square(side), axis=0)) for side in (was, is_, will)], axis=0)
+        far = np.sqrt(sum(offsets[path] ** 2 for path in paths))
+        size = np.maximum(np.maximum(far[sides[0]], far[sides[1]]), far[sides[2]])
         scale = 1 / np.where(size > 0, size, np.inf)
         back = np.maximum(back, scale * _apart(was, is_))
         ahead = np.maximum(ahead, scale * _apart(is_, will))
         middle = [0.5 * (a + b) for a, b in zip(was, will, strict=True)]
         bend = np.maximum(bend, 2 * scale * _apart(middle, is_))
     even = bend <= BEND
-    one = np.where(even | (back <= ahead), before, inner)
-    two = np.where(even | (back > ahead), after, inner)
+    behind = back <= (1 + ALIKE) * ahead
+    one = np.where(even | behind, before, inner)
+    two = np.where(even | ~behind, after, inner)
     span = seen.times[two] - seen.times[one]
     still = (span <= 0) | (~even & (np.minimum(back, ahead) > QUICK))
     found = {
@@ -190,6 +202,10 @@ def _pairs(even: NDArray[np.bool_], own: Lane, step: int) -> tuple[Lane, Lane]:
     return before, after
 
 
-def part_of(found: Mapping[str, Travel], lanes: Sequence[int] | Lane) -> dict[str, Travel]:
-    """The velocities at some of the positions, as if the links were not accelerated by it."""
-    return {link: Travel(each(one.twist, lambda number: sliced(number, lanes))) for link, one in found.items()}
+def part_of(found: Mapping[str, Travel], lanes: Lane, whole: bool = False) -> dict[str, Travel]:
+    """The velocities at some of the positions, as if the links were not accelerated by it; whole: as they are."""
+
+    def part(numbers: Any) -> Any:
+        return each(numbers, lambda number: sliced(number, lanes))
+
+    return {link: Travel(part(one.twist), part(one.acceleration) if whole else None) for link, one in found.items()}

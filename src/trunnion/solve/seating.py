@@ -12,7 +12,7 @@ import functools
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +21,22 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
 from trunnion.joints.clearance import pressed, turned_by_friction
+from trunnion.solve import eccentricity_rate as rate
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import Lanes, part_of, travel
+from trunnion.solve.eccentricity_rate import Lanes, Moved, part_of, travel
 from trunnion.solve.forward import Travel
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.system import System, rubbing
+from trunnion.solve.system import rubbing
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
 from trunnion.solve.seats import GivenSeat
 
-__all__ = ["ROUNDS", "TOLERANCE", "Seated", "loads_of", "settle"]
+__all__ = [
+    "ROUNDS", "TOLERANCE", "ByNumpy", "Looks", "Pressed", "Seated", "Seats", "by_numpy", "centred", "loads_of",
+    "seats_of", "settle", "wanted",
+]  # fmt: skip
 
 ROUNDS = 10  # most of the iteration
 MARGIN = 50.0  # by which a second round may gain less than the first
@@ -42,25 +46,58 @@ TOLERANCE = 1e-6  # change of a seat that one more round would make, of its clea
 NO_LOAD = 1e-9  # of the largest reaction of a position: a load below it is rounding and presses nothing anywhere
 
 Vector = tuple[Number, ...]
+Array = NDArray[np.float64]
+
+
+class Pressed(NamedTuple):
+    """What a walk says of the seats: those its reactions press the pins into, m, by the names of `shifts`, and the
+    speeds of the joints with friction, (joint, lane).
+    """
+
+    offsets: dict[str, Array]
+    speeds: Array
+
+
+class Looks(Protocol):
+    """The walks that seats are settled by, by NumPy or compiled.
+
+    first, meant: the ideal mechanism at all lanes, what it presses and the motion of every link.
+    """
+
+    first: Pressed
+    meant: Mapping[str, Any]
+
+    def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
+        """With the pins at offsets, as they travel there."""
+
+    def moved(self, time: Array, offsets: Mapping[str, Array], rates: Mapping[str, Array]) -> Mapping[str, Moved]:
+        """How every link moves with the pins at offsets, and what their rates add."""
 
 
 @dataclass(frozen=True)
-class Seated:
-    """What the positions of one walk came to with their pins in their seats.
+class Seats:
+    """Where the pins of some positions lie.
 
-    offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; loads: of the pin on each end of its hole, N, by joint;
+    offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; moving: how the links also move as the seats travel;
     rounds: of the iteration; change: that one more round would make, of the clearances; sticks: positions
     at which only the travel of the seats decides the sense of a friction, the joint itself being all but at rest;
     told: at which the accelerations contain the travel of the seats.
     """
 
-    back: Backward
-    offsets: dict[str, NDArray[np.float64]]
-    loads: dict[str, list[Vector]]
+    offsets: dict[str, Array]
+    moving: dict[str, Travel]
     rounds: NDArray[np.intp]
-    change: NDArray[np.float64]
+    change: Array
     sticks: NDArray[np.bool_]
     told: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Seated(Seats):
+    """The same with the walk there, and the loads of the pin on each end of its hole, N, by joint."""
+
+    back: Backward
+    loads: dict[str, list[Vector]]
 
 
 def loads_of(back: Backward, seat: GivenSeat) -> list[Vector]:
@@ -94,60 +131,80 @@ def _share(back: Backward, joint: str) -> Number | None:
     return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 
-def settle(run: Run, seen: Lanes, method: FrictionMethod, start: Backward) -> Seated:
-    """The positions of some lanes with every pin in its seat.
+class ByNumpy:
+    """`Looks` of a run by NumPy."""
 
-    start: motion and reactions of the ideal mechanism at the times of all lanes; the first guess. The seats are
-    those of the loads with the pins held; the travel of the seats comes with the last walk.
+    def __init__(self, run: Run, method: FrictionMethod, first: Pressed, meant: Mapping[str, Any]) -> None:
+        self._run, self._method = run, method
+        self.first, self.meant = first, meant
+
+    def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
+        return _told(self._run, self._run.at(time, offsets, self._method, travel=travel), len(time))
+
+    def moved(self, time: Array, offsets: Mapping[str, Array], rates: Mapping[str, Array]) -> Mapping[str, Moved]:
+        return rate.moved(self._run, {**self._run.values, **offsets}, rates, time)
+
+
+def settle(run: Run, seen: Lanes, method: FrictionMethod, looks: Looks | None = None) -> Seated:
+    """The positions of some lanes with every pin in its seat. looks: by which they settle, by NumPy if not given."""
+    found = seats_of(run, seen, looks or by_numpy(run, seen, method))
+    back = run.at(seen.times[seen.own], found.offsets, method, travel=found.moving)
+    loads = {seat.joint: loads_of(back, seat) for seat in run.seats}
+    return Seated(**vars(found), back=back, loads=loads)
+
+
+def by_numpy(run: Run, seen: Lanes, method: FrictionMethod, start: Backward | None = None) -> ByNumpy:
+    """`Looks` at some lanes by NumPy. start: motion and reactions of the ideal mechanism at all of them, if known."""
+    quick = replace(method, margin_up_to=0.0)
+    start = start or run.ideal(seen.times, quick)
+    return ByNumpy(run, quick, _told(run, start, len(seen.times)), start.walk.motions)
+
+
+def seats_of(run: Run, seen: Lanes, looks: Looks) -> Seats:
+    """The seats of the positions of some lanes.
+
+    They are those of the loads with the pins held; the travel of the seats comes with the last walk.
     """
-    quick, time = replace(method, margin_up_to=0.0), seen.times[seen.own]
-    offsets = _next(run, start, len(seen.times))
-    rounds, change = np.zeros(len(seen.times), np.intp), np.zeros(len(seen.times))
+    count, time, offsets = len(seen.times), seen.times[seen.own], looks.first.offsets
+    rounds, change = np.zeros(count, np.intp), np.zeros(count)
     loaded = any(seat.given is None for seat in run.seats)
     sticks = np.zeros(len(time), bool)
-    senses = np.zeros((len(rubbing(run.system)), len(seen.times)))
-    held = None
+    senses = np.zeros((len(rubbing(run.system)), count))
     if loaded:
-        held = _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(len(seen.times)), senses)
-    moving, told = travel(run, seen, offsets, start, held)
+        _iterate(run, seen.times, looks, offsets, rounds, change, np.arange(count), senses)
+    moving, told = travel(run, seen, offsets, looks.meant, looks.moved)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
-    if loaded:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        turning = _slow(run.system, start)[seen.own] & (rounds < ROUNDS)
-        left = np.flatnonzero(turning) if moving else np.zeros(0, np.intp)
-        turned = run.at(time[left], {path: numbers[left] for path, numbers in mine.items()}, quick,
-                        travel=part_of(moving, left))  # fmt: skip
-        left = left[np.any(_senses(turned) != senses[:, seen.own[left]], axis=0)]
+    if loaded and moving:  # where a joint turns round, the travel of the seats decides the sense of its friction
+        left = np.flatnonzero(_slow(looks.first.speeds)[seen.own] & (rounds < ROUNDS))
+        part = {path: numbers[left] for path, numbers in mine.items()}
+        turned = np.sign(looks.pressed(time[left], part, part_of(moving, left)).speeds)
+        left = left[np.any(turned != senses[:, seen.own[left]], axis=0)]
         sticks[left] = True
-        _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
-    back = run.at(time, mine, method, travel=moving)
-    return Seated(back, mine, _loads(run, back), rounds, change, sticks, told)
+        _iterate(run, time, looks, mine, rounds, change, left, senses[:, seen.own], moving)
+    return Seats(mine, moving, rounds, change, sticks, told)
 
 
-def _slow(system: System, start: Backward) -> NDArray[np.bool_]:
+def _slow(speeds: Array) -> NDArray[np.bool_]:
     """Where a joint with friction is about to turn round."""
-    found: Number = False
-    for joint in rubbing(system):
-        speed = np.abs(primal(start.slips[joint].speed))
-        found = found | (speed <= SLOW * np.nanmax(speed, initial=0.0))
-    return np.broadcast_to(np.asarray(found, bool), np.shape(start.walk.time))
+    sizes = np.abs(speeds)
+    return np.asarray(np.any(sizes <= SLOW * np.nanmax(sizes, axis=1, keepdims=True, initial=0.0), axis=0))
 
 
 def _iterate(
     run: Run,
-    time: NDArray[np.float64],
-    method: FrictionMethod,
-    offsets: dict[str, NDArray[np.float64]],
+    time: Array,
+    looks: Looks,
+    offsets: dict[str, Array],
     rounds: NDArray[np.intp],
-    change: NDArray[np.float64],
+    change: Array,
     left: NDArray[np.intp],
-    senses: NDArray[np.float64],
+    senses: Array,
     moving: Mapping[str, Travel] | None = None,
-) -> Backward | None:
+) -> None:
     """Seats and reactions in turn, in place, until the positions `left` have settled or had their rounds.
 
-    senses: of the slips of the joints with friction in the last round, kept too. Returns the last round of all
-    positions.
+    senses: of the slips of the joints with friction in the last round, kept too.
 
     A round gains about as much as the one before it, so `change`, what one more round would change, is known from
     two; of the first alone, that took the pin into its seat, it is its square with a margin. Where rounds gain
@@ -155,37 +212,27 @@ def _iterate(
     ACM 12 (1965) 547-560, doi:10.1145/321296.321305).
     """
     paths = list(offsets)
-    before = after = np.zeros((len(paths), 0))
-    last = np.full(len(left), 1 / MARGIN)
-    whole: Backward | None = None
+    last, earlier, kept = np.full(len(left), 1 / MARGIN), None, left
     while len(left):
         part = {path: numbers[left] for path, numbers in offsets.items()}
-        found = run.at(time[left], part, method, travel=part_of(moving, left) if moving else None)
-        whole = found if len(left) == len(time) else whole
-        wanted = _next(run, found, len(left))
-        senses[:, left] = _senses(found)
+        goal, speeds = looks.pressed(time[left], part, part_of(moving, left) if moving else None)
+        senses[:, left] = np.sign(speeds)
         rounds[left] += 1
-        now = _change(run.seats, part, wanted)
+        now = _change(run.seats, part, goal)
         change[left] = now * np.minimum(now / np.where(last > 0, last, 1.0), 1.0)
-        here, there = (np.array([one[path] for path in paths]) for one in (part, wanted))
-        following = there
-        if after.size:
+        for path in paths:
+            offsets[path][left] = goal[path]
+        if earlier:
+            slow = np.flatnonzero(now > SLUGGISH * last)
+            steps = ((earlier, kept[slow]), ((part, goal), slow))
+            before, after, here, there = (
+                np.array([one[path][places] for path in paths]) for both, places in steps for one in both
+            )
             ahead = _at_the_wall(run.seats, paths, _extrapolated(before, after, here, there), there)
-            following = np.where(now > SLUGGISH * last, ahead, there)
-        for path, numbers in zip(paths, following, strict=True):
-            offsets[path][left] = numbers
-        open_ = (change[left] > TOLERANCE) & (rounds[left] < ROUNDS)
-        before, after, last, left = here[:, open_], there[:, open_], now[open_], left[open_]
-    return whole
-
-
-def _senses(found: Backward) -> NDArray[np.float64]:
-    """Sense of the slip of every joint with friction at each position."""
-    shape = np.shape(found.walk.time)
-    names = rubbing(found.walk.system)
-    return np.array([np.broadcast_to(np.sign(primal(found.slips[name].speed)), shape) for name in names]).reshape(
-        len(names), *shape
-    )
+            for path, numbers in zip(paths, ahead, strict=True):
+                offsets[path][left[slow]] = numbers
+        earlier, kept = (part, goal), np.flatnonzero((change[left] > TOLERANCE) & (rounds[left] < ROUNDS))
+        last, left = now[kept], left[kept]
 
 
 def _extrapolated(
@@ -212,22 +259,31 @@ def _at_the_wall(
     return ahead
 
 
-def _loads(run: Run, back: Backward) -> dict[str, list[Vector]]:
-    return {seat.joint: loads_of(back, seat) for seat in run.seats}
+def _told(run: Run, back: Backward, count: int) -> Pressed:
+    """What a walk by NumPy says of the seats."""
+    offsets = {path: centred(_row(number, count)) for path, number in wanted(run.seats, back).items()}
+    speeds = [_row(back.slips[joint].speed, count) for joint in rubbing(run.system)]
+    return Pressed(offsets, np.array(speeds).reshape(len(speeds), count))
 
 
-def _next(run: Run, back: Backward, count: int) -> dict[str, NDArray[np.float64]]:
+def _row(number: Number, count: int) -> Array:
+    return np.array(np.broadcast_to(primal(number), (count,)), float)
+
+
+def centred(offsets: Array) -> Array:
+    """The same array; a pin whose load is not known (locked, not assembled) is left in the middle."""
+    offsets[~np.isfinite(offsets)] = 0.0
+    return offsets
+
+
+def wanted(found: Sequence[GivenSeat], back: Backward) -> dict[str, Number]:
     """The seats into which the reactions of a walk press the pins, and those that are given."""
     least = NO_LOAD * _largest_reaction(back)
-    found: dict[str, NDArray[np.float64]] = {}
-    for seat in run.seats:
-        offsets = seat.given if seat.given is not None else _pressed(back, seat, loads_of(back, seat), least)
-        for path, number in seat.play.model.paths(f"seats.{seat.joint}", offsets).items():
-            offset = np.array(np.broadcast_to(primal(number), (count,)), float)
-            # where the load is not known (locked, not assembled) the pin is left in the middle
-            offset[~np.isfinite(offset)] = 0.0
-            found[path] = offset
-    return found
+    offsets: dict[str, Number] = {}
+    for seat in found:
+        own = seat.given if seat.given is not None else _pressed(back, seat, loads_of(back, seat), least)
+        offsets |= seat.play.model.paths(f"seats.{seat.joint}", own)
+    return offsets
 
 
 def _largest_reaction(back: Backward) -> Number:

@@ -407,6 +407,9 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
     figures = [Figure("grashof", "four-bar type (Grashof)", found.grashof)] if found.grashof else []
+    if driver and not found.transmission_angle and mechanism.fixed_link not in run.system.joints[driver][1]:
+        why = f"{driver} drives two moving links; both are of a driver on {mechanism.fixed_link}"
+        figures.append(Figure("transmission_angle", "four-bar type and transmission angle", None, "°", note=why))
     for name, angle in found.transmission_angle.items():
         subject = f"transmission angle of {name}"
         figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "minimum"))
@@ -416,8 +419,9 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
             text = ", ".join(f"{place * scale:.6g}" for place in places)
             figures.append(Figure(f"{name}.dead_centres", f"dead centres of {name}", text, f"{unit} of {driver}"))
     text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in found.limits) or "no position"
+    within = "" if run.cycle.periodic else "within the stated motion"
     figures += [
-        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else ""),
+        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else "", within),
         Figure("shaking_force", "shaking force", found.shaking_force, "N", "maximum"),
         Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "maximum"),
         Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),

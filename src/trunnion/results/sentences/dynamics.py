@@ -17,6 +17,12 @@ DYNAMICS: dict[str, Sentence] = {
         "{driver} comes to rest {times:#time}, for the last time at {time:~s}: {given:~{unit}} act on it then, "
         "and it breaks away from {needed:~{unit}} on",
     ),
+    "simulate.stalls": Sentence(
+        ERROR,
+        "{driver} stalls at {time:~s}, at {coordinate:~{place}}, with the motor on: {given:~{unit}} act on it then, "
+        "and it breaks away from {needed:~{unit}} on",
+        "use a larger flywheel, a stronger motor or a gear, or lower the load there",
+    ),
     "simulate.none_starts": Sentence(
         WARNING,
         "nothing starts: what acts needs {share:.2%} of what resists it at rest in {joint}, and no more in the other "
@@ -27,6 +33,12 @@ DYNAMICS: dict[str, Sentence] = {
         NOTE,
         "all free drivers come to rest {times:#time}, for the last time at {time:~s}: what acts then needs {share:.2%} "
         "of what resists it at rest in {joint}, and no more in the other joints",
+    ),
+    "simulate.all_stall": Sentence(
+        ERROR,
+        "all free drivers rest from {time:~s} on, with the motor of {drivers} on: what acts then needs {share:.2%} of "
+        "what resists it at rest in {joint}, and no more in the other joints",
+        "use a larger flywheel, a stronger motor or a gear, or lower the load there",
     ),
     "simulate.range": Sentence(
         WARNING,
@@ -48,7 +60,7 @@ DYNAMICS: dict[str, Sentence] = {
     "simulate.dead_centre": Sentence(
         ERROR,
         "{driver} reaches its dead centre, {coordinate:.6g} {unit}, at {time:~s}: the links cannot be assembled beyond "
-        "it, and go on while {driver} turns round; the motion ends there",
+        "it, and go on as {driver} reverses; the motion ends there",
         "drive a joint that has no dead centre there, or limit the motion by a stop or a load",
     ),
     "simulate.not_assembled": Sentence(

@@ -74,6 +74,12 @@ PLAY = {
         "the {statistic} is at {at}: the worst case of {measure} to first order, ±{worst:~{unit}}, is of that place; "
         "the figure and the files show the whole cycle besides",
     ),
+    "play.beside_jump": Sentence(
+        WARNING,
+        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
+        "what play does to the place of the jump is left out",
+        "use `trunnion tolerance` with samples and more --steps",
+    ),
     "play.no_effect": Sentence(
         NOTE,
         "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
@@ -105,6 +111,11 @@ PLAY = {
         ERROR,
         "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}; it does so "
         "{over}",
+        "reduce the play of the joints with the largest share",
+    ),
+    "limit.exceeded_there": Sentence(
+        ERROR,
+        "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}",
         "reduce the play of the joints with the largest share",
     ),
     "limit.kept": Sentence(
@@ -266,7 +277,7 @@ TOLERANCE = {
         lambda kept, done, samples: f"stopped before the end: {done:,} of {counted(samples, 'sample')}",
         lambda kept, done, samples: "continue with --resume" if kept else "use --checkpoint FILE to keep what is done",
     ),
-    "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}"),
+    "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}", quiet=True),
     "samples.machines": Sentence(
         NOTE,
         "the samples were computed on {kinds} kinds of machines, whose sines or logarithms differ in the last bit",
@@ -367,6 +378,12 @@ ALLOCATION = {
         "accepted by its estimate, not by the lower end of the interval: fresh samples have {share:.6g}, 95 % "
         "confidence interval {low:.6g} to {high:.6g}, required are {target:g}",
         "to be surer take more samples, or require a higher yield",
+    ),
+    "yield.spare": Sentence(
+        NOTE,
+        "fresh samples have {share:.6g}, 95 % confidence interval {low:.6g} to {high:.6g}, more than the required "
+        "{target:g}",
+        "more samples may lower the cost",
     ),
     "yield.unresolved": Sentence(
         WARNING,

@@ -327,7 +327,7 @@ class SeatedModel(Model):
             return lost, np.full(size, Status.NOT_ASSEMBLED, np.int8), np.zeros(size, bool)
         with np.errstate(all="ignore"):
             seen = lanes(self.phases[k] * run.cycle.duration, run.cycle)
-            seated = settle(run, seen, self.friction, run.ideal(seen.times, self.friction))
+            seated = settle(run, seen, self.friction)
             status = status_of(seated.back, (size,))
             found = {
                 name: np.array(np.broadcast_to(primal(self._course(measure, seated.back)), (size,)), float)

@@ -75,7 +75,7 @@ def _back(run: Run, time: Array) -> Backward:
     if not run.seats:
         return run.solve(time)
     seen, method = lanes(time, run.cycle), FrictionMethod()
-    return settle(run, seen, method, run.ideal(seen.times, method)).back
+    return settle(run, seen, method).back
 
 
 def cycle_efficiency(run: Run) -> float:

@@ -113,8 +113,9 @@ def _yielded(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
         yield finding_for("yield.short", "yield", share=share, target=target)
     elif share < target:
         yield finding_for("yield.uncertain", "yield", share=share, target=target, low=low, high=high)
-    elif checked and checked.low < target:
-        yield finding_for("yield.by_estimate", "yield", **checked._asdict(), target=target)
+    elif checked:
+        code = "yield.by_estimate" if checked.low < target else "yield.spare"
+        yield finding_for(code, "yield", **checked._asdict(), target=target)
 
 
 def _alone(found: Allocated) -> Iterator[Finding]:

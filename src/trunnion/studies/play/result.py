@@ -117,7 +117,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "extremes": [_extreme_of(found, measure) for measure in found.measures],
         "summary": figure_rows(_summary(found, units)),
         "findings": finding_rows(findings),
-        "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
+        "missed": [f"{one.where}: {one.what}" for one in findings if one.code.startswith("limit.exceeded")],
     }
     return dataset_of("play", variables, labels, attributes, driven(found.time, *dial))
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.cycle.positions import check_steps
-from trunnion.cycle.summary import model_notes
+from trunnion.cycle.summary import extreme_beside_jump, model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
 from trunnion.measures.evaluation import NumpyKernel
@@ -371,22 +371,35 @@ def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
     """Measures whose worst case is above their limit, and those that keep theirs."""
     dial = run.system.dial(run.values, effect.time)
     for measure, total in zip(effect.measures, relied_on(effect.total, effect.status), strict=True):
-        if measure.limit is None or not np.any(np.isfinite(total)):
-            continue
-        over, where = np.flatnonzero(total > measure.limit), f"measures.{measure.name}.limit"
-        unit = measure.unit(run.system)
-        factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-        top = int(np.nanargmax(total))
-        figures = {"worst": factor * total[top], "limit": factor * measure.limit, "unit": shown, "at": dial.at(top)}
-        if len(over):
-            yield finding_for("limit.exceeded", where, **figures, over=dial.intervals(over))
-        else:
-            yield finding_for("limit.kept", where, **figures)
+        if measure.limit is not None and np.any(np.isfinite(total)):
+            top = int(np.nanargmax(total))
+            over = np.flatnonzero(total > measure.limit)
+            where = dial.intervals(over) if len(over) else ""
+            yield _against(run, measure, measure.limit, total[top], dial.at(top), where)
+
+
+def _limit_at(run: Run, measure: Measure, worst: float, at: str) -> Iterator[Finding]:
+    """The same of a measure of one place."""
+    sides = [side for side in (measure.upper, measure.lower) if side is not None]
+    if sides and np.isfinite(worst):
+        yield _against(run, measure, min(map(abs, sides)), worst, at)
+
+
+def _against(run: Run, measure: Measure, limit: float, worst: float, at: str, over: str = "") -> Finding:
+    unit, where = measure.unit(run.system), f"measures.{measure.name}.limit"
+    factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
+    figures: dict[str, Any] = {"worst": factor * worst, "limit": factor * limit, "unit": shown, "at": at}
+    if worst <= limit:
+        return finding_for("limit.kept", where, **figures)
+    if over:
+        return finding_for("limit.exceeded", where, **figures, over=over)
+    return finding_for("limit.exceeded_there", where, **figures)
 
 
 def _places(run: Run, effect: Effect) -> Iterator[Finding]:
     """What play does at the place that a measure states, or where its extreme is: the result has the whole cycle."""
-    for measure in effect.measures:
+    for measure, course in zip(effect.measures, effect.value, strict=True):
+        yield from extreme_beside_jump(run, measure, effect.time, course, "play.beside_jump")
         if measure.name in effect.extremes:
             there = effect.extremes[measure.name]
             worst, at = float(there.total[0, 0]), run.system.dial(run.values, there.time).at(0)
@@ -394,6 +407,7 @@ def _places(run: Run, effect: Effect) -> Iterator[Finding]:
                 "play.at_an_extreme", f"measures.{measure.name}", measure=measure.name, at=at, worst=worst,
                 statistic=measure.rule, unit=measure.unit(run.system),
             )  # fmt: skip
+            yield from _limit_at(run, measure, worst, at)
         if measure.at is None:
             continue
         there = _over(run, [measure], effect.plays, plan(run, [measure], 1).times)
@@ -403,6 +417,7 @@ def _places(run: Run, effect: Effect) -> Iterator[Finding]:
             "play.at_a_place", f"measures.{measure.name}.at", measure=measure.name, at=at, worst=worst,
             unit=measure.unit(run.system),
         )  # fmt: skip
+        yield from _limit_at(run, measure, worst, at)
 
 
 def _idle(run: Run, effect: Effect) -> Iterator[Finding]:

@@ -23,7 +23,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.cycle.many import Many
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.positions import check_steps, positions
-from trunnion.cycle.summary import model_notes
+from trunnion.cycle.summary import beside_jumps, model_notes
 from trunnion.cycle.written import CONDITIONS
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
@@ -62,7 +62,7 @@ class Points:
     """The points of a grid and how their cycles are run.
 
     looked: points that were prepared by themselves; said: what they have to say, by place and text and then by point;
-    erring: whether any point has errors; run: of the first point.
+    erring: whether any point has errors; run: of the first point, jumps: beside which its efforts are largest.
     """
 
     mechanism: Mechanism
@@ -77,6 +77,7 @@ class Points:
         self.said: dict[tuple[str, str], dict[Index, Finding]] = {}
         self.looked: set[Index] = set()
         self.erring = False
+        self.jumps: list[Finding] = []
         self.run = self._prepared(tuple(0 for _ in self.swept))
         each = (self.steps + OF_MEANS) * (OF_MARGIN if self.margin else 1)
         self._many = Many(self.run, self.engine, int(np.prod(self.shape)) * each)
@@ -123,6 +124,8 @@ class Points:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
             found = positions(run, self.steps, self.method, margin=self.margin)
+        if not any(index):
+            self.jumps = list(beside_jumps(run, found.time, found.arrays))
         return self._reduced(found.arrays, found.means, found.ideal)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
@@ -225,6 +228,8 @@ class Points:
         found: list[Reduced | None] = []
         for i in range(len(points)):
             own = {name: array[..., i, :] for name, array in arrays.items()}
+            if not any(points[i]):
+                self.jumps = list(beside_jumps(run, cycles[i].times(self.steps), own))
             like = (likes.get(i) or still(own)) if errs[i] else None
             found.append(self._reduced(own, means.get(i) or still(own), like) if ours[i] else None)
         return found

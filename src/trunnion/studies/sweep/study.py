@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import beside_jumps, effort_units, inputs, references
+from trunnion.cycle.summary import effort_units, inputs, references
 from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
@@ -90,7 +90,7 @@ def sweep(
             progress(done)
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
     first = say(points.swept, (0,) * len(points.shape))
-    found += (replace(one, what=f"at {first} {one.what}") for one in beside_jumps(points.run, steps))
+    found += (replace(one, what=f"at {first} {one.what}") for one in points.jumps)
     numbers, plain = mechanism.parameter_set, [one for one in points.swept if not one.written]
     bare = [finding for one in plain for finding in bare_number(numbers, one.path, float(one.values[-1]))]
     found = [*(one for one in found if one.where not in {own.where for own in bare}), *bare]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
-from trunnion.cycle.summary import beside_jumps, model_notes
+from trunnion.cycle.summary import extreme_beside_jump, model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import check_values
@@ -40,7 +40,6 @@ LOOKED = 72  # positions at which loads of pins are looked at
 UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
 ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
 SIZES = ("pin.clearance", "guide.clearance", "pin.hole_radius", "pin.radius")  # what the size of a play depends on
-EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -127,10 +126,9 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _nominal(outcome)
-    if any(of.measure.kind == "effort" and of.measure.statistic in EXTREMES for of in study.linear.measures):
-        for one in beside_jumps(study.run, study.steps):
-            yield finding_for("tolerance.beside_jump", one.where, **one.figures)
     for of in study.linear.measures:
+        time = of.reference.window.time
+        yield from extreme_beside_jump(study.run, of.measure, time, of.curve, "tolerance.beside_jump")
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
     if counted is not None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
-from trunnion.results.quantities import scale_of, signed
+from trunnion.results.quantities import decimals_of, scale_of, signed
 from trunnion.results.sentences import finding_for
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ __all__ = ["MISSED", "against", "limited", "limits", "missed"]
 Array = NDArray[np.float64]
 MISSED = "limit.missed"  # with which the code of such a finding begins
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
+EQUAL = 1e-3  # parts of a worst case that are alike
 HALF = 0.5  # of the room: a nominal figure that is further off its middle is to be brought there first
 
 
@@ -131,7 +132,8 @@ def _short(counted: Sampled | None, i: int, sure: bool) -> list[str]:
     share, low, high, cpk = (float(counted.arrays[key][i]) for key in ("yield", "yield_low", "yield_high", "cpk"))
     found = []
     if share < 1:
-        found.append(f"yield {100 * share:.6g} % (95 % interval {100 * low:.5g} to {100 * high:.5g} %)")
+        own, least, most = (f"{100 * one:.{decimals_of(high - low)}f}" for one in (share, low, high))
+        found.append(f"yield {own} % (95 % interval {least} to {most} %)")
     if cpk < 1 and not sure:
         found.append(f"Cpk {cpk:.3g}")
     return found
@@ -192,9 +194,10 @@ def _remedy(outcome: Outcome, of: Of, say: _Words) -> str:
         return f"{what}: centre them or change the nominal mechanism, narrower ones cannot correct it"
     off = _off_middle(lower, upper, middle)
     first = f"bring the nominal mechanism {say.say(-off)} nearer to the middle of the limits, and " if off else ""
-    name, share, priced = _largest(outcome, of)
+    name, share, equals = _largest(outcome, of)
+    priced = bool(outcome.study.run.system.mechanism.costs)
     whole = "variance" if _by_variance(outcome) else "worst case"
-    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the {whole}"
+    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the {whole}{equals}"
     if not priced:
         return f"{narrow}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
     if not fixed:
@@ -227,8 +230,8 @@ def _by_variance(outcome: Outcome) -> bool:
     return outcome.target is not None and outcome.study.effects.correlated
 
 
-def _largest(outcome: Outcome, of: Of) -> tuple[str, float, bool]:
-    """The number with the largest part in the worst case, its share, and whether anything has a cost.
+def _largest(outcome: Outcome, of: Of) -> tuple[str, float, str]:
+    """The number with the largest part in the worst case, its share, and what equal ones have together, if it is more.
 
     Where a yield is asked for of correlated numbers, in the variance: the worst case knows no correlation.
     """
@@ -236,5 +239,11 @@ def _largest(outcome: Outcome, of: Of) -> tuple[str, float, bool]:
     worst = np.nan_to_num(of.figure.covariances if _by_variance(outcome) else of.figure.spread.worst)
     top = int(np.argmax(worst))
     total = float(np.sum(worst))
-    priced = bool(study.run.system.mechanism.costs)
-    return study.inputs.names[top], float(worst[top]) / total if total > 0 else 0.0, priced
+    if not total > 0:
+        return study.inputs.names[top], 0.0, ""
+    groups = np.abs(worst - worst[:, None]) <= EQUAL * worst[:, None]
+    same = groups[int(np.argmax(groups @ worst))]
+    together = float(same @ worst)
+    equals = f", or {', '.join(np.array(study.inputs.names)[same])}, which are equal, together "
+    equals += f"{100 * together / total:.3g} %"
+    return study.inputs.names[top], float(worst[top]) / total, equals if together > worst[top] else ""

@@ -11,12 +11,12 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
 from trunnion.statistics.costs import Cost
 from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
-from trunnion.views.allocation.tables import bought, headed, is_play, offers_table, room, tables, trials
+from trunnion.views.allocation.tables import bought, headed, offers_table, room, tables, trials
 from trunnion.views.common.cycle import names
 from trunnion.views.common.page import Section
 from trunnion.views.tolerance.figure import KINDS as OF_TOLERANCES
 from trunnion.views.tolerance.figure import figure as tolerance_figure
-from trunnion.views.tolerance.readings import readings
+from trunnion.views.tolerance.readings import is_play, readings
 from trunnion.views.tolerance.report import report as tolerance_report
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from trunnion.results.attributes import attribute
 from trunnion.results.quantities import drawn_in, joined
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
-from trunnion.views.tolerance.readings import readings, share
+from trunnion.views.tolerance.readings import is_play, readings, share, share_interval
 from trunnion.views.tolerance.tables import tables as tolerance_tables
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["bought", "headed", "is_play", "offers_table", "room", "tables", "trials"]
+__all__ = ["bought", "headed", "offers_table", "room", "tables", "trials"]
 
 CRITERIA = {"worst-case": "worst case", "rss": "root of the sum of squares", "yield": "yield"}
 
@@ -44,6 +44,9 @@ def headed(result: xr.Dataset) -> str:
     told = f"{criterion}: cost {cost:.8g}"
     told += f", as stated {before:.8g}" if math.isfinite(before) else ""
     if result.attrs["criterion"] == "yield":
+        if "yield_checked" in result:
+            checked, *ends = (float(result[f"yield_checked{end}"]) for end in ("", "_low", "_high"))
+            told += f", yield of fresh samples {share_interval(checked, *ends)}"
         return told
     return f"{told}, {'global optimum to first order' if result.attrs['proven'] else 'best found'}"
 
@@ -75,11 +78,6 @@ def half_width(t: float, unit: str, sign: str = "±") -> str:
         return "—"
     factor, shown = drawn_in(t, unit)
     return joined(f"{sign}{t * factor:.5g}", shown)
-
-
-def is_play(path: str) -> bool:
-    """Whether what is bought is the clearance of a joint."""
-    return path.startswith("joints.") and path.endswith(".clearance") and path.count(".") == 2
 
 
 def _known(cost: float) -> str:

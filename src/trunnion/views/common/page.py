@@ -136,7 +136,7 @@ def _stated(row: dict[str, Any]) -> str:
         return quantity(value, unit)
     if value is None:  # an expression of the motion
         return text
-    if not text[0].isdigit() and text[0] not in "+-.":
+    if text.lstrip("+-")[:1] not in "0123456789.±":
         return f"{text} = {quantity(value, unit)}"
     return f"{text}\u00a0{unit}" if unit and _is_number(text) else text
 

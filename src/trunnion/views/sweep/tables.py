@@ -28,7 +28,6 @@ __all__ = ["SweepTable", "tables"]
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 LEAST_COLUMNS = 3
 LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
-DRAWN = {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}  # units as on a drawing
 BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
 
 
@@ -59,10 +58,11 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Swe
     efforts = [name for name in found if name.endswith(".effort_max")]
     shown = [*measures, "efficiency", "efficiency_ideal", *efforts, *BESIDE]
     shown = [name for name in dict.fromkeys(shown) if name in found or name in measures]
-    drawn = {name: _drawn(result, plan, name) for name in shown}
-    columns = [values[:, 0] for _, values in drawn.values()]
+    drawn = [_drawn(found[name][0]) for name in shown]
+    columns = [factor * grid(result, plan, name)[1][:, 0] for name, (factor, _) in zip(shown, drawn, strict=True)]
     picked, status = thinned(len(plan.x.values), MOST_ROWS), statuses(result, plan)[:, 0]
-    titles = [f"{name.replace('_', ' ')} [{unit}]".removesuffix(" [1]") for name, (unit, _) in drawn.items()]
+    titles = [f"{name.replace('_', ' ')} [{unit}]".removesuffix(" [1]")
+              for name, (_, unit) in zip(shown, drawn, strict=True)]  # fmt: skip
     words = [_word(int(code)) for code in status]
     head = [plan.x.title, *titles, *(["status"] if any(words) else [])]
     rows = []
@@ -73,17 +73,12 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Swe
     return SweepTable(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
 
 
-def _drawn(result: xr.Dataset, plan: Arrangement, name: str) -> tuple[str, Array]:
-    """Unit and values of a figure as a table shows them: lengths in mm, angles in degrees."""
-    unit, values = grid(result, plan, name)
-    factor, shown = DRAWN.get(unit, (1.0, unit))
-    return shown, factor * values
-
-
 def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) -> list[SweepTable]:
     """A table for each combination of the facets' values; of many of them some."""
     assert plan.other is not None  # a matrix has columns
-    unit, values = _drawn(result, plan, measure)
+    own, values = grid(result, plan, measure)
+    factor, unit = _drawn(own)
+    values = factor * values
     status = statuses(result, plan)
     places = list(product(*(range(len(one.values)) for one in plan.facets)))
     shown = [places[i] for i in thinned(len(places), MOST_TABLES)]
@@ -114,6 +109,11 @@ def _matrix(
         across = thinned(values.shape[1], len(across) - 1)
     head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
     return SweepTable(title, head, rows, values.size - len(down) * len(across))
+
+
+def _drawn(unit: str) -> tuple[float, str]:
+    """Factor and unit of a column: lengths in mm, angles in degrees."""
+    return {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
 
 
 def _cell(value: float, status: int) -> str:

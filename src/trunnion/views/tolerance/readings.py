@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import drawn_in, joined, number, scale_of
+from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
 from trunnion.views.common.cycle import Abscissa, Array, names
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = [
     "MeasureReading",
     "failures",
     "fixed",
+    "is_play",
     "limits_text",
     "methods",
     "outer",
@@ -269,7 +270,7 @@ class MeasureReading:
         short = _without_section(paths)
         found = [
             ContributionRow(
-                path, short[j], unit, with_unit(lower[j], upper[j], unit), float(slope[j]), float(worst[j]),
+                path, short[j], unit, with_unit(lower[j], upper[j], unit, path), float(slope[j]), float(worst[j]),
                 float(worst[j]) / total if total > 0 else math.nan, float(rss[j]), float(variance[j]),
             )
             for j, (path, unit) in enumerate(zip(paths, units, strict=True))
@@ -323,13 +324,19 @@ def _signed(value: float) -> str:
     return f"+{_short(value)}" if value > 0 else _short(value + 0.0)
 
 
-def with_unit(lower: float, upper: float, unit: str) -> str:
+def is_play(path: str) -> bool:
+    """Whether a parameter is the play of a joint: how far its pin may be from the middle, to any side."""
+    return path.startswith("joints.") and path.endswith(".clearance") and path.count(".") == 2
+
+
+def with_unit(lower: float, upper: float, unit: str, path: str) -> str:
     """Limits of a toleranced number with their unit."""
     if math.isnan(lower) or math.isnan(upper):
         return ""
     size = max(abs(lower), abs(upper))
     factor, shown = drawn_in(size, unit)
-    return joined(limits_text(lower * factor, upper * factor), shown.replace(" ", "\u00a0"))
+    told = f"within\u00a0{_short(upper * factor)}" if is_play(path) else limits_text(lower * factor, upper * factor)
+    return joined(told, shown.replace(" ", "\u00a0"))
 
 
 def _known(value: float) -> float:
@@ -344,7 +351,7 @@ def share(value: float, decimals: int | None = None) -> str:
     if math.isnan(value):
         return "—"
     if decimals is None:
-        decimals = _decimals(min(value, 1 - value))
+        decimals = decimals_of(min(value, 1 - value))
     return f"{fixed(100 * value, 0 if value in (0.0, 1.0) else decimals)}\u00a0%"
 
 
@@ -358,14 +365,9 @@ def share_parts(value: float, low: float, high: float) -> tuple[str, str, int | 
     """A share, its interval, empty if there is none, and to how many decimals of a per cent they are told."""
     if math.isnan(low) or math.isnan(high):
         return share(value), "", None
-    decimals = _decimals(high - low)
+    decimals = decimals_of(high - low)
     least = share(low, decimals).removesuffix("\u00a0%")
     return share(value, decimals), f"{least} to {share(high, decimals)}", decimals
-
-
-def _decimals(small: float) -> int:
-    """Of a share in per cent, so that a part of this size shows two digits."""
-    return min(max(1 - math.floor(math.log10(100 * small)), 1), 8) if small > 0 else 1
 
 
 def failures(result: xr.Dataset) -> list[tuple[str, int]]:

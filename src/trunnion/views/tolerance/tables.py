@@ -250,7 +250,8 @@ def _sensitivity(read: MeasureReading, one: ContributionRow) -> str:
     """Change of the measure by the number, in the units in which both are told: "0.01365 °/mm"."""
     if math.isnan(one.sensitivity):
         return "—"
-    factor, shown = drawn_in(1.0, one.unit)
+    half = one.worst / abs(one.sensitivity) if one.sensitivity else math.nan  # so that the unit is that of the limits
+    factor, shown = drawn_in(half if half > 0 else 1.0, one.unit)
     shown = shown.replace(" ", "\u00a0")
     unit = f"{read.label or '1'}/{shown}" if shown else read.label
     return f"{number(one.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
@@ -356,7 +357,7 @@ def inputs(result: xr.Dataset) -> TextTable:
     rows = []
     for j, path in enumerate(names(result, "parameter")):
         unit = about[path].unit
-        told = [value_text(float(nominal[j]), unit), limits_of(float(lower[j]), float(upper[j]), unit)]
+        told = [value_text(float(nominal[j]), unit), limits_of(float(lower[j]), float(upper[j]), unit, path)]
         told += [value_text(float(row[j]), unit, 4) if row.size else "" for row in (deviation, shift)]
         rows.append([path, *told])
     return TextTable(

@@ -280,7 +280,7 @@ export function start(scene, places) {
     "p",
     { class: "hint" },
     "Space plays, ← and → step (Shift: ten), Home and End jump; point at a curve " +
-      (scene.motion ? "to go to that time." : "to move the crank.") +
+      (scene.motion ? "to go to that time." : "to move the mechanism.") +
       (spatial ? " Drag turns the mechanism, with Shift or the right button it shifts, the wheel zooms; so do the keys ← → ↑ ↓ + − 0 once it has the focus." : "") +
       (scene.apart ? " Joints on one spot are drawn apart along their axes; between them the scale does not hold." : ""),
   );

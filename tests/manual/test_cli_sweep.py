@@ -206,22 +206,3 @@ def test_long_tables_are_thinned() -> None:
     assert len(head) == 9
     assert left == 8
     assert head[-1] == "6.1 m"
-
-
-def test_lengths_and_angles_are_shown_as_on_a_drawing(tmp_path: Path) -> None:
-    """As in `analyse`, and as the swept lengths beside them."""
-    text = (EXAMPLES / "toleranced-slider-crank.yaml").read_text(encoding="utf-8")
-    text = text.replace("piston.Q, axis: x}", "piston.Q, axis: x, as: maximum}").replace(
-        "drive-torque: {effort: O}", "swing: {angle: rod, as: maximum}"
-    )
-    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
-    names = {"stroke-position": ("mm", 1e3), "swing": ("deg", 180 / np.pi)}
-    over = {"crank": ["50 mm", "51 mm"]}
-    result = trunnion.sweep(trunnion.read(tmp_path / "model.yaml"), over, 12, measures=list(names))
-    _, head, shown, _ = tables(result, list(names))[0]
-    for column, (name, (unit, factor)) in enumerate(names.items(), 1):
-        assert head[column] == f"{name} [{unit}]"
-        assert [float(row[column]) for row in shown] == pytest.approx(factor * result[name].values, rel=1e-5)
-    over["rod"] = ["200 mm", "201 mm"]
-    result = trunnion.sweep(trunnion.read(tmp_path / "model.yaml"), over, 12, measures=list(names))
-    assert tables(result, ["stroke-position"])[0].title.startswith("stroke-position [mm] over crank")

@@ -93,13 +93,7 @@ class Mechanism(Numbers):
             if lost & sections:  # a whole section: the rest would speak of nothing else
                 raise MechanismError(findings) from None
         found = self.__dict__["checked"] = check_model(self, lost)
-        unread = [finding.where for finding in findings]  # what a part lacks may be what it has misspelt
-        findings += [
-            one
-            for one in found
-            if one.severity is Severity.ERROR
-            and not ("." in one.where and any(where.startswith(f"{one.where}.") for where in unread))
-        ]
+        findings += [finding for finding in found if finding.severity is Severity.ERROR]
         if findings:
             raise MechanismError(findings)
 

@@ -101,7 +101,7 @@ class Status(Coded):
     SOLVED = 0, "solved"
     ZERO_SLIP = 1, "a joint with friction is momentarily at rest: its friction may act either way"
     NEAR_SINGULAR = 2, "close to a singular position: forces and speeds depend strongly on the dimensions"
-    CONTACT_LOST = 3, "a pin loses contact: its load reverses and it would cross its play"
+    CONTACT_LOST = 3, "a pin loses contact: its load reverses, or nothing presses it"
     NOT_CONVERGED = 4, "the friction iteration did not converge"
     LOCKED = 5, "locked by friction: no drive effort can move the mechanism"
     LOAD_UNDEFINED = 6, "a load or spring has no value: outside its table, a division by zero, a length of zero"

@@ -560,7 +560,9 @@ def test_drawings_show_springs_and_following_loads(tmp_path: Path) -> None:
     data["loads"] = {"push": {"link": "coupler", "at": "E", "force": ["30 N * cos(drive)", 0], "frame": "link"}}
     result = run(data)
     shown = scene(result)
-    assert shown["springs"] == [{"name": "S", "ends": ["ground.S", "coupler.E"]}]
+    (spring,) = shown["springs"]
+    assert (spring["name"], spring["ends"]) == ("S", ["ground.S", "coupler.E"])
+    assert spring["pull"] == pytest.approx(result["spring_force"].values[0], rel=1e-3)
     push = shown["loads"][0]
     assert (push["frame"], push["varies"], abs(push["force"][0])) == ("link", True, pytest.approx(30))
     for kind in ("mechanism", "power"):

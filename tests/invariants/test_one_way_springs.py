@@ -76,15 +76,37 @@ def test_a_slack_rope_needs_no_direction() -> None:
     assert result["spring_elongation"].values[0, 0] == -0.05
 
 
-def test_a_bumper_at_the_end_of_a_slide() -> None:
-    data: Data = {
+def cart(**more: Any) -> Data:
+    """A cart that is driven along the ground, from 0 to 0.25 m."""
+    return {
         "links": {"ground": {"points": {"X": slide(0, 0)}}, "cart": {"points": {"X": slide(0, 0)}}},
         "joints": {"X": prismatic("ground", "cart")},
         "drivers": {"X": {"speed": 0.1, "range": [0.0, 0.25]}},
-        "springs": {"S": {"joint": "X", "stiffness": 2000.0, "free_length": 0.05, "only": "push"}},
+        **more,
     }
+
+
+def test_a_bumper_at_the_end_of_a_slide() -> None:
+    data = cart(springs={"S": {"joint": "X", "stiffness": 2000.0, "free_length": 0.05, "only": "push"}})
     result = run(data, 6)
     np.testing.assert_allclose(result["drive_effort"].values[0], [-100, 0, 0, 0, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("only", "free", "nearest"), [("push", 0.05, None), ("push", -0.01, 0.0), ("pull", 0.3, 0.25), ("pull", 0.2, None)]
+)
+def test_one_that_never_acts_is_told(only: str, free: float, nearest: float | None) -> None:
+    """The slide goes from 0 to 0.25 m."""
+    data = cart(springs={"S": {"joint": "X", "stiffness": 2000.0, "free_length": free, "only": only, "useful": True}})
+    told = [row for row in json.loads(run(data, 6).attrs["findings"]) if row["where"] == "springs.S"]
+    expected = [] if nearest is None else [("spring.never_acts", free, nearest)]
+    assert [(row["code"], row["figures"]["free"], row["figures"]["nearest"]) for row in told] == expected
+
+
+@pytest.mark.parametrize(("load", "told"), [({"only": "positive"}, False), ({"only": "negative"}, True)])
+def test_a_useful_load_that_takes_no_power_is_told(load: Data, told: bool) -> None:
+    data = cart(loads={"F": {"joint": "X", "resisting_force": 5.0, "useful": True, **load}})
+    assert ("load.no_power" in [row["code"] for row in json.loads(run(data, 6).attrs["findings"])]) is told
 
 
 @pytest.mark.parametrize("only", ["pull", "push"])

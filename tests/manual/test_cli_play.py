@@ -170,3 +170,21 @@ def test_an_extreme_is_of_its_place_and_other_statistics_are_left_out(tmp_path: 
     titles = [one.title for one in tables(result)]
     assert titles[1].startswith("least: the minimum, at ")
     assert figure(result).axes
+
+
+def test_no_effect_at_one_position_is_no_matter_of_the_driver() -> None:
+    """Elsewhere the play may have one, and another driver need not help."""
+    result = trunnion.play(trunnion.read(EXAMPLES / "fourbar-with-play.yaml"), ["angle:crank"], at="90 deg")
+    found = {one.code: one for one in result.trunnion.findings}
+    assert "play.no_effect" not in found
+    assert found["play.no_effect_there"].figures["at"] == "90°"
+    assert not found["play.no_effect_there"].remedy
+
+
+def test_rounding_is_shown_as_zero() -> None:
+    result = trunnion.play(trunnion.read(SLIDER), ["stroke-position"], steps=12).copy(deep=True)
+    result["worst_case"][0, 0] = 0.9e-9 * result["worst_case_total"].min()
+    result["worst_case"][0, 1] = 1.1e-9 * result["worst_case_total"].max()
+    shown = [row[2] for row in tables(result)[0].rows]
+    assert shown[0] == "0\u00a0m"
+    assert shown[1] != "0\u00a0m"

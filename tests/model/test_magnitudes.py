@@ -1,12 +1,13 @@
-"""Lengths far larger than the others: a forgotten unit is told with its figure, and plain SI numbers are left alone."""
+"""A forgotten unit is told with its figure, and plain SI numbers are left alone."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
-from trunnion import read
+from trunnion import MechanismError, read
 from trunnion.errors import Severity
 
 LINKAGE = """\
@@ -36,7 +37,9 @@ drivers: {A: {speed: 60 rpm}}
         ("C: [BC, 0]", "C: [2 * BC, 0]", "", ""),
         ("C: [BC, 0]", "C: [0.09, 0]", "", ""),
         ("100 mm, AB: 30 mm, BC: 90 mm, CD: 70 mm", "10, AB: 3, BC: 9, CD: 7", "", ""),  # all of them plain
-        ("AB: 30 mm, BC: 90 mm", "AB: 30, BC: 90", "dimensions.BC", "as are 1 others"),
+        ("AB: 30 mm, BC: 90 mm", "AB: 30, BC: 90", "dimensions.AB", "300 times"),
+        ("AB: 30 mm, BC: 90 mm, CD: 70 mm", "AB: 30, BC: 90, CD: 70", "dimensions.BC", "as are 2 others"),
+        ("AD: 100 mm, AB: 30 mm", "AD: 100 mm, AB: 1", "dimensions.AB", "10 times"),
         ("radius: 6 mm", "radius: 6", "joint_defaults.pin.radius", "60 times"),
         ("radius: 6 mm", "radius: 60 cm", "joint_defaults.pin.radius", "more than every link is long"),
         ("radius: 6 mm", "radius: 60 mm", "", ""),  # an eccentric
@@ -50,3 +53,92 @@ def test_a_forgotten_unit(tmp_path: Path, old: str, new: str, where: str, figure
     found = [one for one in read(tmp_path / "linkage.yaml").checked if one.severity is Severity.WARNING]
     assert [one.where for one in found][:1] == ([where] if where else [])
     assert all(figures in one.what for one in found[:1])
+
+
+CLAMP = """\
+trunnion: 1
+space: planar
+gravity: [0, 0]
+dimensions: {AB: 30 mm, BC: 90 mm, n: 2, pinch: 1 mm}
+links:
+  ground:  {points: {A: [0, 0], S: {at: [0, 0], axis: [1, 0]}, W: [n * BC, 0]}}
+  crank:   {points: {A: [0, 0], B: [AB, 0]}}
+  coupler: {points: {B: [0, 0], C: [BC, 0]}}
+  ram:     {points: {C: [0, 0], S: {at: [0, 0], axis: [1, 0]}}}
+joints:
+  A: {type: revolute, links: [ground, crank]}
+  B: {type: revolute, links: [crank, coupler]}
+  C: {type: revolute, links: [coupler, ram]}
+  S: {type: prismatic, links: [ground, ram], friction: 0}
+joint_defaults: {pin: {radius: 6 mm}, friction: 0.1}
+drivers: {S: {range: [70 mm, 90 mm], speed: 20 mm/s}}
+loads: {F: {link: ram, at: C, force: [-5 N, 0]}}
+springs: {work: {between: [ground.W, ram.C], stiffness: 8 N/mm, free_length: 80 mm + pinch, only: push}}
+assembly: {B: [0.02, 0.02]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "severity", "where", "figures"),
+    [
+        ("", "", None, "", ""),  # a plain factor and a plain hint
+        ("range: [70 mm, 90 mm]", "range: [70 mm, 90]", Severity.WARNING, "drivers.S.range.to", "is 90 m, "),
+        ("speed: 20 mm/s", "speed: 20", Severity.NOTE, "drivers.S.speed", "is 20 m/s, "),
+        ("stiffness: 8 N/mm", "stiffness: 8", Severity.NOTE, "springs.work.stiffness", "is 8 N/m, "),
+        ("force: [-5 N, 0]", "force: [-5, 0]", Severity.NOTE, "loads.F.force.x", "is -5 N, "),
+        ("pinch: 1 mm", "pinch: 1", Severity.WARNING, "dimensions.pinch", "11.1 times the largest length"),
+        ("pinch: 1 mm", "pinch: 0.001", Severity.NOTE, "dimensions.pinch", "is 0.001 m, "),
+        ("radius: 6 mm", "radius: 0.006", Severity.NOTE, "joint_defaults.pin.radius", "is 0.006 m, "),
+    ],
+)
+def test_a_plain_number_among_others_with_a_unit(
+    tmp_path: Path, old: str, new: str, severity: Severity | None, where: str, figures: str
+) -> None:
+    (tmp_path / "clamp.yaml").write_text(CLAMP.replace(old, new), encoding="utf-8")
+    told = read(tmp_path / "clamp.yaml").checked
+    found = [(one.severity, one.where) for one in told]
+    assert found == ([(severity, where)] if severity else [])
+    assert all(figures in one.what for one in told)
+
+
+def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) -> None:
+    plain = CLAMP.replace("80 mm + pinch", "80 * pinch").replace("8 N/mm", "8000").replace("5 N", "5")
+    plain = re.sub(r"(\d+) mm(/s)?", lambda found: str(int(found[1]) / 1000), plain)
+    (tmp_path / "clamp.yaml").write_text(plain.replace("radius: 0.006", "radius: 6 mm"), encoding="utf-8")
+    told = [*read(tmp_path / "clamp.yaml").checked]
+    for example in Path("examples").glob("*.yaml"):
+        told += [one for one in read(example).checked if "plain number where" in one.what or "forgotten" in one.what]
+    assert told == []
+
+
+def test_a_dimension_may_be_called_as_a_limit(tmp_path: Path) -> None:
+    (tmp_path / "linkage.yaml").write_text(LINKAGE.replace("AB", "lower"), encoding="utf-8")
+    assert read(tmp_path / "linkage.yaml").with_values({"lower": "31 mm"}).parameters()["dimensions.lower"] == 0.031
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where"),
+    [
+        ("stiffness: 8", "stifness: 8", "springs.work.stifness"),
+        ("S: {type: prismatic, links: [ground, ram], friction: 0}",
+         "S: {type: prismatic, links: [ground, ram], friction: off}", "joints.S.friction.coefficient"),
+        ("friction: 0.1}", "friction: off}", "joint_defaults.friction.coefficient"),
+    ],
+)  # fmt: skip
+def test_one_slip_is_one_error(tmp_path: Path, old: str, new: str, where: str) -> None:
+    assert CLAMP.count(old) == 1
+    (tmp_path / "clamp.yaml").write_text(CLAMP.replace(old, new), encoding="utf-8")
+    with pytest.raises(MechanismError) as caught:
+        read(tmp_path / "clamp.yaml")
+    assert [one.where for one in caught.value.findings] == [where]
+
+
+def test_a_default_that_no_joint_follows_is_told(tmp_path: Path) -> None:
+    """A fit is the pin's own clearance."""
+    fitted = re.sub(r"(revolute, links: \[.*?\])", r"\1, pin: {fit: 12 mm H7/f7}", CLAMP)
+    fitted = fitted.replace("pin: {radius: 6 mm}", "pin: {clearance: 0 mm}")
+    assert fitted.count("fit:") == 3
+    one_left = fitted.replace("pin: {fit: 12 mm H7/f7}", "pin: {radius: 6 mm}", 1)
+    for text, told in ((fitted, ["joint_defaults.pin.clearance"]), (one_left, [])):
+        (tmp_path / "clamp.yaml").write_text(text, encoding="utf-8")
+        assert [one.where for one in read(tmp_path / "clamp.yaml").checked] == told

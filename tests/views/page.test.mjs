@@ -215,6 +215,7 @@ console.log(
     loads: seen("stage", "load"),
     moments: seen("stage", "arc"),
     springs: places.stage.find(classes("spring")).map((element) => element.attributes.d),
+    dashes: places.stage.find(classes("spring")).map((element) => element.attributes["stroke-dasharray"]),
     slits: places.stage.find(classes("slit")).map((element) => element.attributes.d),
     labels: places.stage.find(classes("load")).map((element) => {
       const text = element.find((part) => part.name === "text")[0];

@@ -62,6 +62,9 @@ if NODE:  # not a skip: what must hold everywhere is tested in Python; this is t
         assert shown["loads"] == 2
         assert len(shown["springs"]) == 1
         assert re.fullmatch(r"M[-\d.,]+(L[-\d.]+,[-\d.]+)+", shown["springs"][0])
+        assert shown["dashes"] == ["none"]
+        idle = result.assign_coords(spring=["S"]).assign(spring_force=(("spring", "position"), np.zeros((1, 36))))
+        assert page(idle, tmp_path)["dashes"] == ["2 3"]  # it acts one way and does not here
 
     def test_pitch_circles_are_drawn(tmp_path):
         result = analyse(geared_five_bar(), 24)

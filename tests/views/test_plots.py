@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from xml.etree import ElementTree
 
 import numpy as np
@@ -181,3 +182,15 @@ def test_no_pyplot_state_is_touched(plain):
 def test_hull_leaves_inner_points_out():
     corners = hull(np.array([[0, 0], [4, 0], [0, 4], [1, 1], [2, 0]], dtype=float))
     assert {tuple(corner) for corner in corners} == {(0, 0), (4, 0), (0, 4)}
+
+
+def test_a_spring_is_dotted_where_it_does_not_act() -> None:
+    result = four_bar(36)
+    stated = json.loads(result.attrs["scene"])
+    stated["springs"] = {"S": {"between": ["ground.A", "coupler.E"], "joint": None}}
+    pull = np.where(np.arange(36) < 18, 0.0, 5.0)[np.newaxis]
+    result = result.assign_coords(spring=["S"]).assign(spring_force=(("spring", "position"), pull))
+    result.attrs["scene"] = json.dumps(stated)
+    for index, line in ((3, ":"), (20, "-")):
+        coils = [one for one in mechanism(result, index=index).axes[0].lines if len(one.get_xdata()) == 20]
+        assert [one.get_linestyle() for one in coils] == [line]

@@ -289,6 +289,22 @@ def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
             jumps = np.flatnonzero(np.abs(np.diff(at.arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
                 yield finding_for("spring.jump", f"springs.{name}", at=at.dial.at(int(jumps[0])))
+        if spring.only is not None:
+            yield from _never_acts(run, name, at.arrays["spring_elongation"][i])
+    marked = [name for name, load in run.system.mechanism.loads.items() if load.useful]
+    useful = at.arrays["useful_power"]
+    if marked and np.any(np.isfinite(useful)) and not np.any(np.nan_to_num(useful)):
+        yield finding_for("load.no_power", "loads", loads=marked, count=len(marked))
+
+
+def _never_acts(run: Run, name: str, elongation: NDArray[np.float64]) -> Iterator[Finding]:
+    """A spring that only pulls or only pushes and is on its other side throughout: nothing ever touches it."""
+    only = str(run.system.mechanism.springs[name].only)
+    sign = 1.0 if only == "pull" else -1.0
+    if np.any(np.isfinite(elongation)) and np.nanmax(sign * elongation) < 0:
+        free = float(np.max(run.values[f"springs.{name}.free_length"]))
+        nearest = free + sign * float(np.nanmax(sign * elongation))
+        yield finding_for("spring.never_acts", f"springs.{name}", only=only, free=free, nearest=nearest)
 
 
 def references(mechanism: Mechanism) -> list[str]:

@@ -29,7 +29,7 @@ from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import nearest
 from trunnion.model.numbers import Numbers
-from trunnion.model.parameters import LIMITS, Location
+from trunnion.model.parameters import Location
 from trunnion.model.parts import (
     Contact,
     Guide,
@@ -243,7 +243,7 @@ class Mechanism(Numbers):
         if choice:
             return choice
         entry = self.parameter_set.entries.get(self.path_of(name))
-        if entry and entry.location[-1] in LIMITS:
+        if entry and entry.is_limit:
             remedy = f"set {entry.where}, as ±0.1 deg or +0.2/-0.1 deg"
             raise MechanismError(Finding("a limit is stated with the other", name, remedy))
         if entry:

@@ -75,7 +75,12 @@ class Entry:
         """Where a finding about it points: to a deviation as it was written, to both limits as to one."""
         if self.path.startswith(ERRORS):
             return f"{ERRORS}{self.location[1]}"
-        return self.path.rpartition(".")[0] if self.location[-1] in LIMITS else self.path
+        return self.path.rpartition(".")[0] if self.is_limit else self.path
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether it is one of two limits, and no dimension of that name."""
+        return self.location[-1] in LIMITS and self.location[0] != "dimensions"
 
 
 def entries(mechanism: Fields) -> list[Entry]:

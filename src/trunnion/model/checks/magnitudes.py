@@ -1,4 +1,4 @@
-"""Checks of magnitudes: lengths far larger than the others, whose unit was likely forgotten; pins larger than links."""
+"""Checks of magnitudes: numbers whose unit was likely forgotten; pins larger than links."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, Severity
-from trunnion.model.parameters import Entry, ParameterSet
+from trunnion.model.parameters import Entry, ParameterSet, measured
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import KINDS, unit
+from trunnion.model.units import KINDS, NUMBER, Kind, UnitError, unit
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
@@ -17,32 +17,78 @@ if TYPE_CHECKING:
 __all__ = ["bare_number", "magnitudes"]
 
 FAR = 20.0  # times the largest length stated with a unit: a plain number above it is no length of this mechanism
+# kinds told of where lengths have units, and the unit that is likely meant
+MEANT = {
+    KINDS[name]: text for name, text in (("length", "mm"), ("stiffness", "N/mm"), ("force", "N"), ("speed", "mm/s"))
+}
 
 
 def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
-    """Warnings of plain lengths (m) far above those stated with a unit, and of pins larger than every link."""
+    """What plain numbers mean where most lengths have a unit; plain lengths far above these; pins above every link."""
     values = {path: abs(float(value)) for path, value in numbers.nominal.items()}
     lengths = [one for path, one in numbers.entries.items() if one.kind is KINDS["length"] and path in values]
     places = [one for one in lengths if one.path.startswith("links.") and ".points." in one.path]
     pins = [one for one in lengths if one.path.endswith((".pin.radius", ".guide.length")) and not one.alias]
     known = max((values[one.path] for one in places if not _plain(mechanism, one)), default=0.0)
+    bare = _without_unit(mechanism, numbers) if known > 0 else {}
+    for path, kind in bare.items():
+        long = kind is KINDS["length"] and values[path] > known
+        yield _forgotten(path, values[path], known) if long else _meant(path, float(numbers.nominal[path]), kind)
     far = [one for one in (*places, *pins) if values[one.path] > FAR * known > 0]
     told = {path: values[path] for one in far for path in _plain(mechanism, one) if values[path] > FAR * known}
+    told = {path: value for path, value in told.items() if path not in bare}
     if told:
         path = max(told, key=told.__getitem__)
-        more = f", as are {len(told) - 1} others without a unit: units" if len(told) > 1 else ": a unit"
-        times = f"{values[path] / known:.3g} times the largest length with a unit, {known:g} m"
-        yield Finding(
-            f"is {values[path]:g} m, {times}{more} forgotten?",
-            path,
-            f"write it, as {values[path]:g} mm",
-            Severity.WARNING,
-        )
+        yield _forgotten(path, told[path], known, len(told) - 1)
     largest = 2 * max((values[one.path] for one in places), default=0.0)
     for one in pins:
-        if values[one.path] > largest > 0 and one.path not in told and one.path.endswith(".radius"):
+        if values[one.path] > largest > 0 and not {one.path} & {*told, *bare} and one.path.endswith(".radius"):
             what = f"is {values[one.path]:g} m, more than every link is long"
             yield Finding(what, one.path, "check its unit", Severity.WARNING)
+
+
+def _forgotten(path: str, value: float, known: float, others: int = 0) -> Finding:
+    """A warning of a length (m) above all that have a unit."""
+    more = f", as are {others} others without a unit: units" if others else ": a unit"
+    times = f"{value / known:.3g} times the largest length with a unit, {known:g} m"
+    what = f"is {value:g} m, {times}{more} forgotten?"
+    return Finding(what, path, f"write it, as {value:g} mm", Severity.WARNING)
+
+
+def _meant(path: str, value: float, kind: Kind) -> Finding:
+    """A note of a number that is small enough, or no length."""
+    other = f", or {value:g} {MEANT[kind]} if that is meant" if MEANT[kind] != kind.unit else ""
+    what = f"is {value:g} {kind.unit}, a plain number where other lengths have a unit"
+    return Finding(what, path, f"write {value:g} {kind.unit}{other}", Severity.NOTE)
+
+
+def _without_unit(mechanism: Numbers, numbers: ParameterSet) -> dict[str, Kind]:
+    """Plain numbers by path, with what they measure; none unless more lengths have a unit. A hint is no length."""
+    kinds = measured(mechanism, numbers.entries.values())
+    stated = [one for one in numbers.entries.values() if not one.alias and not one.path.startswith("assembly.")]
+    united = [one for one in stated if kinds[one.path] is KINDS["length"] and _literal_unit(one.quantity)]
+    found: dict[str, Kind] = {}
+    for one in stated:
+        kind = kinds[one.path]
+        if kind in MEANT and (kind.name != "speed" or one.path.startswith("drivers.")) and one.path in numbers.nominal:
+            found |= {path: kind for path in _plain(mechanism, one) if path == one.path or _is_one(path, one, kind)}
+    lengths = [path for path, kind in found.items() if kind is KINDS["length"]]
+    return found if len(united) > len(lengths) else {}
+
+
+def _is_one(path: str, entry: Entry, kind: Kind) -> bool:
+    """Whether a dimension measures what the entry does that speaks of it: as a plain factor it makes no sense there."""
+    name = path.removeprefix("dimensions.")
+    try:
+        entry.quantity.check({one: NUMBER if one == name else None for one in entry.quantity.names}, kind)
+    except UnitError:
+        return name in entry.quantity.names
+    return False
+
+
+def _literal_unit(quantity: Quantity) -> str:
+    literal = quantity.expression.literal if quantity.expression else None
+    return literal.unit if literal else ""
 
 
 def _plain(mechanism: Numbers, entry: Entry) -> list[str]:
@@ -60,11 +106,11 @@ def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Find
     """A warning of a number without a unit, for one that the model states with a unit, if it is nearer to that number
     as it is written than to its value in SI."""
     entry, before = numbers.entries.get(path), float(numbers.nominal.get(path, math.nan))
-    literal = entry.quantity.expression.literal if entry and entry.quantity.expression else None
-    if entry is None or literal is None or not literal.unit or not value * before > 0:
+    own = _literal_unit(entry.quantity) if entry else ""
+    if not own or not value * before > 0:
         return
-    factor = unit(literal.unit)[0]
+    factor = unit(own)[0]
     written = before / float(factor)
     if abs(math.log(value / written)) < abs(math.log(value / before)):
-        what = f"{value:g} is in SI units, where the model states {written:g} {literal.unit}: a unit forgotten?"
-        yield Finding(what, path, f"write {value:g}{literal.unit}", Severity.WARNING)
+        what = f"{value:g} is in SI units, where the model states {written:g} {own}: a unit forgotten?"
+        yield Finding(what, path, f"write {value:g}{own}", Severity.WARNING)

@@ -69,8 +69,9 @@ def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
     if joint.guide and joint.guide.height is not None and joint.contact is None:
         what = "the height of a guide is not used where it is not in play"
         yield Finding(what, f"{where}.guide.height", "remove it, or state a contact", Severity.NOTE)
-    if joint.friction is None:
-        return
+    coefficient = joint.friction and joint.friction.parameters.get("coefficient")
+    if joint.friction is None or (coefficient and not {"off", "none"}.isdisjoint(coefficient.names)):
+        return  # none is stated, or none is meant: see `loads.unknown_name`
     if not turns and not slides:
         what = f"friction of a {kind} joint is not modelled"
         reason = (

@@ -42,6 +42,7 @@ def check_values(
     """
     values = numbers.nominal
     yield from _each(numbers, numbers.entries if changed is None else changed)
+    yield from _unfollowed(numbers) if changed is None else ()
     parts = None if changed is None else {tuple(path.split(".", 2)[:2]) for path in changed}
 
     def among(section: str, names: Iterable[str]) -> Iterator[str]:
@@ -67,6 +68,15 @@ def check_values(
         yield from _directions(mechanism, values)
         yield from direction_values(mechanism, values)
         yield from _sides(mechanism, values)
+
+
+def _unfollowed(numbers: ParameterSet) -> Iterator[Finding]:
+    """Defaults without effect, as a clearance of pins that all have a fit."""
+    followed = {one.alias for one in numbers.entries.values()}
+    for path in numbers.entries:
+        if path.startswith("joint_defaults.") and path not in followed:
+            remedy = "remove it, or state it in the joints"
+            yield Finding("has no effect: no joint follows it", path, remedy, Severity.NOTE)
 
 
 def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:

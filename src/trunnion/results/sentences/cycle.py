@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from trunnion.errors import agreeing
-from trunnion.results.quantities import between
+from trunnion.results.quantities import between, readable
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["CYCLE"]
@@ -119,6 +119,11 @@ CYCLE: dict[str, Sentence] = {
     "load.drives": Sentence(
         WARNING, "this resistance is negative {at}: it drives the joint", "use max(0 N, …), or a load with a sign"
     ),
+    "load.no_power": Sentence(
+        WARNING,
+        "{loads} {count:#is/are} useful, but {count:#takes/take} no power at any position",
+        "check its size and where it acts, or that its joint moves in the sense of only: …",
+    ),
     "load.not_counted": Sentence(
         NOTE,
         "beside the drive, which supplies {drive:~J}, this load supplies {work:~J} over the cycle; the efficiency does "
@@ -142,6 +147,14 @@ CYCLE: dict[str, Sentence] = {
         WARNING,
         "its torque jumps at {at}, where its angle passes half a turn from the free angle",
         "whole turns are not counted in this joint",
+    ),
+    "spring.never_acts": Sentence(
+        WARNING,
+        lambda only, free, nearest: (
+            f"never acts: its {'longest' if only == 'pull' else 'shortest'} length is {readable(nearest, 'm')}, its "
+            f"free length {readable(free, 'm')}, and it can only {only}"
+        ),
+        "move its ends, or change its free length or the motion, if it is to act",
     ),
     "position.singular": Sentence(
         ERROR,
@@ -212,7 +225,7 @@ CYCLE: dict[str, Sentence] = {
     "seat.unsettled": Sentence(
         WARNING,
         "the seat did not converge in {rounds} iterations {at}: it still changes by {change:.2g} times the clearance, "
-        "because the load depends more on the seat than its own size",
+        "for the load turns as the pin moves: as of work that is touched with the pin on one side of its hole alone",
         "the pin floats there: treat it as loss of contact",
     ),
     "seat.held": Sentence(

@@ -85,6 +85,7 @@ PLAY = {
         "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
         "drive the joint that is driven in the machine",
     ),
+    "play.no_effect_there": Sentence(NOTE, "the play of {joints} has no effect on {measure} at {at}"),
     "play.held": Sentence(
         NOTE,
         lambda joints, measure, holding: (

@@ -53,7 +53,7 @@ from trunnion.studies.play.result import dataset, relied_on
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
+__all__ = ["IDLE", "Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
 
 CHUNK = 4096  # positions at a time
 EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
@@ -431,8 +431,14 @@ def _idle(run: Run, effect: Effect) -> Iterator[Finding]:
         idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= IDLE * max(largest)]
         if not idle:
             continue
+        if len(effect.time) == 1:  # elsewhere it may have some
+            at = run.system.dial(run.values, effect.time).at(0)
+            yield finding_for(
+                "play.no_effect_there", f"measures.{measure.name}", joints=idle, measure=measure.name, at=at
+            )
+            continue
         known = course[np.isfinite(course)]
-        if len(known) > 1 and np.ptp(known) <= IDLE * max(float(np.max(np.abs(known))), 1.0):
+        if len(known) and np.ptp(known) <= IDLE * max(float(np.max(np.abs(known))), 1.0):
             holding = [joint for joint in effect.plays if joint not in idle]
             yield finding_for(
                 "play.held", f"measures.{measure.name}", joints=idle, measure=measure.name, holding=holding

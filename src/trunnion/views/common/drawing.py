@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +29,8 @@ class Picture:
     """What is needed to draw a result at any position: its layout, tracks of points, angles of links, a size.
 
     tracks: "link.point" → (axis, position) m; angles: link → (position,) rad; size: diagonal of all of it, m.
-    weight: of lines, 1 in a figure of its own; only: links that have a colour, all if none is named.
+    weight: of lines, 1 in a figure of its own; only: links that have a colour, all if none is named; pulls: spring →
+    (position,) N or N m, 0 where one that acts one way does not act.
     """
 
     stated: dict[str, Any]
@@ -39,6 +40,7 @@ class Picture:
     box: tuple[float, float, float, float]
     weight: float = 1.0
     only: tuple[str, ...] = ()
+    pulls: dict[str, Array | None] = field(default_factory=dict)
 
     @property
     def letters(self) -> float:
@@ -78,7 +80,8 @@ def picture(result: xr.Dataset) -> Picture:
     tracks = {key: _track(result, key) for key in names(result, "point")}
     angles = {link: column(result, "link_angle", link=link) for link in names(result, "link")}
     known = {link: angle for link, angle in angles.items() if angle is not None}
-    return framed(layout(result), tracks, known)
+    pulls = {name: column(result, "spring_force", spring=name) for name in names(result, "spring")}
+    return replace(framed(layout(result), tracks, known), pulls=pulls)
 
 
 def framed(stated: dict[str, Any], tracks: dict[str, Array], angles: dict[str, Array]) -> Picture:
@@ -117,8 +120,8 @@ def sketch(axes: Axes, shown: Picture, index: int) -> None:
     _curves(axes, shown)
     for link in sorted(shown.moving, key=lambda link: link in shown.only):  # what is spoken of lies above
         _body(axes, shown, link, index, shown.colour(link))
-    for spring in shown.stated["springs"].values():
-        _spring(axes, shown, spring.get("between") or (), index)
+    for name, spring in shown.stated["springs"].items():
+        _spring(axes, shown, spring.get("between") or (), index, shown.pulls.get(name))
     for pair in shown.stated["gears"].values():
         for circle in pair:
             _pitch_circle(axes, shown.tracks[circle["at"]][:, index], circle["radius"])
@@ -212,15 +215,16 @@ def tint(colour: str, share: float = 0.28) -> str:
 COILS = np.array([[0.0, 0.18, *np.linspace(0.2, 0.8, 16), 0.82, 1.0], [0, 0, *np.tile([1.0, -1.0], 8), 0, 0]])
 
 
-def _spring(axes: Axes, shown: Picture, ends: Sequence[str], index: int) -> None:
-    """A zigzag between the ends of a spring."""
+def _spring(axes: Axes, shown: Picture, ends: Sequence[str], index: int, pull: Array | None) -> None:
+    """A zigzag between the ends of a spring, dotted where it does not act."""
     places = [shown.tracks[end][:, index] for end in ends if end in shown.tracks]
     if len(places) < 2 or not np.isfinite(places).all():
         return
     along = places[1] - places[0]
     across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * 0.012 * shown.size
     path = places[0][:, None] + np.outer(along, COILS[0]) + np.outer(across, COILS[1])
-    axes.plot(*path, color=MUTED, linewidth=1.1, zorder=4.5, solid_joinstyle="round")
+    line = ":" if pull is not None and pull[index] == 0 else "-"
+    axes.plot(*path, color=MUTED, linewidth=1.1, linestyle=line, zorder=4.5, solid_joinstyle="round")
 
 
 def _pitch_circle(axes: Axes, place: Array, radius: float) -> None:

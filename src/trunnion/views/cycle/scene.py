@@ -68,7 +68,7 @@ def scene(
         "links": _links(stated, kept, points),
         "joints": _joints(stated, kept, other),
         "loads": _loads(stated, points),
-        "springs": _springs(stated, points),
+        "springs": _springs(kept, stated, points),
         "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
         "drivers": _drivers(kept, other, stated),
         "sums": {name: series(column(kept, name)) for name in SUMS if name in kept and not (steady and name in DRIVEN)},
@@ -164,10 +164,14 @@ def _loads(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any
     return rows
 
 
-def _springs(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
-    """Springs between two known points."""
+def _springs(result: xr.Dataset, stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
+    """Springs between two known points, with their pull."""
     ends = {name: spring.get("between") or () for name, spring in stated["springs"].items()}
-    return [{"name": name, "ends": list(two)} for name, two in ends.items() if two and set(two) <= points.keys()]
+    return [
+        {"name": name, "ends": list(two), "pull": series(column(result, "spring_force", spring=name))}
+        for name, two in ends.items()
+        if two and set(two) <= points.keys()
+    ]
 
 
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:

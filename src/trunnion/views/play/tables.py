@@ -9,6 +9,7 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import quantity
 from trunnion.studies.play.result import relied_on
+from trunnion.studies.play.study import IDLE
 from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.table import TextTable
 
@@ -42,7 +43,7 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTabl
         effect = effects[j]
         where = over.say(int(np.nanargmax(effect))) if np.nanmax(effect) > 0 else "—"
         share = f"{100 * effect[top] / total[top]:.1f} %" if total[top] > 0 else "—"
-        rows.append([str(joint), _play(result, j), quantity(float(np.nanmax(effect)), unit), where, share])
+        rows.append([str(joint), _play(result, j), _size(np.nanmax(effect), total[top], unit), where, share])
     for label, key in zip(SUMS, ("worst_case_total", "rss", "deviation_total"), strict=True):
         row = _relied_on(result, key)
         best = int(np.nanargmax(row))
@@ -63,11 +64,16 @@ def _table_there(result: xr.Dataset, name: str, unit: str, word: str, where: str
     total, rows = float(np.sum(effects)), list[list[str]]()
     for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
         share = f"{100 * effect / total:.1f} %" if total > 0 else "—"
-        rows.append([str(joint), _play(result, j), quantity(float(effect), unit), where, share])
+        rows.append([str(joint), _play(result, j), _size(effect, total, unit), where, share])
     sums = total, np.sqrt(np.sum(effects**2)), np.sqrt(np.sum(deviations**2))
     for label, number in zip(SUMS, sums, strict=True):
         rows.append([label, "", quantity(float(number), unit), where, ""])
     return TextTable(f"{name}: the {word}, at {where}", ["joint", "play", "effect ±", "at", "share"], rows)
+
+
+def _size(effect: float, total: float, unit: str) -> str:
+    """One effect; what is no more than rounding of them all is 0."""
+    return quantity(float(effect) if effect > IDLE * total else 0.0, unit)
 
 
 def _relied_on(result: xr.Dataset, name: str) -> Array:

@@ -125,8 +125,9 @@ function build(view) {
       .filter((link) => !link.ground)
       .flatMap((link) => link.free.map((key) => freePoint(key, link.name))),
     loads: loadsOf(scene),
-    springs: scene.springs.map(({ name, ends }) => ({
+    springs: scene.springs.map(({ name, ends, pull = [] }) => ({
       ends,
+      pull,
       node: svg("path", { class: "spring" }, svg("title", {}, name)),
     })),
     gears: scene.gears.map(({ name, at: key, radius }) => ({
@@ -362,7 +363,10 @@ function pose(view) {
     one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed));
     poseLoad(one, spotsOf(view, one.keys), frame);
   });
-  parts.springs.forEach((one) => set(one.node, { d: coil(spotsOf(view, one.ends)) }));
+  parts.springs.forEach((one) => {
+    const acts = at(one.pull, view.posed) !== 0; // one that acts one way does not everywhere
+    set(one.node, { d: coil(spotsOf(view, one.ends)), "stroke-dasharray": acts ? "none" : "2 3" });
+  });
   parts.gears.forEach((one) => {
     moveTo(one.node, spotOf(view, one.key));
     set(one.node, { r: one.radius * frame.scale });

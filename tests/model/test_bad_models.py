@@ -233,7 +233,7 @@ def test_a_motor_stated_by_its_power_is_told_what_to_state() -> None:
     with pytest.raises(MechanismError) as error:
         Mechanism(**data)
     (found,) = (one for one in error.value.findings if one.where.endswith("motor.power"))
-    assert "did you mean 'breakdown_effort'" in found.remedy
+    assert "breakdown_effort = k P" in found.remedy
 
 
 def test_doubts_are_kept_apart_from_errors(findings_of: FindingsOf, tmp_path) -> None:  # type: ignore[no-untyped-def]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -75,19 +76,13 @@ def simulate(
     from trunnion.dynamics.opened import in_play
     from trunnion.dynamics.simulate import simulated
     from trunnion.dynamics.steady_cycle import UnsteadyError
-    from trunnion.results.tables import check_table
 
     of = "cycle" if steady else "motion"
     check_files(out or [], report, of=of, kind=kind if out else None)
     duration, step = seconds(time, "--time", "2s"), seconds(impact_step, "--impact-step", "1us")
     mechanism = stated(file, set_, table, friction)
     if not in_play(mechanism):
-        for path in out or []:
-            check_table(path, of, in_play=False)
-        if kind and out:
-            from trunnion.views.motion.contacts import check_kind
-
-            check_kind(kind, in_play=False)
+        _check_without_play(out or [], of, kind)
     with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
 
         def told(reached: float) -> None:
@@ -100,3 +95,15 @@ def simulate(
             say(placed(none.findings, file, ["drivers"]))
             raise typer.Exit(exit_status(none.findings)) from None
     Shown(result, file, ["drivers"], out or [], report, units_row, drawn={"kind": kind}, units=units).finish()
+
+
+def _check_without_play(out: list[Path], of: str, kind: str | None) -> None:
+    """MechanismError for a table or figure of contacts, of which there are none without joints in play."""
+    from trunnion.results.tables import check_table
+
+    for path in out:
+        check_table(path, of, in_play=False)
+    if kind and out:
+        from trunnion.views.motion.contacts import check_kind
+
+        check_kind(kind, in_play=False)

@@ -18,12 +18,8 @@ MEANT = {
     "gauss": "normal",
     "gaussian": "normal",
     "diameter": "radius",
-    "power": "breakdown_effort",
 }
-REMARKS = {
-    "radius": ", half the diameter",
-    "breakdown_effort": ", some 2.5 times the rated power over the rated speed in rad/s",
-}
+REMARKS = {"radius": ", half the diameter"}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
 
 

@@ -363,7 +363,7 @@ ALLOCATION = {
     ),
     "allocation.dearer": Sentence(
         ERROR,
-        "the tolerances as stated cost {before:.6g}, less than the {cost:.6g} of those found, and they meet the limits too",
+        "the tolerances as stated cost {before:.6g}, less than the {cost:.6g} of those found, and meet the limits too",
         "keep them as stated",
     ),
     "allocation.worst_case_beyond": Sentence(

@@ -108,17 +108,9 @@ def allocate(
     if samples and found.answer.found:
         methods.append("monte-carlo")
     known = tolerance(
-        with_them,
-        names,
-        methods,
-        max(samples, 1),
-        seed,
-        steps,
-        at,
-        friction_method=friction_method,
-        jobs=jobs,
-        progress=progress,
-    )
+        with_them, names, methods, max(samples, 1), seed, steps, at,
+        friction_method=friction_method, jobs=jobs, progress=progress,
+    )  # fmt: skip
     return dataset(found, known)
 
 

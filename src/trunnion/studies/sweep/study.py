@@ -67,10 +67,7 @@ def sweep(
     any point), none or more than MOST_POINTS of them, or a structure that does not determine the motion.
     """
     points = Points(mechanism, grid(mechanism, over), steps, friction_method or FrictionMethod(), margin, engine)
-    labels: dict[str, list[str]] = {
-        "driver": list(mechanism.drivers),
-        "joint": list(mechanism.effective_joints),
-    }
+    labels = {"driver": list(mechanism.drivers), "joint": list(mechanism.effective_joints)}
     sizes = {dim: len(names) for dim, names in labels.items()} | {one.name: len(one.values) for one in points.swept}
     arrays = {
         name: one.over(*(swept.name for swept in points.swept)).blank(sizes)
@@ -91,19 +88,24 @@ def sweep(
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
     first = say(points.swept, (0,) * len(points.shape))
     found += (replace(one, what=f"at {first} {one.what}") for one in points.jumps)
-    numbers, plain = mechanism.parameter_set, [one for one in points.swept if not one.written]
-    bare = [finding for one in plain for finding in bare_number(numbers, one.path, float(one.values[-1]))]
-    found = [*(one for one in found if one.where not in {own.where for own in bare}), *bare]
+    found = _with_bare(mechanism, points.swept, found)
     found += _not_steady(points, watched.values(), arrays)
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
-    of_errors = () if points.erring else (name for name, one in FIGURES.items() if one.part == "errors")
-    for name in of_errors:
-        arrays.pop(name, None)
+    if not points.erring:
+        of_errors = {name for name, one in FIGURES.items() if one.part == "errors"}
+        arrays = {name: array for name, array in arrays.items() if name not in of_errors}
     figures = FIGURES | {
         name: Variable((), one.figure_unit(points.run.system, points.run.values), f"measure {name}")
         for name, one in watched.items()
     }
     return _dataset(points, labels, arrays, found, figures)
+
+
+def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], found: list[Finding]) -> list[Finding]:
+    """The findings, with those of plain numbers where the model states a unit in place of others of the same number."""
+    numbers, plain = mechanism.parameter_set, [one for one in swept if not one.written]
+    bare = [finding for one in plain for finding in bare_number(numbers, one.path, float(one.values[-1]))]
+    return [*(one for one in found if one.where not in {own.where for own in bare}), *bare]
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------

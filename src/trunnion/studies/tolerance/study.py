@@ -78,18 +78,17 @@ def tolerance(
     """
     (methods, notes), stated = _known(methods), engine
     _check(methods, samples, seed, engine, target)
-    if engine == "gpu" and cluster is None:
-        device()  # that there is one is known before anything takes time
+    if engine == "gpu" and cluster is None:  # that there is one is known before anything takes time
+        device()
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
     job, tally, shares, stopped = None, None, None, False
-    method = next((one for one in methods if one in SAMPLINGS), None)
-    if method is not None:
+    if (method := next((one for one in methods if one in SAMPLINGS), None)) is not None:
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
-        alone = job.samples * job.positions < FEW and cluster is None
-        jobs = 1 if jobs is None and (alone or engine == "jax") else jobs
-        jobs = FEEDERS if jobs is None and engine == "gpu" else jobs
+        if jobs is None:
+            alone = job.samples * job.positions < FEW and cluster is None
+            jobs = 1 if alone or engine == "jax" else FEEDERS if engine == "gpu" else None
         ran = runner.run(
             job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
             threads=engine in ("compiled", "gpu"),

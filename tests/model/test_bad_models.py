@@ -54,7 +54,7 @@ CASES = [
     ("mass: 4.8 kg", "mass: 1 kg * (AB / (AB - AB))", 11, "links.crank.mass", "no finite value (inf)", "divisions"),
     ("mass: 4.8 kg", "mass: -1 kg", 11, "links.crank.mass", "is -1, which is negative", "at least 0"),
     ("inertia: 2 kg m^2", "inertia: -2", 14, "links.coupler.inertia", "negative", "unit"),
-    ("[AB, 0]", "[ABC, 0]", 10, "links.crank.points.B.x", "'ABC', which is not one of the dim", "'AB'"),
+    ("[AB, 0]", "[ABC, 0]", 10, "links.crank.points.B.x", "'ABC' is not one of the dim", "'AB'"),
     ("[AB, 0]", "[AB + 3, 0]", 10, "links.crank.points.B.x", "a length and a number are added", "3 mm"),
     ("AB: 2 m", "AB: 2 m + BC", 4, "dimensions.AB", "'BC', which is not one", "known: 'AB', 'AD'"),
     ("AB: 2 m", "AB: 2 * AB", 4, "dimensions.AB", "is defined by itself: AB → AB", "a value"),

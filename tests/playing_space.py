@@ -224,7 +224,7 @@ def own_shaft(times: Array) -> Dropped:
     while time < times[-1]:
         events = [of(k, k not in onsets) for k in range(4)]
         found = solve_ivp(rate, (time, times[-1]), y, "DOP853", events=events, args=(onsets,), rtol=1e-12, atol=1e-15,
-                          dense_output=True, max_step=2e-5 if onsets else np.inf)  # fmt: skip
+                          dense_output=True, max_step=2e-5 if onsets else 1e-4)  # fmt: skip
         inside = times[(times >= time) & (times < found.t[-1] if found.status else times <= found.t[-1])]
         states += [found.sol(inside)] if len(inside) else []
         time, y = float(found.t[-1]), found.y[:, -1]

@@ -176,5 +176,5 @@ def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch:
     figures = {one.name: one for one in analyse(Mechanism(**model), steps=36).trunnion.summary}
     for name in ("efficiency", "efficiency_error", "friction_power_mean"):
         assert (figures[name].value is not None) == known
-    assert ("pins do not settle where" in figures["efficiency"].note) != known
+    assert ("pins do not settle" in figures["efficiency"].note) != known
     assert figures["efficiency_ideal"].value is not None

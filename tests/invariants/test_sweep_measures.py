@@ -46,7 +46,8 @@ def test_each_point_is_an_analysis_of_its_own(space: str) -> None:
         mean = float(one["drive_power_mean"]) / speed
         assert float(result["mean:effort:A"][k]) == pytest.approx(mean, abs=1e-5 * rms)
         assert float(result["least"][k]) <= float(effort.min())
-        assert float(result["least"][k]) == pytest.approx(float(effort.min()), rel=2e-2)
+        many = trunnion.analyse(mechanism.with_values({**start, swept: value}), 2000 * STEPS)["drive_effort"]
+        assert float(result["least"][k]) == pytest.approx(float(many.min()), rel=2e-3, abs=2e-4 * float(many.max()))
         apart = float(result["there"][k]) - turned[STEPS // 6]
         assert np.sin(apart / 2) == pytest.approx(0, abs=1e-9)
         assert float(result["swing"][k]) == pytest.approx(np.ptp(np.unwrap(turned)), rel=1e-2)
@@ -99,7 +100,7 @@ def test_on_the_command_line(program: Run, tmp_path: Path) -> None:  # noqa: F81
     done = program("sweep", path, "--over", "AB=1.9m:2m:2", "--steps", 24, "--measure", "swing",
                    "--measure", "maximum:effort:A", "--out", "a.csv", "--out", "a.nc")  # fmt: skip
     assert done.code in (0, 1), done.err
-    assert "swing [rad]" in done.out
+    assert "swing [deg]" in done.out
     head = (tmp_path / "a.csv").read_text("utf-8").splitlines()[0].split(",")
     assert {"swing", "maximum:effort:A"} <= set(head)
     done = program("sweep", path, "--over", "AB=1.9m:2m:2", "--measure", "swings")

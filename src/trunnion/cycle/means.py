@@ -26,7 +26,7 @@ Powers = Callable[[Rows, Array], Mapping[str, Array]]
 
 # what `Powers` has of each lane and node, NaN where there is no answer
 AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
-SUPPOSED = "supposed_power"  # and may have: power through the drivers, W, where that of another mechanism stands in
+SUPPOSED = "supposed_power"  # and may have, W: by how much that through the drivers differs from what stands in for it
 MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
 NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
@@ -51,8 +51,8 @@ class Means:
     """Means over one cycle, W; NaN where any place of it has no answer.
 
     drive_power: of all drivers; useful_power: that the useful loads take; friction_power: lost in all joints;
-    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N; supposed: share of
-    the power through the drivers that flows where another mechanism stands in (`SUPPOSED`).
+    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N; supposed: share
+    of the power through the drivers by which it differs from that which stands in for it (`SUPPOSED`).
     """
 
     drive_power: Mean

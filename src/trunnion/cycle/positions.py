@@ -170,8 +170,10 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> 
             return powers
         # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows in a short one
         meant = _powers(run.ideal(time.ravel(), method=method), time)
+        driven, supposed = (np.sum(one["drive_power"], axis=0) for one in (powers, meant))
+        apart = np.where(np.isfinite(driven), np.abs(supposed - driven), np.abs(supposed))
         powers = {name: np.where(valid, array, meant[name]) for name, array in powers.items()}
-        return {**powers, SUPPOSED: np.where(valid, 0.0, np.abs(np.sum(meant["drive_power"], axis=0)))}
+        return {**powers, SUPPOSED: np.where(valid, 0.0, apart)}
 
     between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
     means = means_of(of, seated, between, SEATED)[0]

@@ -443,7 +443,7 @@ def _why(means: Means, arrays: Arrays) -> str:
     if np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return "not every position is solved"
     if means.supposed > MOST_SUPPOSED:
-        return f"pins do not settle where {means.supposed:.0%} of the work flows"
+        return f"pins do not settle, which may change {means.supposed:.0%} of the work"
     if not np.isfinite(means.drive_power.value):
         return "not every position between the steps is solved"
     if means.drive_power.net < 0:

@@ -28,6 +28,10 @@ Look = Callable[[Array], Array]  # from times in the cycle, s, to the course the
 SIGNS = {"maximum": (1.0,), "minimum": (-1.0,), "largest": (1.0, -1.0), "peak-to-peak": (1.0, -1.0)}
 ROUNDS, PLACES = 12, 9  # of the places in a round the next one takes the two gaps about the best
 BESIDE, ALIKE = 3.5, 1e-6  # steps that a polynomial reaches; of the range of a course: what it may be off
+TOPS, NEAR = (
+    3,
+    0.02,
+)  # positions that are looked about, and of the range of a course what they may be lower than the best
 FEWEST = 8  # positions from which the shape of a course is known
 
 
@@ -79,20 +83,33 @@ def extreme(known: Reference, course: Array, look: Look) -> Array:
 
 
 def _highest(known: Reference, course: Array, look: Look, sign: float) -> Array:
-    """The largest value of each row, times a sign."""
-    time, period, last = known.window.time, known.window.period, course.shape[-1] - 1
+    """The largest value of each row, times a sign: about its highest positions that are no neighbours."""
+    signed = sign * np.where(np.isnan(course), -sign * np.inf, course)
+    rows, last = np.arange(len(course)), course.shape[-1] - 1
+    best, near = np.max(sign * course, axis=-1), NEAR * np.ptp(known.parts[0])  # NaN stays
+    for _ in range(TOPS):
+        top = np.argmax(signed, axis=-1)
+        if not np.any(signed[rows, top] > best - near):
+            break
+        best = np.maximum(best, _about(known, top, look, sign))
+        for beside in (top - 1, top, top + 1):
+            signed[rows, beside % (last + 1) if known.window.period is not None else np.clip(beside, 0, last)] = -np.inf
+    return np.asarray(best)
+
+
+def _about(known: Reference, top: NDArray[np.intp], look: Look, sign: float) -> Array:
+    """The largest value of each row in the gaps beside a position, times a sign."""
+    time, period = known.window.time, known.window.period
     gaps = np.diff(time, append=time[-1] if period is None else time[0] + period)
-    signed = sign * course
-    top, rows = np.argmax(np.nan_to_num(signed, nan=-np.inf), axis=-1), np.arange(len(course))
-    best, low, high = np.max(signed, axis=-1), time[top] - gaps[top - 1], time[top] + gaps[top]
+    rows, best = np.arange(len(top)), np.full(len(top), -np.inf)
+    low, high = time[top] - gaps[top - 1], time[top] + gaps[top]
     if period is None:
-        low, high = np.where(top == 0, time[0], low), np.where(top == last, time[-1], high)
+        low, high = np.where(top == 0, time[0], low), np.where(top == len(time) - 1, time[-1], high)
     shares = np.linspace(0.0, 1.0, PLACES)
     for _ in range(ROUNDS):
         places = low[:, None] + (high - low)[:, None] * shares
-        found = sign * look(places if period is None else places % period)
-        found = np.nan_to_num(found, nan=-np.inf)
+        found = np.nan_to_num(sign * look(places if period is None else places % period), nan=-np.inf)
         most = np.argmax(found, axis=-1)
-        best = np.maximum(best, np.max(found, axis=-1))  # NaN stays
+        best = np.maximum(best, np.max(found, axis=-1))
         low, high = places[rows, np.maximum(most - 1, 0)], places[rows, np.minimum(most + 1, PLACES - 1)]
-    return np.asarray(best)
+    return best

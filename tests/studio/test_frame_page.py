@@ -28,6 +28,8 @@ from trunnion.model.mechanism import Mechanism
 ROOT = Path(__file__).resolve().parents[2]
 FOURBAR = (ROOT / "examples" / "durango-fourbar.yaml").read_text("utf-8")
 MOST_GIF = 3.0  # s
+ALL_BOXES = """(kinds) => kinds.map((kind) =>
+    [...document.querySelectorAll(kind)].map((one) => one.getBoundingClientRect().toJSON()))"""
 
 CUT_OFF = """[...document.querySelectorAll("button, select, input:not([type=checkbox]), summary")]
   .filter((one) => one.offsetParent && !one.closest(".panel .body, .tools"))
@@ -119,9 +121,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.wait_for_selector(".laid")
         for index in range(0, 360, 15):
             user.state(f"s.index.value = {index}")
-            boxes = [
-                [one.bounding_box() for one in user.page.locator(kind).all()] for kind in (".laid", ".sheet .load text")
-            ]
+            boxes = user.page.evaluate(ALL_BOXES, [".laid", ".sheet .load text"])  # of one picture
             assert all(boxes)
             for one, two in itertools.product(*boxes):
                 wide, high = (

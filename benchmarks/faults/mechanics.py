@@ -376,7 +376,7 @@ _DYNAMICS = (
         "dynamics/energy.py",
         "found = found - 0.5 * algebra.power",
         "found = found - algebra.power",
-        ("tests/reference/test_motion_in_time.py", "-k", "books"),
+        ("tests/reference/test_energy_account.py", "-k", "works_and_energies"),
     ),
     Fault(
         "inertia-of-the-other-sign-in-tables",

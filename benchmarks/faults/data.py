@@ -121,8 +121,8 @@ _RIG = (
     Fault(
         "scatter-of-a-population",
         "rig/reading/measurement.py",
-        "np.nanstd(self.turns, axis=0, ddof=1)",
-        "np.nanstd(self.turns, axis=0)",
+        "np.nanstd(turns, axis=0, ddof=1)",
+        "np.nanstd(turns, axis=0)",
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or freedom or scatter or turns"),
     ),
     Fault(

@@ -218,8 +218,8 @@ _CYCLE = (
     Fault(
         "mean-effort-for-rms",
         "cycle/means.py",
-        "efforts = np.sqrt(value[4 : 4 + drivers])",
-        "efforts = value[4 : 4 + drivers]",
+        "np.sqrt(value[4 : 4 + drivers])",
+        "value[4 : 4 + drivers]",
         ("tests/reference/test_means.py",),
     ),
     Fault(

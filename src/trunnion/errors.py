@@ -62,10 +62,17 @@ class Finding:
         """The same finding with its place in a file."""
         return replace(self, file=file, line=line)
 
+    @property
+    def kind_of_part(self) -> str:
+        """What `joints.A` is, joint, where the sentence begins with A itself; nothing elsewhere."""
+        section, _, name = self.where.partition(".")
+        named = name and self.what.startswith(f"{name} ")
+        return (section if "," in name else section.removesuffix("s")) if named else ""
+
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line) if part)
         head = " ".join(part for part in (f"{place}:" if place else "", f"{self.severity}:") if part)
-        subject = f"{self.where}: " if self.where else ""
+        subject = f"{self.kind_of_part} " if self.kind_of_part else f"{self.where}: " if self.where else ""
         remedy = f" — {self.remedy}" if self.remedy else ""
         return f"{head} {subject}{self.what}{remedy}"
 

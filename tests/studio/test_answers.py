@@ -368,3 +368,4 @@ def test_files(what):
     assert found["name"].startswith("Four-bar-of-Durango")
     if what == "csv":
         assert found["bytes"].count(b"\n") == 37
+        assert b",A.effort [N m]," in found["bytes"].split(b"\n")[0]

@@ -52,11 +52,13 @@ BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measuremen
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
 
-def frame(result: xr.Dataset, table: str = "") -> pd.DataFrame:
-    """The flat columns of a table, the first if none is named."""
+def frame(result: xr.Dataset, table: str = "", units: str = "si") -> pd.DataFrame:
+    """The flat columns of a table, the first if none is named; units as for `save`."""
     import pandas as pd
 
-    return pd.DataFrame({name: values(slice(None)) for name, _, values in flat_columns(result, table)})
+    found = flat_columns(result, table)
+    found = in_model_units(result, found) if units == "model" else found
+    return pd.DataFrame({name: values(slice(None)) for name, _, values in found})
 
 
 def frames(found: Sequence[Column]) -> Iterator[pd.DataFrame]:

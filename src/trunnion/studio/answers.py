@@ -156,10 +156,7 @@ def _model(asked: Asked) -> dict[str, Any]:
 
 
 def _row(one: Finding) -> dict[str, Any]:
-    section, _, name = one.where.partition(".")
-    place = spoken(one.where)
-    if name and one.what.startswith(f"{name} "):  # what it is about is said once
-        place = section if "," in name else section.removesuffix("s")
+    place = one.kind_of_part or spoken(one.where)
     own = {"severity": one.severity.value, "place": place, "remedy": remedied(one.remedy)}
     return own | {key: getattr(one, key) for key in ("code", "what", "where", "line")}
 

@@ -36,7 +36,7 @@ def _result(state: Loaded, steps: int) -> xr.Dataset:
 def _csv(state: Loaded, steps: int) -> bytes:
     from trunnion.results.export import frame
 
-    text: str = frame(_result(state, steps)).to_csv(index=False, lineterminator="\n")
+    text: str = frame(_result(state, steps), units="model").to_csv(index=False, lineterminator="\n")
     return text.encode()
 
 
@@ -106,7 +106,7 @@ def _script(state: Loaded, steps: int) -> bytes:
         "mechanism = trunnion.read(path)",
         f"result = trunnion.analyse(mechanism, steps={steps})",
         "print(result.trunnion)",
-        'trunnion.save(result, "result.csv")',
+        'trunnion.save(result, "result.csv", units="model")',
         "",
     ]
     return "\n".join(lines).encode()

@@ -125,7 +125,8 @@ def _svg(figure: Drawing, salt: str) -> str:
 def _findings(findings: Iterable[Finding]) -> str:
     rows = []
     for one in findings:
-        where = f"{one.kind_of_part} " if one.kind_of_part else f"<code>{escape(one.where)}</code> " if one.where else ""
+        where = f"<code>{escape(one.where)}</code> " if one.where else ""
+        where = f"{one.kind_of_part} " if one.kind_of_part else where
         remedy = f" — {with_code(one.remedy)}" if one.remedy else ""
         severity = str(one.severity)
         head = f'<b style="color:{COLOURS.get(severity, "inherit")}">{escape(severity)}</b>'

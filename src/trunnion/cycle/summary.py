@@ -96,7 +96,7 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
-    measured = watched(run, time, method, arrays["status"])
+    measured = watched(run, time, method, arrays["status"], found_positions.compiled)
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
     attributes = encoded(
         {

@@ -71,7 +71,7 @@ def written(
             time = run.cycle.times(steps, some)
             block = stretch(run, time, first.method, engine, kept.variables, tails[0], among=steps)
             block = replace(block, means=first.means, ideal=first.ideal)
-            values = values_at(run, measured.measures, time, first.method, tails[1])
+            values = values_at(run, measured.measures, time, first.method, tails[1], first.compiled)
             own = replace(measured, values=values, valid=np.ones(len(time), bool))
             powers = {name: np.maximum(row, peak(block.arrays[name])) for name, row in powers.items()}
             count += np.bincount(block.arrays["status"].astype(np.intp), minlength=len(count))

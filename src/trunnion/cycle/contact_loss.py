@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,9 +86,11 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     late = np.flatnonzero((arrays["seat_change"] > TOLERANCE) & open_)
     loaded = [seat for seat in run.seats if seat.given is None]
     least = _least_loaded(arrays["end_force"][..., late], [joints.index(one.joint) for one in loaded])
-    for seat in loaded:
+    ends = [_ends(seat, arrays["end_force"][joints.index(seat.joint)]) for seat in loaded]
+    seen = iter(_seen(run, [end for own in ends for end in own if end.peak > NO_LOAD * largest], time))
+    for seat, own in zip(loaded, ends, strict=True):
         i = joints.index(seat.joint)
-        loss = _of_joint(run, seat, arrays["end_force"][i], time, largest)
+        loss = _of_joint(run, seat, own, seen, len(time), largest)
         turns = any(len(end) > 1 for end in seat.play.model.ends)
         lifted = _lifted(arrays["end_force"][i], arrays["seat_offset"][i]) if loss.loaded else NOWHERE
         loss = replace(loss, unsettled=late[least == i], lifted=lifted, turns=turns)
@@ -227,48 +229,79 @@ def _least_loaded(forces: NDArray[np.float64], rows: Sequence[int]) -> NDArray[n
     return np.array([rows[k] for k in least], np.intp)
 
 
+class _End(NamedTuple):
+    """The load of one end of a joint, (component, position), N, and its largest size."""
+
+    seat: GivenSeat
+    number: int
+    load: NDArray[np.float64]
+    peak: float
+
+
+def _ends(seat: GivenSeat, forces: NDArray[np.float64]) -> list[_End]:
+    loads = _end_loads(seat, forces)
+    return [_End(seat, number, load, float(np.nanmax(_size(load), initial=0.0))) for number, load in loads]
+
+
 def _of_joint(
-    run: Run, seat: GivenSeat, forces: NDArray[np.float64], time: NDArray[np.float64], largest: float
+    run: Run,
+    seat: GivenSeat,
+    ends: Sequence[_End],
+    seen: Iterator[list[tuple[float, float]]],
+    count: int,
+    largest: float,
 ) -> Loss:
-    """Where the load of an end of one joint passes through zero."""
+    """Where the load of an end of one joint passes through zero. seen: the passages of each end that is pressed."""
     places: list[tuple[float, int]] = []
     least, peak = np.inf, 1.0
-    loads = list(_end_loads(seat, forces))
-    known = any(np.any(np.isfinite(load)) for _, load in loads)
-    top = max((float(np.nanmax(_size(load), initial=0.0)) for _, load in loads), default=0.0)
+    known = any(np.any(np.isfinite(end.load)) for end in ends)
+    top = max((end.peak for end in ends), default=0.0)
     if known and top <= NO_LOAD * largest:
         return Loss(seat.joint, [], 0.0, top, NOWHERE, NOWHERE, loaded=False)
-    for number, load in loads:
-        own = float(np.nanmax(_size(load), initial=0.0))
+    for _, number, _, own in ends:
         if own <= NO_LOAD * largest:
             continue  # nothing ever presses this end
         end = int(seat.play.model.ends[number][0][0]) if len(seat.play.model.ends) > 1 else 0
-        seen = _seen(run, seat, number, load, time, own)
-        for place, size in _once(seen, len(time), run.cycle.periodic):
+        for place, size in _once(next(seen), count, run.cycle.periodic):
             places.append((place, end))
             if size / own < least / peak:
                 least, peak = size, own
     return Loss(seat.joint, sorted(places), least, peak, NOWHERE, NOWHERE)
 
 
-def _seen(
-    run: Run, seat: GivenSeat, number: int, load: NDArray[np.float64], time: NDArray[np.float64], peak: float
-) -> Iterator[tuple[float, float]]:
-    """Passages of a load near zero; between wide steps those that are there when looked at closely, without play.
+def _seen(run: Run, ends: Sequence[_End], time: NDArray[np.float64]) -> list[list[tuple[float, float]]]:
+    """Passages of loads near zero; between wide steps those that are there when looked at closely, without play.
 
     How near a load comes to zero from one position to the next is not known of wide steps, only that it turns round.
     """
     step = time[1] - time[0] if len(time) > 1 else 0.0
     if step <= run.cycle.duration / CLOSE:
-        yield from _passages(load, peak, run.cycle.periodic)
-        return
-    for place, _ in _passages(load, peak, run.cycle.periodic, near=np.inf):
-        from_ = np.floor(place) - 0.25
-        times = time[0] + step * (from_ + np.arange(PARTS + 1) * FINE)
-        times = times if run.cycle.periodic else np.clip(times, 0.0, run.cycle.duration)
-        close = np.array([np.broadcast_to(part, times.shape) for part in loads_of(run.ideal(times), seat)[number]])
-        for fine, size in _passages(close, peak, periodic=False):
-            yield from_ + fine * FINE, size
+        return [list(_passages(end.load, end.peak, run.cycle.periodic)) for end in ends]
+    turns = [_passages(end.load, end.peak, run.cycle.periodic, near=np.inf) for end in ends]
+    starts = [[float(np.floor(place)) - 0.25 for place, _ in own] for own in turns]
+    places = np.array([start + np.arange(PARTS + 1) * FINE for own in starts for start in own]).ravel()
+    times = time[0] + step * places
+    close = _closely(run, ends, times if run.cycle.periodic else np.clip(times, 0.0, run.cycle.duration))
+    found: list[list[tuple[float, float]]] = []
+    parts = iter(range(0, len(times), PARTS + 1))
+    for end, load, own in zip(ends, close, starts, strict=True):
+        looked = [(start, load[:, low : low + PARTS + 1]) for start, low in zip(own, parts, strict=False)]
+        found.append([
+            (start + fine * FINE, size)
+            for start, there in looked for fine, size in _passages(there, end.peak, periodic=False)
+        ])  # fmt: skip
+    return found
+
+
+def _closely(run: Run, ends: Sequence[_End], time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Loads of ends without play at some times, all from the same walks."""
+    found: list[list[NDArray[np.float64]]] = [[np.zeros((len(end.load), 0))] for end in ends]
+    for low in range(0, len(time), CHUNK):
+        some = time[low : low + CHUNK]
+        back = run.ideal(some)
+        for own, end in zip(found, ends, strict=True):
+            own.append(_loads_at(back, end.seat, some)[end.number])
+    return [np.concatenate(own, axis=1) for own in found]
 
 
 def _once(found: Iterable[tuple[float, float]], count: int, periodic: bool) -> Iterator[tuple[float, float]]:

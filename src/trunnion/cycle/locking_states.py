@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -65,10 +66,11 @@ SHORT = {
     LockingState.SELF_LOCKING_FORWARD: "self-locking, pushed forward",
     LockingState.DRIVEN_ON: "loads drive it on",
 }
-PUSHED = (
+PUSHES = (
     LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON,
 )  # fmt: skip
 NO_MARGIN = (LockingState.LOCKED, LockingState.JAMMED, LockingState.UNSOLVED)  # these are not near locking
+PUSHED, HAS_MARGIN = np.isin(list(LockingState), PUSHES), ~np.isin(list(LockingState), NO_MARGIN)  # by code
 
 
 class LockingRange(NamedTuple):
@@ -114,15 +116,17 @@ def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float
         (beyond & held, LockingState.SELF_LOCKING_FORWARD),
         (beyond, LockingState.DRIVEN_ON),
     ]
-    found = np.select([of for of, _ in cases], [int(state) for _, state in cases], int(LockingState.RUNS))
-    return found.astype(np.int8)
+    found = np.full(len(known), int(LockingState.RUNS), np.int8)
+    for where, state in reversed(cases):
+        found[where] = int(state)
+    return found
 
 
 def in_order(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
     """`states` of the positions of a cycle in their order. Where the loads have no power at one position alone they
     turn there from backward to forward: a dead centre, which is of the state of what follows."""
     found = states(ahead, back, known, least)
-    pushes = np.isin(found, PUSHED)
+    pushes = PUSHED[found]
     alone = np.zeros(len(found), bool)
     alone[1:-1] = (found[1:-1] == LockingState.RUNS) & pushes[:-2] & pushes[2:]
     held = -ahead.delivered > (_least(back) if least is None else least)
@@ -133,21 +137,21 @@ def in_order(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: flo
 def ranges_of(state: NDArray[Any], margin: NDArray[np.float64], near: float = NEAR) -> list[LockingRange]:
     """The intervals in which the state of positions stays the same, in their order; after them those that run, but with
     a margin below `near`."""
-    runs = [LockingRange(list(LockingState)[int(state[run[0]])], *_worst(run, margin)) for run in _runs(state)]
-    close = (margin < near) & ~np.isin(state, NO_MARGIN)
-    return [*runs, *(LockingRange(None, *_worst(run, margin)) for run in _runs(close) if close[run[0]])]
+    known, states = np.where(np.isnan(margin), np.inf, margin), list(LockingState)
+
+    def worst(first: int, beyond: int) -> tuple[int, int, float, int]:
+        at = first + int(np.argmin(known[first:beyond]))
+        return first, beyond - 1, float(margin[at]), at
+
+    runs = [LockingRange(states[state[first]], *worst(first, beyond)) for first, beyond in _runs(state)]
+    close = (margin < near) & HAS_MARGIN[state]
+    return [*runs, *(LockingRange(None, *worst(first, beyond)) for first, beyond in _runs(close) if close[first])]
 
 
-def _runs(values: NDArray[Any]) -> Iterator[NDArray[np.intp]]:
-    """Numbers of consecutive positions of one value."""
-    yield from np.split(np.arange(len(values)), np.flatnonzero(np.diff(values)) + 1)
-
-
-def _worst(run: NDArray[np.intp], margin: NDArray[np.float64]) -> tuple[int, int, float, int]:
-    """First and last of some positions, their smallest margin and where it is."""
-    own = margin[run]
-    at = int(run[np.nanargmin(own)]) if np.any(np.isfinite(own)) else int(run[0])
-    return int(run[0]), int(run[-1]), float(margin[at]), at
+def _runs(values: NDArray[Any]) -> Iterator[tuple[int, int]]:
+    """Consecutive positions of one value: the first one and the one beyond."""
+    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
+    return itertools.pairwise([0, *changes.tolist(), len(values)])
 
 
 def cells(one: LockingRange, dial: Dial, near: float = NEAR, ends: Sequence[str] | None = None) -> list[str]:

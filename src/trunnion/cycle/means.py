@@ -135,13 +135,13 @@ def unknown(means: Means) -> Means:
 def still(arrays: Mapping[str, Array]) -> Means:
     """The means of a mechanism that stands, in its one position; NaN where positions have no answer."""
     alone = len(arrays["status"]) == 1 and arrays["status"][0] < Status.NOT_CONVERGED
+    driven, useful, lost, efforts = (
+        arrays[name][..., 0] + (0.0 if alone else np.nan)
+        for name in ("drive_power", "useful_power", "friction_power", "drive_effort")
+    )
 
     def of(number: Array) -> Mean:
-        value = float(number[0]) if alone else float("nan")
+        value = float(np.sum(number))
         return Mean(value, 0.0, abs(value), CANCELLED * abs(value))
 
-    lost, efforts = arrays["friction_power"], arrays["drive_effort"]
-    return Means(
-        of(np.sum(arrays["drive_power"], axis=0)), of(arrays["useful_power"]), of(np.sum(lost, axis=0)),
-        np.array([of(row).value for row in lost]), np.array([abs(of(row).value) for row in efforts]),
-    )  # fmt: skip
+    return Means(of(driven), of(useful), of(lost), lost, np.abs(efforts))

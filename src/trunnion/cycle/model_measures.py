@@ -90,8 +90,11 @@ def positions_told(valid: NDArray[np.bool_]) -> str:
     return "" if np.all(valid) else f"of {np.count_nonzero(valid)} of {len(valid)} positions"
 
 
-def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None) -> Watched:
-    """The model's measures over the cycle. time: positions of the result, s; status: theirs, if known.
+def watched(
+    run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None, compiled: bool = False
+) -> Watched:
+    """The model's measures over the cycle. time: positions of the result, s; status: theirs, if known; compiled:
+    whether pins settle in their seats by the compiled engine.
 
     A figure at a position where a pin loses contact is NaN: it is that of a seat which would jump.
     """
@@ -102,7 +105,8 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
         except MechanismError as error:
             told = f"the measure '{name}' is left out: {error.findings[0].what}"
             findings.append(Finding(told, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
-    values, stated = values_at(run, measures, time, method), [one for one in measures if one.rule != "deviation"]
+    values = values_at(run, measures, time, method, compiled=compiled)
+    stated = [one for one in measures if one.rule != "deviation"]
     with np.errstate(all="ignore"):
         of_cycle = figures_of(run, stated, steps, method) if stated else {}
     figures = np.array([of_cycle.get(one.name, np.nan) for one in measures], float)
@@ -170,17 +174,18 @@ def values_at(
     time: Array,
     method: FrictionMethod,
     tails: dict[str, Tail] | None = None,
+    compiled: bool = False,
 ) -> Array:
     """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers.
 
-    tails: of those that are angles before these times, and then of these.
+    tails: of those that are angles before these times, and then of these; compiled: see `courses_of`.
     """
     system, tails = run.system, {} if tails is None else tails
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
         return values
     with np.errstate(all="ignore"):
-        courses = courses_of(run, measures, time, method)[0]
+        courses = courses_of(run, measures, time, method, compiled)[0]
         walk = forward(system, run.values, run.chosen.assembly, time)
     for i, measure in enumerate(measures):
         if len(courses[measure.name]) > 1:

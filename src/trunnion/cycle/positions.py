@@ -22,7 +22,7 @@ from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers,
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled_seats import CompiledLooks, SeatKernels, Travelling, as_inputs
+from trunnion.solve.compiled_seats import CompiledLooks, Travelling, as_inputs
 from trunnion.solve.eccentricity_rate import Lanes, around, lanes, part_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
@@ -163,7 +163,7 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> 
 
     def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
         seen = around(time.ravel(), run.cycle)
-        found = settle(run, seen, method, CompiledLooks(_seat_kernels(run, method), seen.times) if compiled else None)
+        found = settle(run, seen, method, CompiledLooks(run, seen.times, method) if compiled else None)
         valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
         powers = _powers(found.back, time)
         if np.all(valid):
@@ -305,13 +305,12 @@ def _fill_seated(
     or_not: bool,
 ) -> bool:
     """The same with pins in seats, as many positions at a time as memory should hold twice."""
-    quick = replace(method, margin_up_to=0.0)
     for low in range(0, len(time), SEATED_AT_ONCE):
         window = slice(low, min(low + SEATED_AT_ONCE, len(time)))
         part, some = time[window], {name: array[..., window] for name, array in arrays.items()}
         seen = lanes(part, run.cycle)
         try:
-            seats = seats_of(run, seen, CompiledLooks(_seat_kernels(run, quick), seen.times))
+            seats = seats_of(run, seen, CompiledLooks(run, seen.times, method))
             inputs = {**run.values, **as_inputs(seats.offsets, seats.moving)}
             own = _kernel(run, inputs, part, some, method)
         except MechanismError:
@@ -328,11 +327,6 @@ def _fill_seated(
         _note_seats(arrays, seats, window, causes)
         _fill_beside_ideal(arrays, ideal, run, time, window, method)
     return True
-
-
-def _seat_kernels(run: Run, method: FrictionMethod) -> SeatKernels:
-    """The compiled kernels by which pins settle in their seats, made once."""
-    return run.once(("seats", method), lambda: SeatKernels(run, method))
 
 
 def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:

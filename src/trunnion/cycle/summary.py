@@ -96,7 +96,7 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
     found, near = findings(run, found_positions)
-    measured = watched(run, time, method, arrays["status"])
+    measured = watched(run, time, method, arrays["status"], found_positions.compiled)
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
     attributes = encoded(
         {
@@ -214,7 +214,7 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
         at.causes, at.dial, arrays["status"], arrays["condition"], efforts, near,
         felt(run.system, run.values),
     )  # fmt: skip
-    found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []
+    found += near_locking.findings(near, _dial_of(near, run, at)) if near else []
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
     several = len(spans) > 1 or run.system.mechanism.gears
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
@@ -383,19 +383,21 @@ def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray
     loads = [("reaction", "reaction_force", "N")]
     if system.mechanism.space == "spatial":
         loads.append(("reaction moment", "reaction_moment", "N m"))
+    rounding = {variable: _rounding(arrays, variable) for _, variable, _ in loads}
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         for what, variable, unit in loads if len(sound) else ():
             size = np.sqrt(np.sum(arrays[variable][i] ** 2, axis=0))
             top = int(sound[np.argmax(size[sound])])
             key, planar = f"{name}.{what.replace(' ', '_')}_max", system.mechanism.space == "planar"
-            if size[top] > _rounding(arrays, variable) or (planar and size[top] == 0):
+            if size[top] > rounding[variable] or (planar and size[top] == 0):
                 yield Figure(key, f"{what} of {name}", size[top], unit, "maximum", f"at {dial.at(top)}")
             elif planar:  # rounding has no place
                 yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
-        slide = arrays["joint_slide"][i]
+        if not PAIRS[kind].guided:
+            continue
         valid = arrays["status"] != Status.CONTACT_LOST
-        slide = slide[valid]
-        if PAIRS[kind].guided and np.any(np.isfinite(slide)):
+        slide = arrays["joint_slide"][i][valid]
+        if np.any(np.isfinite(slide)):
             stroke, note = np.nanmax(slide) - np.nanmin(slide), positions_told(valid)
             yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
 
@@ -413,6 +415,11 @@ def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
         return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked)
 
 
+def _dial_of(near: near_locking.Locking, run: Run, found: Positions) -> Dial:
+    """Names of the positions that were looked at: most often all."""
+    return found.dial if len(near.times) == len(found.time) else run.system.dial(run.values, near.times)
+
+
 def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> dict[str, Any]:
     """Where it holds itself, for the report: the ranges of `locking` with their share of the positions looked at."""
     mechanism = run.system.mechanism
@@ -424,7 +431,7 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
         known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     else:  # of more positions: the smallest margin from each to the next
         margin = np.minimum.reduceat(margin, np.searchsorted(found.time, near.times * (1 - 1e-12)))
-    dial = run.system.dial(run.values, near.times)
+    dial = _dial_of(near, run, found)
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),
          "first": one.first, "count": one.last - one.first + 1}

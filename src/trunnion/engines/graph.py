@@ -148,6 +148,8 @@ class Graph:
         (a, b), (first, second) = args, known
         if a == b and op in ("max", "min", "and", "or"):
             return a
+        if op in ("max", "min") and any(value != value for value in known):
+            return self.constant(math.nan)
         if op in ("and", "or"):
             kept = op == "and"  # the value that leaves the other as it is
             for value, other in ((first, b), (second, a)):

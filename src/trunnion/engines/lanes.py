@@ -47,6 +47,7 @@ class Lanes:
         self.b = builder
         self.width = width
         self.tables = tables  # of the module, by their entries
+        self._constants: dict[tuple[str, bool], Value] = {}
         kinds = (self._wide(one) for one in (DOUBLE, LONG, INT, BYTE, BIT))
         self.double, self.long, self.int, self.byte, self.bit = kinds
 
@@ -58,9 +59,11 @@ class Lanes:
 
     def constant(self, value: float | bool) -> Value:
         """The same float or bool in all lanes."""
-        return (
-            self._all(self.bit, BIT, int(value)) if isinstance(value, bool) else self._all(self.double, DOUBLE, value)
-        )
+        key = repr(value), isinstance(value, bool)
+        if key not in self._constants:
+            kinds = (self.bit, BIT) if isinstance(value, bool) else (self.double, DOUBLE)
+            self._constants[key] = self._all(*kinds, value)
+        return self._constants[key]
 
     def whole(self, value: int) -> Value:
         return self._all(self.long, LONG, value)
@@ -144,8 +147,10 @@ class Lanes:
 
     def larger(self, a: Value, b: Value, sign: str = ">") -> Value:
         """The larger of two, NaN if one is; with < the smaller."""
-        found = self.select(self.compare(sign, a, b), a, b)
-        return self.select(self.isnan(a), a, found)  # if b is NaN, no comparison holds, and found is b
+        if isinstance(b, ir.Constant):
+            a, b = b, a
+        found = self.select(self.compare(sign, a, b), a, b)  # if b is NaN, no comparison holds, and found is b
+        return found if isinstance(a, ir.Constant) else self.select(self.isnan(a), a, found)
 
     def sign(self, a: Value) -> Value:
         signed = self.copysign(self.constant(1.0), a)

@@ -20,6 +20,7 @@ __all__ = [
     "origin", "summary_of", "whole",
 ]  # fmt: skip
 
+_AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
 KEPT = "variables"  # the attribute of a result that has not kept every variable
 
 
@@ -65,8 +66,7 @@ def whole(result: Described, what: str) -> None:
 def encoded(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes as files can hold them: lists and dicts as JSON."""
     return {
-        name: json.dumps(value, ensure_ascii=False) if isinstance(value, (list, tuple, dict)) else value
-        for name, value in attributes.items()
+        name: _AS_TEXT(value) if isinstance(value, (list, tuple, dict)) else value for name, value in attributes.items()
     }
 
 

@@ -72,8 +72,8 @@ def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> 
 
 
 @functools.lru_cache(maxsize=64)
-def _index(dim: str, members: tuple[str, ...]) -> xr.indexes.PandasIndex:
-    """The names along a dimension.
+def _index(dim: str, members: tuple[str, ...]) -> tuple[xr.indexes.PandasIndex, dict[Any, xr.Variable]]:
+    """The names along a dimension, as an index and as a coordinate; xarray copies what it is given.
 
     An index of pandas: of an array, xarray would load pint and dask to see whether it is one of theirs.
     """
@@ -81,7 +81,8 @@ def _index(dim: str, members: tuple[str, ...]) -> xr.indexes.PandasIndex:
     import xarray as xr
 
     text = np.asarray(members, dtype=str)
-    return xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
+    index = xr.indexes.PandasIndex(pd.Index(text, name=dim), dim, coord_dtype=text.dtype)
+    return index, index.create_variables()
 
 
 def dataset_of(
@@ -101,8 +102,8 @@ def dataset_of(
     names: dict[str, Any] = {}
     indexes: dict[str, xr.indexes.PandasIndex] = {}
     for dim, members in labels.items():
-        indexes[dim] = _index(dim, tuple(members))
-        names |= indexes[dim].create_variables()
+        indexes[dim], own = _index(dim, tuple(members))
+        names |= own
     drive = (along or {}).get("drive")
     if drive is not None and drive.dims == ("position",):
         # xarray draws over the coordinate that bears the dimension's name. It has no index: two results are combined

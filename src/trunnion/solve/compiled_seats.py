@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from trunnion.solve.run import Run
 from trunnion.solve.seating import ByNumpy, Pressed, centred, wanted
 from trunnion.solve.system import Values, rubbing
 
-__all__ = ["CompiledLooks", "SeatKernels", "Travelling", "as_inputs"]
+__all__ = ["CompiledLooks", "Travelling", "as_inputs"]
 
 FEW = 256  # positions that NumPy does as quickly; they are those that are hard to settle, where rounding decides
 RATE, SPEED = "rate ", "speed "  # before the path of an offset, the name of a joint
@@ -94,11 +94,11 @@ class SeatKernels:
 
 
 class CompiledLooks(ByNumpy):
-    """`Looks` by the kernels of a run, the ideal mechanism at these times of all lanes, s."""
+    """`Looks` by the kernels of a run, made once; the ideal mechanism at these times of all lanes, s."""
 
-    def __init__(self, kernels: SeatKernels, times: Array) -> None:
-        self._kernels = kernels
-        run = kernels.run
+    def __init__(self, run: Run, times: Array, method: FrictionMethod) -> None:
+        quick = replace(method, margin_up_to=0.0)
+        self._kernels = kernels = run.once(("seats", quick), lambda: SeatKernels(run, quick))
         found = kernels.ideal.curves(run.ideal_values, times)[0]
         super().__init__(run, kernels.method, self._pressed(found), {
             link: _Motion(*parts) for link, parts in kernels.motions(found, 2).items()

@@ -144,10 +144,11 @@ class VectorKernel(CompiledKernel):
         doubtful = graph.as_boolean(number_of(graph, found.doubtful))
         for doubt in graph.doubts:
             doubtful = graph.apply("or", doubtful, doubt)
+        zero = nothing = graph.constant(0.0)
         for name, curve in zip(found.curves, curves, strict=True):
-            if name in self.undefined:
-                continue
-            doubtful = graph.apply("or", doubtful, graph.apply("not", graph.apply("finite", curve)))
+            if name not in self.undefined:  # 0 times what is not finite is NaN
+                nothing = graph.apply("add", nothing, graph.apply("mul", curve, zero))
+        doubtful = graph.apply("or", doubtful, graph.apply("not", graph.apply("eq", nothing, zero)))
         status = graph.node("byte", (graph.as_float(number_of(graph, found.status)),))
         return graph, [*curves, status, doubtful]
 

@@ -13,7 +13,7 @@ happens is reported.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -111,17 +111,19 @@ def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     real = _primal(problem)
     none: list[Number] = [0.0] * len(real.contacts)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
-    bound = np.where(np.isfinite(peak(real.state(none).normals)), real.bound(), 0.0)
+    state = real.state(none)
+    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
-    found = _iterated(real, _started(real, none, ~certain), method)
+    found = _iterated(real, _Iterate(none, ~certain, state, real.gaps(state, none)), method)
     shares: Number = 1.0
     left = ~certain
     if method.limit >= STUBBORN:
         left = left | ~(found.done | _obeyed(real, found))
     if np.any(left):
         forces, shares = _follow(real, found.forces, left)
-        again = _started(real, forces, ~left)
-        found = _iterated(real, replace(again, rows=found.rows, inverse=found.inverse, rounds=found.rounds), method)
+        state = real.state(forces)
+        again = _Iterate(forces, ~left, state, real.gaps(state, forces), found.rows, found.inverse, found.rounds)
+        found = _iterated(real, again, method)
     state, rows, inverse = found.state, found.rows, found.inverse
     depth = _depth(problem)
     forces = found.forces
@@ -172,12 +174,6 @@ def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
     return ~(real.excess(at.gaps, at.forces) > OBEYED)
 
 
-def _started(real: FrictionProblem, forces: list[Number], done: Number) -> _Iterate:
-    """At these forces, with nothing done in the lanes that are not."""
-    state = real.state(forces)
-    return _Iterate(forces, done, state, real.gaps(state, forces))
-
-
 def _iterated(real: FrictionProblem, start: _Iterate, method: FrictionMethod) -> _Iterate:
     """Newton's method from a start, in the lanes that are not done; those that are stay as they are.
 
@@ -191,19 +187,20 @@ def _iterated(real: FrictionProblem, start: _Iterate, method: FrictionMethod) ->
     excess: Number = 1.0  # of no friction at all
     slow: Number = ~done
     for _ in range(min(method.limit, STUBBORN)):
-        if np.all(done):
+        going = ~done
+        if not np.any(going):
             break
-        rounds = rounds + ~done
+        rounds = rounds + going
         if np.any(slow):
             fresh = real.map_derivative(state)
             rows = _chosen(slow, fresh, rows)
             inverse = _chosen(slow, linalg.quick_inverse(identity_minus(fresh)), inverse)
-        (forces,) = _chosen(~done, [_corrected(forces, gaps, inverse)], [forces])
+        (forces,) = _chosen(going, [_corrected(forces, gaps, inverse)], [forces])
         before, state = state, real.state(forces)
         gaps = real.gaps(state, forces)
         previous, excess = excess, real.excess(gaps, forces)
         here = _changed(state, before)
-        change = np.where(done, change, here) if np.any(done) else here
+        change = np.where(going, here, change)
         # a lane of NaN has nothing to wait for
         ends = ~(excess > SETTLED) if method.criterion is None else ~np.greater(here, method.criterion)
         done = done | ends

@@ -50,7 +50,7 @@ class Dial(NamedTuple):
 
     def at(self, position: int) -> str:
         """One position; what is next to nothing of the largest coordinate is 0."""
-        value, largest = float(self.values[position]), float(np.max(np.abs(self.values)))
+        value, largest = float(self.values[position]), np.abs(self.values).max()
         return f"{0.0 if abs(value) < ROUNDING * largest else value:.4g}{self.unit}"
 
     def intervals(self, positions: Positions) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from allocations import FOUR_BAR, bought, four_bar, random_costs, rocker_sensitivities, rows
+from allocations import FOUR_BAR, PRICES, bought, four_bar, random_costs, rocker_sensitivities, rows
 from numpy.typing import NDArray
 from scipy.optimize import NonlinearConstraint, minimize
 
@@ -47,8 +47,10 @@ def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree() -> None:
     assert answer.tolerances == pytest.approx((0.035238, 0.021336, 0.028878, 0.034654), abs=5e-7)
     assert answer.cost == pytest.approx(16.456705, abs=5e-7)
     assert answer.proven
-    assert answer.gap < 1e-9
-    assert answer.cost * (1 - 1e-9) <= answer.bound <= answer.cost
+    assert answer.gap < 1e-12
+    assert answer.cost * (1 - 1e-12) <= answer.bound <= answer.cost
+    falls = 0.45 * np.array(PRICES) * answer.tolerances**-1.45  # −dC/dt is what the rows take, at their prices
+    assert answer.price @ problem.effects.worst == pytest.approx(falls, rel=1e-12)
     rng = np.random.default_rng(0)
     for _ in range(6):
         cost, t = slsqp(problem, np.exp(rng.uniform(-9, -5, 4)))
@@ -78,7 +80,7 @@ def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
     else:
         t = (k * b / s**2) ** (1 / (k + 2))
         t *= limit / np.sqrt(np.sum((s * t) ** 2)) * (1.0 if criterion == "rss" else 3 / 2.5)
-    assert answer.tolerances == pytest.approx(t, rel=1e-7)
+    assert answer.tolerances == pytest.approx(t, rel=1e-10)
     assert answer.proven
 
 
@@ -88,8 +90,22 @@ def test_exponential_costs_of_one_row_have_their_closed_form() -> None:
     costs = [Cost("exponential", {"B": b[i], "k": k[i], "unit": 1.0}) for i in range(3)]
     answer = solve(AllocationProblem(bought(costs), rows(s[None], limit)))
     log_price = (np.sum(s / k * np.log(b * k / s)) - limit) / np.sum(s / k)
-    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=1e-8)
+    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=1e-10)
     assert answer.proven
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_dual_of_a_worst_case_is_worth_its_cost(seed: int) -> None:
+    """With prices λ of the rows each half width is by itself where k B/t^(k+1) = Σ λ|S|, or at a bound: six decades."""
+    rng = np.random.default_rng(seed)
+    effect, limit = rng.normal(size=(12, 5)) * 10 ** rng.uniform(-3, 3, 5), rng.uniform(0.1, 0.5, 12)
+    k, b, low, high = rng.uniform(0.3, 2.5, 5), rng.uniform(0.5, 5, 5), 1e-5, 0.2
+    costs = [Cost("power", {"B": b[i], "k": k[i], "unit": 1.0}) for i in range(5)]
+    answer = solve(AllocationProblem(bought(costs, least=low, most=high), rows(effect, limit)))
+    taken = answer.price @ np.abs(effect)
+    t = np.clip((k * b / taken) ** (1 / (k + 1)), low, high)
+    assert answer.cost == pytest.approx(np.sum(b * t**-k + taken * t) - answer.price @ limit, rel=1e-12)
+    assert answer.tolerances == pytest.approx(t, rel=1e-8)
 
 
 @pytest.mark.spread(12)

@@ -1,7 +1,5 @@
 """An allocation as a conic program: power and exponential cones for costs, second-order cones for RSS rows.
 
-Its dual objective is a lower bound of the cost of all that keep the limits, and proves the answer.
-
 P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives,
 arXiv:2405.12762
 """
@@ -19,14 +17,13 @@ from scipy import sparse
 from trunnion.statistics.costs import COST_MODELS
 from trunnion.studies.allocation.task import Task
 
-__all__ = ["Optimum", "settled"]
+__all__ = ["Optimum", "Rows", "settled", "solver"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SOUND = ("Solved", "AlmostSolved", "InsufficientProgress")
-FINE = 1e-12
-CLOSE = 1e-4  # residuals of an answer that is looked at; its gap tells what it is worth
-BROKEN = 1e-11  # of a limit: a row to add
+CLOSE = 1e-4  # residuals of an answer that goes into Newton's method; the proof is of what comes out
+BROKEN = 1e-7  # of a limit: a row to add
 ACTIVE = 1e-6  # of the largest multiplier: a side that limits
 AT_ONCE = 16  # rows added in one round
 
@@ -54,16 +51,15 @@ class _Cones:
 
 @dataclass(frozen=True)
 class Optimum:
-    """Unknowns u within all limits, the sides that hold them with their multipliers, and how good they are.
+    """Unknowns u, the sides that hold them with their multipliers, and how good they are.
 
-    bound: no u within the limits costs less; gap: cost from this bound, in units of the cost that tolerances change;
-    wider: the share by which all limits had to be widened; rounds: of the solver.
+    gap: cost from its lower bound, in units of the cost that tolerances change; wider: the share by which all limits
+    had to be widened; rounds: of the solver.
     """
 
     u: Array
     rows: Rows
     weights: Array
-    bound: float
     wider: float = 0.0
     gap: float = np.nan
     rounds: int = 0
@@ -87,18 +83,7 @@ def settled(task: Task, relaxed: bool = False) -> Optimum | None:
         if not len(broken):
             break
         rows = np.concatenate([rows, broken[np.argsort(-value[broken], kind="stable")[:AT_ONCE]]])
-    if relaxed:
-        return point
-    u = _within(task, point.u)
-    return replace(point, u=u, gap=abs(task.cost(u) - point.bound) / task.scale(u), rounds=rounds)
-
-
-def _within(task: Task, u: Array) -> Array:
-    """The same brought back within the limits, which the solver keeps to its tolerance only."""
-    over, least = (np.max(task.sides.value(task.tolerances(one)), initial=0.0) for one in (u, task.low))
-    if over <= 1 or least >= 1:
-        return u
-    return task.low + (1 - least) / (over - least) * (u - task.low)  # on a line to the least the sides are convex
+    return replace(point, rounds=rounds)
 
 
 def _first(task: Task) -> Rows:
@@ -127,16 +112,14 @@ def _solved(task: Task, rows: Rows, relaxed: bool) -> Optimum | None:
         shares = [_epigraph(task, place, cones) for place in range(len(priced))]
         scale = sum(shares) or 1.0
         aim[count:] = np.array(shares) / scale
-    nothing = sparse.csc_matrix((cones.columns, cones.columns))
-    whole, b = sparse.csc_matrix(np.vstack(cones.blocks)), np.concatenate(cones.right)
-    found = clarabel.DefaultSolver(nothing, aim, whole, b, cones.cones, _settings()).solve()
+    nothing, whole = np.zeros((cones.columns, cones.columns)), np.vstack(cones.blocks)
+    found = solver(nothing, aim, whole, np.concatenate(cones.right), cones.cones).solve()
     if str(found.status) not in SOUND or found.r_prim > CLOSE or found.r_dual > CLOSE:
         return None
     x, weights = np.asarray(found.x), scale * np.maximum(np.asarray(found.z)[firsts], 0.0)
     active = weights > ACTIVE * np.max(weights, initial=0.0)
-    bound = sum(cost.value(np.inf) for _, cost in priced) + scale * found.obj_val_dual
     wider = float(x[-1]) if relaxed else 0.0
-    return Optimum(np.clip(x[:count], task.low, task.high), rows[active], weights[active], bound, wider)
+    return Optimum(np.clip(x[:count], task.low, task.high), rows[active], weights[active], wider)
 
 
 def _side(task: Task, k: int, cones: _Cones, relaxed: bool) -> int:
@@ -175,8 +158,10 @@ def _epigraph(task: Task, place: int, cones: _Cones) -> float:
     return float(given["B"] or 0.0)
 
 
-def _settings() -> clarabel.DefaultSettings:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = FINE
-    return settings
+def solver(square: Array, aim: Array, whole: Array, right: Array, cones: list[Any], **settings: float) -> Any:
+    """Least ½ x·square·x + aim·x with right − whole x in the cones; settings: other than Clarabel's own."""
+    chosen = clarabel.DefaultSettings()
+    for name, value in ({"verbose": False} | settings).items():
+        setattr(chosen, name, value)
+    upper, rows = sparse.csc_matrix(np.triu(square)), sparse.csc_matrix(whole)
+    return clarabel.DefaultSolver(upper, aim, rows, right, cones, chosen)

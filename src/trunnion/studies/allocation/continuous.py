@@ -1,6 +1,7 @@
 """Least cost over half widths that may be anything between bounds: a convex problem, solved and proven.
 
-Clarabel solves it as a conic program; its dual objective, a lower bound of the cost, proves the answer.
+Clarabel solves it as a conic program, Newton's method takes the answer to rounding, and a lower bound of the cost over
+the box of the bounds proves it.
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.cones import Optimum, settled
+from trunnion.studies.allocation.newton import judged, sharpened, within
 from trunnion.studies.allocation.problem import PROVEN, AllocationProblem, Answer, none, shortfalls
 from trunnion.studies.allocation.task import Task, sides, task_of
 
 __all__ = ["allocate_continuous", "minimise"]
 
 Array = NDArray[np.float64]
-NEAR = 1e-3  # of the first units: the least unit of the second time
+NEAR = 1e-3  # of the first units: the least unit in Newton's method
+STEPS = 20  # of Newton's method: two or three do mostly
+ENOUGH = 1e-14  # gap at which there is nothing left to gain
 
 
 def allocate_continuous(problem: AllocationProblem) -> Answer:
@@ -54,7 +58,7 @@ def answer_of(problem: AllocationProblem, task: Task, point: Optimum) -> Answer:
         tolerances,
         costs,
         cost,
-        bound=min(point.bound, cost),
+        bound=cost - point.gap * task.scale(point.u),
         gap=point.gap,
         proven=point.gap <= PROVEN,
         price=price,
@@ -81,15 +85,16 @@ def unmet(problem: AllocationProblem, task: Task) -> list[Finding]:
 
 
 def minimise(task: Task) -> Optimum | None:
-    """The point of least cost of a task whose limits can be kept; None if it was not found.
-
-    It is found twice: first to know how large the unknowns are, then with all of them near 1.
-    """
+    """The point of least cost of a task whose limits can be kept; None if it was not found."""
     first = settled(task)
     if first is None:
         return None
     unit = task.unit * np.maximum(first.u, NEAR)
-    second = settled(replace(task, unit=unit))
-    if second is None or second.gap > first.gap:
-        return first
-    return replace(second, u=second.u * unit / task.unit)
+    scaled = replace(task, unit=unit)  # all unknowns near 1
+    best = point = judged(scaled, replace(first, u=first.u * task.unit / unit))
+    for _ in range(STEPS):
+        if best.gap < ENOUGH or not np.isfinite(point.gap):
+            break
+        point = sharpened(scaled, point)
+        best = min(best, point, key=lambda one: one.gap)
+    return replace(best, u=within(scaled, best.u) * unit / task.unit)

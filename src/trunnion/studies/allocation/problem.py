@@ -47,7 +47,7 @@ CRITERIA: dict[Criterion, str] = {
 }
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
-PROVEN = 1e-8  # of the cost that tolerances change: a gap below it proves the optimum
+PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,6 @@ from trunnion.solve.system import Dial, System, felt, rubbing
 if TYPE_CHECKING:
     import xarray as xr
 
-    from trunnion.measures.measures import Measure
     from trunnion.solve.run import Run
 
 from trunnion.cycle.model_measures import Watched, positions_told, watched
@@ -50,7 +49,6 @@ __all__ = [
     "books",
     "dataset_of",
     "effort_units",
-    "extreme_beside_jump",
     "figures",
     "inputs",
     "model_notes",
@@ -63,7 +61,6 @@ __all__ = [
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
-EXTREMES = ("maximum", "minimum", "largest", "peak-to-peak")  # statistics that a jump of the effort may make
 FEWEST = 12  # positions among which a jump can be told from a slope
 JUMP, STEADY = (
     0.2,
@@ -242,19 +239,6 @@ def beside_jumps(run: Run, time: NDArray[np.float64], arrays: Mapping[str, NDArr
             k, more = found
             at = run.system.dial(run.values, time).at(k)
             yield finding_for("effort.beside_jump", f"drivers.{name}", at=at, more=more, unit=unit)
-
-
-def extreme_beside_jump(
-    run: Run, measure: Measure, time: NDArray[np.float64], course: NDArray[np.float64], code: str
-) -> Iterator[Finding]:
-    """The same of an extreme of an effort that is measured, in the words of a code of `sentences`."""
-    if measure.kind != "effort" or measure.statistic not in EXTREMES:
-        return
-    size = {"maximum": course, "minimum": -course}.get(measure.statistic, np.abs(course))
-    if found := _beside_jump(run, time, size):
-        k, more = found
-        at, unit = run.system.dial(run.values, time).at(k), measure.unit(run.system)
-        yield finding_for(code, f"measures.{measure.name}", at=at, more=more, unit=unit)
 
 
 def _beside_jump(run: Run, time: NDArray[np.float64], size: NDArray[np.float64]) -> tuple[int, float] | None:

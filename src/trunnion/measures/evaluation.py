@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
-from trunnion.measures.corners import with_corner
-from trunnion.measures.figures import known, reference
+from trunnion.measures.corners import extreme, raised, sides_of, with_corner
+from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import plan
+from trunnion.measures.positions import PositionPlan, plan
 from trunnion.solve.backward import Backward
 from trunnion.solve.compiled_seats import CompiledLooks
 from trunnion.solve.eccentricity_rate import lanes
@@ -24,10 +25,17 @@ from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.switches import Mechanisms, tracked
 
-__all__ = ["Courses", "NumpyKernel", "courses_of", "figures_of", "where_known"]
+__all__ = ["Courses", "Kernel", "NumpyKernel", "at_corner", "courses_of", "figures_of", "looking", "where_known"]
 
 Courses = dict[str, tuple[Number, ...]]
+
+
+class Kernel(Protocol):
+    """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s."""
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]: ...
 
 
 @dataclass(frozen=True)
@@ -114,6 +122,37 @@ def figures_of(run: Run, measures: Sequence[Measure], steps: int, method: Fricti
 
         found[measure.name] = with_corner(one, look, run).figure
     return found
+
+
+def at_corner(
+    kernel: Kernel,
+    plan: PositionPlan,
+    values: Mapping[str, Number],
+    known: Reference,
+    course: NDArray[np.float64],
+    figures: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Figures, (sample,), of a measure whose extreme is at a corner or may be, of plain numbers.
+
+    course: (sample, position); figures: what is made of it without corners.
+    """
+    run, look = plan.run, looking(kernel, plan, values, known.measure)
+    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle] * len(course))
+    times = tracked(of, known.bends, lambda own, time: replace(plan, times=time).moved(own))
+    beside = sides_of(known, times, run.cycle)
+    return extreme(known, course, look, beside) if known.corner else raised(known, course, look, beside, figures)
+
+
+def looking(
+    kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number], measure: Measure
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """The course of a measure at the times of the nominal mechanism, or those that are the same of others."""
+
+    def look(time: NDArray[np.float64]) -> NDArray[np.float64]:
+        courses, _ = kernel.courses(values, replace(plan, times=time).moved(values))
+        return np.broadcast_to(np.asarray(primal(courses[measure.name][0]), float), time.shape)
+
+    return look
 
 
 def shape_of(values: Mapping[str, Number], time: Number) -> tuple[int, ...]:

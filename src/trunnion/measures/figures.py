@@ -32,6 +32,7 @@ from trunnion.measures.extremes import Extreme, Grid, largest, shape_of
 from trunnion.measures.lines import distances, total, turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Window
+from trunnion.solve.switches import Bend
 from trunnion.solve.system import System
 
 __all__ = [
@@ -147,7 +148,8 @@ class Reference:
 
     parts: its course, (position,) each, angles without jumps; turning: whether it is an angle; attitude: whether it is
     the turn of a link in space; turns: what an angle gains in a period, rad; figure: its figure, 0 for what is a
-    deviation by itself; NaN where it has none. corner: whether that is an extreme at a corner of the course, `corners`.
+    deviation by itself; NaN where it has none. corner: whether that is an extreme at a corner of the course, `corners`;
+    bends: of the forces, beside which it may be.
     """
 
     measure: Measure
@@ -159,6 +161,7 @@ class Reference:
     turns: float = 0.0
     figure: float = 0.0
     corner: bool = False
+    bends: tuple[Bend, ...] = ()
 
     @property
     def against(self) -> bool:

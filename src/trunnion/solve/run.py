@@ -22,7 +22,7 @@ from trunnion.solve.geometry import build
 from trunnion.solve.memory import keep_pages
 from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy
-from trunnion.solve.switches import Mechanisms, edges
+from trunnion.solve.switches import Bend, Mechanisms, parted, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values
 
 if TYPE_CHECKING:
@@ -110,7 +110,12 @@ class Run:
     @functools.cached_property
     def edges(self) -> NDArray[np.float64]:
         """Times, s, from the start to the end of the cycle, between which its forces are smooth; see `switches`."""
-        return edges(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))[0]
+        return parted(np.array([one.time for one in self.bends], float), self.cycle)
+
+    @functools.cached_property
+    def bends(self) -> list[Bend]:
+        """Where in the cycle its forces may jump or bend as the model says it, in no order; see `switches`."""
+        return stated_bends(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))
 
     @property
     def ideal_values(self) -> Values:

@@ -28,7 +28,7 @@ from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
-__all__ = ["Mechanisms", "bends", "edges"]
+__all__ = ["Bend", "Mechanisms", "bends", "edges", "parted", "stated_bends", "tracked"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -39,6 +39,7 @@ MOST_SCANNED = 20_000
 MOST_LEVELS = 720  # of one table in a turn: of more points every n-th, so that no node of a panel is far from any
 PANELS = 6  # of a turn: the widest that is integrated in one go
 MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
+TRACKED = 72  # of a turn: how far to either side a bend of one mechanism is looked for in others
 ROUNDS = 60
 SETTLED = 1e-11  # of the cycle
 CLOSE = 1e-10  # of the cycle: edges that are one
@@ -78,10 +79,22 @@ class Mechanisms:
 Look = Callable[[Forward], Iterator[Switch]]
 
 
+class Bend(NamedTuple):
+    """A time, s, at which forces may jump or bend; by which scan, which function of it passes which level there.
+
+    scan: -1 where the model states the time itself.
+    """
+
+    time: float
+    scan: int = -1
+    function: int = 0
+    level: float = 0.0
+
+
 class _Scan(NamedTuple):
     """How switches are worked out: a walk at the times of some mechanisms, and what is read from it."""
 
-    walk: Callable[[Mechanisms, Rows, Array], Forward]
+    walk: Callable[[System, Values, Assembly, Number], Forward]
     look: Look
     wanted: Callable[[System], bool]
     places: int
@@ -93,30 +106,75 @@ def edges(of: Mechanisms) -> list[Array]:
 
     No two are farther apart than a PANELS-th of a turn.
     """
-    return [
-        _parted(np.concatenate([[0.0, cycle.duration], times]), cycle)
-        for times, cycle in zip(bends(of), of.cycles, strict=True)
-    ]
+    return [parted(times, cycle) for times, cycle in zip(bends(of), of.cycles, strict=True)]
 
 
 def bends(of: Mechanisms) -> list[Array]:
     """Times, s, of every mechanism at which its forces may jump or bend, in no order."""
     found: list[list[float]] = [[] for _ in of.cycles]
-    for row, moment in _knots(of):
-        found[row].append(moment)
-    quiet = NOISE if placed(of.system.mechanism) else 0.0
-    for scan in (
-        _Scan(_stated, lambda walk: Stated(walk).switches(), _varies, STATED_SCANNED, quiet),
-        _Scan(_moving, _of_motion, _switches, SCANNED, NOISE),
-    ):
-        for row, moment in _passages(of, scan):
-            found[row].append(moment)
+    for row, one in _bends(of):
+        found[row].append(one.time)
     return [np.array(times, float) for times in found]
 
 
-def _parted(times: Array, cycle: Cycle) -> Array:
-    """Rising, those that are one taken once, wide gaps parted evenly."""
-    times = np.sort(times[(times >= 0) & (times <= cycle.duration)])
+def stated_bends(of: Mechanisms) -> list[Bend]:
+    """Where the forces of one mechanism may jump or bend, with what it is that does, so that it can be `tracked`."""
+    return [one for _, one in _bends(of)]
+
+
+def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Array], Number]) -> Array:
+    """Times, s, (mechanism, bend), at which other mechanisms have the bends of one; NaN where it is not near the same.
+
+    They are times of the one, `moved` to those of the others by their values; cycles: that of the one, for each.
+    """
+    cycle, count, found = of.cycles[0], len(of.cycles), np.tile([one.time for one in known], (len(of.cycles), 1))
+    for k, scan in enumerate(_scans(of.system)):
+        own = np.flatnonzero([one.scan == k for one in known])
+        if not len(own):
+            continue
+        rows, which = np.repeat(np.arange(count), len(own)), np.tile(own, count)
+        bend = [known[i] for i in own.tolist()]
+        widths = np.array([_width(one, known, cycle) for one in bend])
+        function, level = (np.tile([one[i] for one in bend], count) for i in (2, 3))
+
+        def values(rows: Rows, times: Array, scan: _Scan = scan) -> Array:
+            times = times % cycle.duration if cycle.periodic else np.clip(times, 0.0, cycle.duration)
+            own = of.picked(rows)
+            walk = scan.walk(of.system, own, of.assembly, of.lanes(np.asarray(primal(moved(own, times)), float)))
+            return np.stack([of.shaped(switch.number, times) for switch in scan.look(walk)])
+
+        low, high = (found[rows, which] + way * np.tile(widths, count) for way in (-1.0, 1.0))
+        lanes = np.arange(len(rows))
+        ends = [values(rows, time[:, None])[function, lanes, 0] for time in (low, high)]
+        passed = (ends[0] >= level) != (ends[1] >= level)
+        crossing = _Crossing(rows, function, level, low, high, *ends)
+        found[rows, which] = np.where(passed, _located(crossing, values, np.full(len(rows), cycle.duration)), np.nan)
+    return found
+
+
+def _width(of: Bend, known: Sequence[Bend], cycle: Cycle) -> float:
+    """How far to either side of a bend it is looked for in other mechanisms, s: not beyond the next one of its kind."""
+    like = [abs(one.time - of.time) / 2 for one in known if one[1:3] == of[1:3] and one is not of]
+    return min(cycle.duration / (TRACKED * max(1.0, cycle.turns)), *like, cycle.duration)
+
+
+def _scans(system: System) -> tuple[_Scan, _Scan]:
+    quiet = NOISE if placed(system.mechanism) else 0.0
+    return (
+        _Scan(stated_walk, lambda walk: Stated(walk).switches(), _varies, STATED_SCANNED, quiet),
+        _Scan(forward, _of_motion, _switches, SCANNED, NOISE),
+    )
+
+
+def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
+    yield from ((row, Bend(moment)) for row, moment in _knots(of))
+    for k, scan in enumerate(_scans(of.system)):
+        yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
+
+
+def parted(times: Array, cycle: Cycle) -> Array:
+    """Edges from the times of the bends: rising, those that are one taken once, wide gaps parted evenly."""
+    times = np.sort(np.concatenate([[0.0, cycle.duration], times[(times >= 0) & (times <= cycle.duration)]]))
     kept = times[np.append(np.diff(times) > CLOSE * cycle.duration, True)]
     kept[0] = 0.0
     widest = cycle.duration / min(PANELS * max(1.0, np.ceil(cycle.turns - 1e-9)), MOST_EDGES)
@@ -141,15 +199,6 @@ def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
 
 
 # ---- numbers of the motion that pass a level -------------------------------------------------------------------
-
-
-def _stated(of: Mechanisms, rows: Rows, time: Array) -> Forward:
-    """A walk that knows what the loads may speak of."""
-    return stated_walk(of.system, of.picked(rows), of.assembly, of.lanes(time))
-
-
-def _moving(of: Mechanisms, rows: Rows, time: Array) -> Forward:
-    return forward(of.system, of.picked(rows), of.assembly, of.lanes(time))
 
 
 def _of_motion(walk: Forward) -> Iterator[Switch]:
@@ -198,21 +247,24 @@ class _Crossing(NamedTuple):
     at_high: Array
 
 
-def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float]]:
-    """(mechanism, time) of every passage that a scan shows."""
+def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float, int, float]]:
+    """(mechanism, time, function, level) of every passage that a scan shows."""
     duration = np.array([cycle.duration for cycle in of.cycles])
     turns = max(cycle.turns for cycle in of.cycles)
     count = int(min(scan.places * max(1.0, np.ceil(turns - 1e-9)), MOST_SCANNED))
     time = duration[:, None] * np.linspace(0.0, 1.0, count + 1)
     if not scan.wanted(of.system):
         return
-    switches = list(scan.look(scan.walk(of, np.arange(len(duration)), time)))
+
+    def look(rows: Rows, times: Array) -> list[Switch]:
+        return list(scan.look(scan.walk(of.system, of.picked(rows), of.assembly, of.lanes(times))))
+
+    switches = look(np.arange(len(duration)), time)
     if not switches:
         return
 
     def values(rows: Rows, times: Array) -> Array:
-        found = scan.look(scan.walk(of, rows, times))
-        return np.stack([of.shaped(switch.number, times) for switch in found])
+        return np.stack([of.shaped(switch.number, times) for switch in look(rows, times)])
 
     courses = np.stack([of.shaped(switch.number, time) for switch in switches])
     noise = scan.noise * np.nanmax(np.abs(np.nan_to_num(courses)), axis=-1, keepdims=True)
@@ -229,7 +281,8 @@ def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float]]:
     if found or dips:
         columns = [np.array(column) for column in zip(*found, *dips, strict=True)]
         one = _Crossing(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
-        yield from zip(one.row.tolist(), _located(one, values, duration[one.row]).tolist(), strict=True)
+        times = _located(one, values, duration[one.row])
+        yield from zip(one.row.tolist(), times.tolist(), one.function.tolist(), one.level.tolist(), strict=True)
 
 
 def _levels(of: Mechanisms, switch: Switch, row: int, course: Array) -> Array:

@@ -75,10 +75,10 @@ PLAY = {
         "the figure and the files show the whole cycle besides",
     ),
     "play.beside_jump": Sentence(
-        WARNING,
-        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}; "
-        "what play does to the place of the jump is left out",
-        "use `trunnion tolerance` with samples and more --steps",
+        NOTE,
+        "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
+        "positions ({figure:~{unit}}; {coarse:~{unit}} at the positions); what play does to the place of the corner is "
+        "included",
     ),
     "play.no_effect": Sentence(
         NOTE,

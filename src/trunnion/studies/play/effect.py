@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
     worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status. extremes:
-    of each measure whose figure is a maximum or minimum, by name, what play does to it alone at its place.
+    of each measure whose figure is a maximum or minimum, by name, what play does to it alone at its place; corner: of
+    such an effect at a corner of its course, the figure and what the positions have of it.
     """
 
     run: Run
@@ -37,6 +38,7 @@ class Effect:
     loads: Array
     status: NDArray[np.int8]
     extremes: Mapping[str, Effect] = field(default_factory=dict)
+    corner: tuple[float, float] | None = None
 
     def of(self, i: int) -> tuple[Effect, int]:
         """Where the figure of a measure is looked for, and its number there: at its extreme, or over the cycle."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,14 +28,15 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.cycle.positions import check_steps
-from trunnion.cycle.summary import extreme_beside_jump, model_notes
+from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.evaluation import NumpyKernel
-from trunnion.measures.figures import moment, reference
+from trunnion.measures.corners import with_corner
+from trunnion.measures.evaluation import NumpyKernel, at_corner, looking
+from trunnion.measures.figures import Reference, moment, reference
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
-from trunnion.measures.positions import place_of, plan
+from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -57,6 +59,7 @@ __all__ = ["IDLE", "Effect", "by_duals", "by_virtual_load", "play", "plays", "va
 
 CHUNK = 4096  # positions at a time
 EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
+STEP = 1e-5  # of the size of the mechanism: of a difference
 IDLE = 1e-9  # of the largest effect of a joint: what is less is rounding
 
 Array = NDArray[np.float64]
@@ -90,9 +93,8 @@ def by_duals(
 
     carrier: of `shifts.CARRIERS`, the link on which seats stay: pins that turn with one or the other move otherwise.
     """
-    paths = [f"{carrier}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
-    rows = np.eye(len(paths))[:, :, None]  # (offset, sample, 1): each sample moves one offset
-    offsets = {path: Dual(0.0, row) for path, row in zip(paths, rows, strict=True)}
+    rows = _offsets(known, carrier)
+    offsets = {path: Dual(0.0, row) for path, row in rows.items()}
     with np.errstate(all="ignore"):
         if measure.kind in MOTIONS:
             number = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
@@ -100,8 +102,33 @@ def by_duals(
             number = measure.curve(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))[0]
         else:
             number = measure.curve(run.at(time, offsets, method))[0]
-    slopes = iter(np.broadcast_to(derivative(number), (len(paths), len(time))))
-    return {name: [tuple(next(slopes) for _ in end) for end in play.model.ends] for name, play in known.items()}
+    return _by_end(known, np.broadcast_to(derivative(number), (len(rows), len(time))))
+
+
+def of_corner(
+    kernel: NumpyKernel, places: PositionPlan, one: Reference, known: Mapping[str, Play], carrier: str = HOLE
+) -> Loads:
+    """The same of an extreme at a corner of the course, which moves with the pins: by central differences."""
+    values, rows = kernel.run.values, _offsets(known, carrier)
+    step = STEP * float(np.ravel(primal(kernel.run.system.size(values)))[0])
+
+    def figures(way: float) -> Array:
+        moved = {**values, **{path: way * step * row for path, row in rows.items()}}
+        course = np.asarray(kernel.courses(moved, places.times)[0][one.measure.name][0])
+        return at_corner(kernel, places, moved, one, course[:, one.window.index], course[:, 0])
+
+    return _by_end(known, (figures(1.0) - figures(-1.0))[:, None] / (2 * step))
+
+
+def _offsets(known: Mapping[str, Play], carrier: str) -> dict[str, Array]:
+    """Paths of the offsets with a row each, (sample, 1), in which it is 1 in a sample of its own."""
+    paths = [f"{carrier}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
+    return dict(zip(paths, np.eye(len(paths))[:, :, None], strict=True))
+
+
+def _by_end(known: Mapping[str, Play], slopes: Array) -> Loads:
+    each = iter(slopes)
+    return {name: [tuple(next(each) for _ in end) for end in play.model.ends] for name, play in known.items()}
 
 
 def variance(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
@@ -188,19 +215,28 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
     """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole.
 
     To first order an extreme changes as its course does there: where the course turns back, to move along it does
-    nothing. None of a course that does not change.
+    nothing. One at a corner of its course changes as the corner moves too. None of a course that does not change.
     """
     found = {}
     for measure in measures:
         if measure.rule not in EXTREMES:
             continue
         places = plan(run, [measure], steps)
-        course = NumpyKernel(run, [measure], FrictionMethod()).courses(run.values, places.times)[0][measure.name]
+        kernel = NumpyKernel(run, [measure], FrictionMethod())
+        course = kernel.courses(run.values, places.times)[0][measure.name]
         rate = measure.rate_of_course(forward(run.system, run.values, run.chosen.assembly, places.times))
-        time = moment(reference(measure, course, places.windows[measure.name], run.system, rate))
-        if np.isfinite(time):
-            time = time % run.cycle.duration if run.cycle.periodic else time
-            found[measure.name] = _over(run, [measure], known, np.array([time]))
+        one = reference(measure, course, places.windows[measure.name], run.system, rate)
+        time = moment(one)
+        if not np.isfinite(time):
+            continue
+        time = time % run.cycle.duration if run.cycle.periodic else time
+        there = _over(run, [measure], known, np.array([time]))
+        sharp = with_corner(one, looking(kernel, places, run.values, measure), run)
+        if sharp.corner:
+            loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
+            _put(there, 0, loads, slice(None), np.ones(1, bool), others)
+            there = replace(there, corner=(sharp.figure, one.figure))
+        found[measure.name] = there
     return found
 
 
@@ -264,22 +300,21 @@ def _fill(effect: Effect, rates: Array, window: slice) -> None:
         else:
             value = measure.curve(walk if back is None or measure.of_motion else back)[0]
             known = placed = posed if measure.of_motion else acting
-            loads, others = _both(run, measure, effect.plays, time, method)
+            loads, others = _both(run, effect.plays, partial(by_duals, run, measure, time=time, method=method))
         effect.value[i, window] = np.where(placed, value, np.nan)
         _put(effect, i, loads, window, known, others or {})
 
 
-def _both(
-    run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod
-) -> tuple[Loads, Loads]:
-    """Loads of a speed or a force: seats on the links that carry them, and the others if the model does not say."""
+def _both(run: Run, known: Mapping[str, Play], loads_of: Callable[..., Loads]) -> tuple[Loads, Loads]:
+    """Loads of a speed or a force, of plays and the link that carries their seats: on the links that do, and the others
+    if the model does not say."""
     carriers = {name: shifts.carriers_of(run.system.mechanism, name) for name in known}
     found = []
     for place in range(2):
         loads: Loads = {}
         for carrier in shifts.CARRIERS:
             own = {name: one for name, one in known.items() if carriers[name][place : place + 1] == (carrier,)}
-            loads |= by_duals(run, measure, own, time, method, carrier) if own else {}
+            loads |= loads_of(known=own, carrier=carrier) if own else {}
         found.append(loads)
     return found[0], found[1]
 
@@ -398,10 +433,13 @@ def _against(run: Run, measure: Measure, limit: float, worst: float, at: str, ov
 
 def _places(run: Run, effect: Effect) -> Iterator[Finding]:
     """What play does at the place that a measure states, or where its extreme is: the result has the whole cycle."""
-    for measure, course in zip(effect.measures, effect.value, strict=True):
-        yield from extreme_beside_jump(run, measure, effect.time, course, "play.beside_jump")
+    for measure in effect.measures:
         if measure.name in effect.extremes:
             there = effect.extremes[measure.name]
+            if there.corner is not None:
+                figure, coarse = there.corner
+                unit, where = measure.unit(run.system), f"measures.{measure.name}"
+                yield finding_for("play.beside_jump", where, figure=figure, coarse=coarse, unit=unit)
             worst, at = float(there.total[0, 0]), run.system.dial(run.values, there.time).at(0)
             yield finding_for(
                 "play.at_an_extreme", f"measures.{measure.name}", measure=measure.name, at=at, worst=worst,

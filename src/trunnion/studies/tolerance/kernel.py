@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.corners import extreme, with_corner
-from trunnion.measures.evaluation import Courses, NumpyKernel, where_known
+from trunnion.measures.corners import with_corner
+from trunnion.measures.evaluation import Courses, Kernel, NumpyKernel, looking, where_known
 from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
@@ -29,17 +28,11 @@ from trunnion.studies.tolerance.inputs import Inputs
 if TYPE_CHECKING:
     from trunnion.solve.compiled import CompiledKernel
 
-__all__ = ["Kernel", "at_corner", "batch_of", "engine_for", "kernel_of", "parts_of", "references"]
+__all__ = ["batch_of", "engine_for", "kernel_of", "parts_of", "references"]
 
 
 AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20, "gpu": 1 << 22}  # numbers in an array, by engine
 WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
-
-
-class Kernel(Protocol):
-    """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s."""
-
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]: ...
 
 
 @dataclass(frozen=True)
@@ -142,24 +135,5 @@ def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[
         turns = measure.of_motion and measure.turning(system)
         rate = measure.coordinate(system).rate(walk) if turns else None
         one = reference(measure, courses[measure.name], plan.windows[measure.name], system, rate)
-        found[measure.name] = with_corner(one, _looking(kernel, plan, values, measure), run)
+        found[measure.name] = with_corner(one, looking(kernel, plan, values, measure), run)
     return found
-
-
-def at_corner(
-    kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number], known: Reference, course: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Figures, (sample,), of a measure whose extreme is at a corner, of plain numbers; course: (sample, position)."""
-    return extreme(known, course, _looking(kernel, plan, values, known.measure))
-
-
-def _looking(
-    kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number], measure: Measure
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """The course of a measure at the times of the nominal mechanism, or those that are the same of others."""
-
-    def look(time: NDArray[np.float64]) -> NDArray[np.float64]:
-        courses, _ = kernel.courses(values, replace(plan, times=time).moved(values))
-        return np.broadcast_to(np.asarray(primal(courses[measure.name][0]), float), time.shape)
-
-    return look

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
-from trunnion.measures.evaluation import NumpyKernel
+from trunnion.measures.evaluation import NumpyKernel, at_corner
 from trunnion.measures.figures import Reference, figure, shown, span
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.studies.tolerance.effects import Effects, FirstOrder
-from trunnion.studies.tolerance.kernel import at_corner
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
 
@@ -110,7 +109,7 @@ def _at_corner(
     def figures(way: float) -> Array:
         moved = {path: primal(one) + way * step[:, None] * derivative(one) for path, one in values.items()}
         course = _courses(alone, plan, effects, moved)[0][known.measure.name][0].real
-        return at_corner(alone, plan, moved, known, course[:, known.window.index])
+        return at_corner(alone, plan, moved, known, course[:, known.window.index], course[:, 0])
 
     middle, moving = figures(0.0), step > 0
     if not np.any(moving):

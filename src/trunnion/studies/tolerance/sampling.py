@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Status
-from trunnion.measures.evaluation import Courses
+from trunnion.measures.evaluation import Courses, Kernel, at_corner
 from trunnion.measures.figures import Reference, judged, kept
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan, plan
@@ -28,7 +28,7 @@ from trunnion.statistics.histogram import Bins, count
 from trunnion.statistics.streams import SobolStream, uniforms
 from trunnion.statistics.tally import Tree, moments_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import Kernel, at_corner, batch_of, kernel_of, references
+from trunnion.studies.tolerance.kernel import batch_of, kernel_of, references
 from trunnion.studies.tolerance.on_device import DeviceReducer, Reduced
 from trunnion.version import __version__
 
@@ -212,7 +212,7 @@ class Sampling:
         known = references(MotionKernel(run, self.measures, self.friction), places, inputs)
         kernel = kernel_of(self.engine, run, self.measures, self.friction)
         device = None
-        if self.engine == "gpu" and not any(one.corner for one in known.values()):
+        if self.engine == "gpu" and not any(one.corner or one.bends for one in known.values()):
             bands = [(self.curve_spread[i][0], self.curve_bins(i)) for i in range(len(self.measures))]
             device = DeviceReducer(MotionKernel(run, self.measures, self.friction), self.positions, known, bands)
         return Sampler(self, inputs, places, kernel, known, device)
@@ -274,9 +274,9 @@ class Sampler:
         for i, measure in enumerate(self.job.measures):
             course, known = courses[measure.name], self.nominal[measure.name]
             found[i], passed[i], curve = judged(course, known)
-            if known.corner:
+            if known.corner or known.bends:
                 values = self.inputs.values(u, self.job.rotation)
-                found[i] = at_corner(self.kernel, self.plan, values, known, curve)
+                found[i] = at_corner(self.kernel, self.plan, values, known, curve, found[i])
                 passed[i] = kept(course, known, found[i])
             curves.append(curve)
         return found, passed, curves, status

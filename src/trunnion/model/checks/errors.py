@@ -365,7 +365,7 @@ def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[
 def _cross(values: Mapping[str, Number], link: str, *points: str) -> bool:
     """Whether two points of a link have axes that are not parallel; those of an eccentric are."""
     axes = [[float(values.get(f"links.{link}.points.{one}.axis.{k}", 0.0)) for k in "xyz"] for one in points]
-    return bool(np.any(np.cross(*axes) != 0))
+    return bool(np.any(np.cross(axes[0], axes[1]) != 0))
 
 
 def _place(values: Mapping[str, Number], link: str, point: str) -> np.ndarray:

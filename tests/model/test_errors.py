@@ -441,6 +441,9 @@ def test_large_plays_and_short_pins() -> None:
     assert not doubts(PLAYING)
     (doubt,) = doubts(PLAYING.with_values({"A.pin.clearance": "0.31 mm"}))
     assert "a play of 0.31 mm is 1.03 % of the 30 mm from 'A' to 'B'" in doubt
+    eccentric = {"A.pin.clearance": "0.31 mm", "A.pin.radius": "35 mm"}  # wider than the crank is long: a lever still
+    (doubt,) = doubts(PLAYING.with_values(eccentric))
+    assert "a play of 0.31 mm is 1.03 % of the 30 mm from 'A' to 'B'" in doubt
     assert not doubts(RSSR)
     # 2 · 10 · 0.51 / 20² = 0.0255
     (doubt,) = doubts(RSSR.with_values({"D.pin.hole_radius": "10.51 mm"}))

@@ -101,6 +101,35 @@ def test_a_plain_number_among_others_with_a_unit(
     assert all(figures in one.what for one in told)
 
 
+BOUGHT = """tolerances: {AB: ±0.05 mm, BC: {limits: ±0.05 mm, shift: 0.01 mm}}
+costs:
+  AB: {model: power, B: 1, k: 1, unit: mm, least: 0.01 mm}
+  B.clearance: {options: {g6: {tolerance: 28 um, cost: 40}, f7: {tolerance: 53 um, cost: 25}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "severity", "where", "figures"),
+    [
+        ("", "", None, "", ""),
+        ("28 um", "0.000028", Severity.NOTE, "costs.B.clearance.options.g6.tolerance", "is 2.8e-05 m, "),
+        ("28 um", "0.028", Severity.WARNING, "costs.B.clearance.options.g6.tolerance", "0.311 times the largest"),
+        ("28 um", "28", Severity.WARNING, "costs.B.clearance.options.g6.tolerance", "311 times the largest length"),
+        ("least: 0.01 mm", "least: 1e-5", Severity.NOTE, "costs.AB.least", "is 1e-05 m, "),
+        ("AB: ±0.05 mm", "AB: 0.05", Severity.WARNING, "tolerances.AB", "is 0.05 m, "),
+        (", unit: mm", "", Severity.NOTE, "costs.AB", "B is what a half width of 1 m costs"),
+    ],
+)
+def test_a_plain_tolerance_or_cost_among_lengths_with_a_unit(
+    tmp_path: Path, old: str, new: str, severity: Severity | None, where: str, figures: str
+) -> None:
+    bought = CLAMP.replace("pin: {radius: 6 mm}", "pin: {radius: 6 mm, clearance: 0.02 mm}") + BOUGHT.replace(old, new)
+    (tmp_path / "clamp.yaml").write_text(bought, encoding="utf-8")
+    told = read(tmp_path / "clamp.yaml").checked
+    assert [(one.severity, one.where) for one in told] == ([(severity, where)] if severity else [])
+    assert all(figures in one.what for one in told)
+
+
 def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) -> None:
     plain = CLAMP.replace("80 mm + pinch", "80 * pinch").replace("8 N/mm", "8000").replace("5 N", "5")
     plain = re.sub(r"(\d+) mm(/s)?", lambda found: str(int(found[1]) / 1000), plain)

@@ -167,6 +167,30 @@ def test_yield() -> None:
     assert kept == pytest.approx(0.95, abs=0.012)
 
 
+def test_the_margins_tried_are_what_the_limit_has() -> None:
+    """Room over standard deviation, which a cap by what is not bought keeps below the margin asked for."""
+    costs = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm", "least": "0.02 mm"} for name in ("l1", "l3")}
+    model = fourbar(costs=costs, measures={"at": {"angle": "rocker", "at": "90 deg", "limit": "±0.02 deg"}})
+    result = trunnion.allocate(model, criterion="yield", target=0.95, samples=2000)
+    assert float(result["used"][0]) == pytest.approx(1.0, abs=1e-6)
+    margin = float(result["trial_margin"][np.argmin(abs(result["trial_cost"].values - float(result["cost_total"])))])
+    sigma = np.linalg.norm(slopes(4)[1] * 1e-3 * dimensions(result) / 3)
+    assert margin * sigma == pytest.approx(np.radians(0.02), rel=1e-6)
+    assert margin == pytest.approx(float(result["yield_margin"][0]), rel=1e-9)
+
+
+def test_options_as_stated_cost_what_keeps_them() -> None:
+    """A half width between two options is bought as the cheapest that keeps it; one below all has no cost."""
+    data = trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data()
+    paid = {"±0.02 mm": 11.8, "±0.03 mm": 4.2, "±0.2 mm": 1.5, "±0.007 mm": np.nan}
+    for stated, cost in paid.items():
+        model = Mechanism(**{**data, "tolerances": {**data["tolerances"], "l2": stated}})
+        result = trunnion.allocate(model, steps=12, samples=0)
+        assert float(result["cost_before"].sel(parameter="dimensions.l2")) == pytest.approx(cost, nan_ok=True)
+        grades = 3 * 6.2  # IT8 of 70, 90 and 100 mm is 46, 54 and 54 µm
+        assert float(result["cost_total_before"]) == pytest.approx(cost + grades + 4 * 1.6, nan_ok=True)
+
+
 def test_failures_are_split_by_cost() -> None:
     """Two limits near their least cost, and cheaper than one margin for both.
 

@@ -79,10 +79,15 @@ class Means:
         return self.useful_power.net / work if work > 0 else float("nan")
 
     @property
-    def efficiency_error(self) -> float:
+    def integration_error(self) -> float:
         """How far the errors of both integrals may have moved the efficiency."""
         work, value = self.drive_power.net, self.efficiency
         return (self.useful_power.error + abs(value) * self.drive_power.error) / work if work > 0 else float("nan")
+
+    @property
+    def efficiency_error(self) -> float:
+        """The same, with the share of the drive work that is supposed where pins do not settle."""
+        return self.integration_error + abs(self.efficiency) * self.supposed
 
 
 def means_of(

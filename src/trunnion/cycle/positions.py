@@ -179,7 +179,7 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> 
     means = means_of(of, seated, between, SEATED)[0]
     if means.supposed > MOST_SUPPOSED:
         return unknown(means)
-    return means_of(of, seated, between, FINER)[0] if means.efficiency_error > COARSE else means
+    return means_of(of, seated, between, FINER)[0] if means.integration_error > COARSE else means
 
 
 def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:

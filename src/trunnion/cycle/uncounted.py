@@ -20,6 +20,7 @@ from trunnion.solve.run import Run
 __all__ = ["beside_the_drive", "findings"]
 
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
+ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
 
 
 def beside_the_drive(mechanism: Mechanism) -> list[str]:
@@ -34,12 +35,14 @@ def findings(run: Run, means: Means) -> Iterator[Finding]:
     """A warning of an efficiency above 1, with the work of each source beside the drives; else a note of loads that
     act beside the drive and supply work. means: of the cycle."""
     beside = beside_the_drive(run.system.mechanism)
-    above = means.efficiency > 1 + 1e-9 + means.efficiency_error
+    above = means.efficiency > 1 + ROUNDED + means.efficiency_error
     if not (above or beside) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
         return
     drive = means.drive_power.net * run.cycle.duration
-    work = {name: value for name, value in _work(run, means).items() if value > LEAST * abs(drive)}
+    every = _work(run, means)
+    work = {name: value for name, value in every.items() if value > LEAST * abs(drive)}
     if above:
+        work = work or dict([max(every.items(), key=lambda one: one[1])])
         supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
         yield finding_for(
             "efficiency.above_one", efficiency=means.efficiency, drive=drive, work=work, phrases={"supplies": supplies}

@@ -129,7 +129,9 @@ SAME_AS = {"drive_effort_lower": "drive_effort", "drive_effort_upper": "drive_ef
 # of the cycle as a whole, beside VARIABLES
 CYCLE: dict[str, Variable] = {
     "efficiency": Variable((), "1", "useful work over drive work of the cycle"),
-    "efficiency_error": Variable((), "1", "how far the errors of the integrals may have moved the efficiency"),
+    "efficiency_error": Variable(
+        (), "1", "how far the errors of the integrals and pins that do not settle may have moved it"
+    ),
     "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
     "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),

@@ -322,8 +322,8 @@ def _play_size(mechanism: Numbers, name: str, joint: Joint, values: Mapping[str,
         return
     place = f"{where}.pin"
     side, distance, link = _shortest_side(mechanism, name, joint, values)
-    crossing = distance <= values.get(f"{where}.pin.radius", 0.0)  # axes that all but meet: that is no lever
-    if rho > 0.01 * distance and not crossing:
+    meeting = distance <= values.get(f"{where}.pin.radius", 0.0) and _cross(values, link, name, side)  # is no lever
+    if rho > 0.01 * distance and not meeting:
         what = f"a play of {_mm(rho)} is {100 * rho / distance:.3g} % of the {_mm(distance)} from '{name}' to '{side}'"
         remedy = f"above 1 % of a side of the link '{link}' results for small play are inaccurate: check its unit"
         yield Finding(what, place, remedy, Severity.WARNING)
@@ -360,6 +360,12 @@ def _shortest_side(mechanism: Numbers, name: str, joint: Joint, values: Mapping[
             if 0 < distance < best[1]:
                 best = (other, distance, link)
     return best
+
+
+def _cross(values: Mapping[str, Number], link: str, *points: str) -> bool:
+    """Whether two points of a link have axes that are not parallel; those of an eccentric are."""
+    axes = [[float(values.get(f"links.{link}.points.{one}.axis.{k}", 0.0)) for k in "xyz"] for one in points]
+    return bool(np.any(np.cross(axes[0], axes[1]) != 0))
 
 
 def _place(values: Mapping[str, Number], link: str, point: str) -> np.ndarray:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, Severity
+from trunnion.model.checks.tolerances import stated_entries
 from trunnion.model.parameters import Entry, ParameterSet, measured
+from trunnion.model.prices import cost_paths
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, NUMBER, Kind, UnitError, unit
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["bare_number", "magnitudes"]
 
 FAR = 20.0  # times the largest length stated with a unit: a plain number above it is no length of this mechanism
+WIDE = 0.01  # of that length: a plain tolerance or play above it is likely in another unit
 # kinds told of where lengths have units, and the unit that is likely meant
 MEANT = {
     KINDS[name]: text for name, text in (("length", "mm"), ("stiffness", "N/mm"), ("force", "N"), ("speed", "mm/s"))
@@ -25,15 +28,21 @@ MEANT = {
 
 def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     """What plain numbers mean where most lengths have a unit; plain lengths far above these; pins above every link."""
-    values = {path: abs(float(value)) for path, value in numbers.nominal.items()}
+    stated = [one for one in stated_entries(mechanism, mechanism.entries) if ".values." not in one.path]
+    entries = {**numbers.entries, **{one.path: one for one in stated}}
+    plain = {one.path: one.quantity.source for one in stated if not isinstance(one.quantity.source, str)}
+    nominal = {path: float(value) for path, value in {**numbers.nominal, **plain}.items()}
+    values = {path: abs(value) for path, value in nominal.items()}
     lengths = [one for path, one in numbers.entries.items() if one.kind is KINDS["length"] and path in values]
     places = [one for one in lengths if one.path.startswith("links.") and ".points." in one.path]
     pins = [one for one in lengths if one.path.endswith((".pin.radius", ".guide.length")) and not one.alias]
     known = max((values[one.path] for one in places if not _plain(mechanism, one)), default=0.0)
-    bare = _without_unit(mechanism, numbers) if known > 0 else {}
+    bare = _without_unit(mechanism, entries, nominal) if known > 0 else None
+    yield from _of_unit_one(mechanism, numbers) if bare is not None else ()
+    bare = bare or {}
     for path, kind in bare.items():
-        long = kind is KINDS["length"] and values[path] > known
-        yield _forgotten(path, values[path], known) if long else _meant(path, float(numbers.nominal[path]), kind)
+        long = kind is KINDS["length"] and values[path] > (WIDE if path in plain else 1.0) * known
+        yield _forgotten(path, values[path], known) if long else _meant(path, nominal[path], kind)
     far = [one for one in (*places, *pins) if values[one.path] > FAR * known > 0]
     told = {path: values[path] for one in far for path in _plain(mechanism, one) if values[path] > FAR * known}
     told = {path: value for path, value in told.items() if path not in bare}
@@ -62,18 +71,30 @@ def _meant(path: str, value: float, kind: Kind) -> Finding:
     return Finding(what, path, f"write {value:g} {kind.unit}{other}", Severity.NOTE)
 
 
-def _without_unit(mechanism: Numbers, numbers: ParameterSet) -> dict[str, Kind]:
-    """Plain numbers by path, with what they measure; none unless more lengths have a unit. A hint is no length."""
+def _of_unit_one(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
+    """Notes of cost formulas of lengths whose B is paid at a half width of 1 m, for they state no unit."""
     kinds = measured(mechanism, numbers.entries.values())
-    stated = [one for one in numbers.entries.values() if not one.alias and not one.path.startswith("assembly.")]
+    for name, cost in mechanism.costs.items():
+        paths = cost_paths(mechanism, name, numbers) if cost.model and cost.unit is None else []
+        if paths and kinds.get(paths[0], KINDS["length"]) is KINDS["length"]:
+            what = "states no unit: B is what a half width of 1 m costs, where other lengths have a unit"
+            yield Finding(what, f"costs.{name}", "write unit: m, or unit: mm if that is meant", Severity.NOTE)
+
+
+def _without_unit(
+    mechanism: Numbers, entries: Mapping[str, Entry], nominal: Mapping[str, float]
+) -> dict[str, Kind] | None:
+    """Plain numbers by path, with what they measure; None unless more lengths have a unit. A hint is no length."""
+    kinds = measured(mechanism, entries.values())
+    stated = [one for one in entries.values() if not one.alias and not one.path.startswith("assembly.")]
     united = [one for one in stated if kinds[one.path] is KINDS["length"] and _literal_unit(one.quantity)]
     found: dict[str, Kind] = {}
     for one in stated:
         kind = kinds[one.path]
-        if kind in MEANT and (kind.name != "speed" or one.path.startswith("drivers.")) and one.path in numbers.nominal:
+        if kind in MEANT and (kind.name != "speed" or one.path.startswith("drivers.")) and one.path in nominal:
             found |= {path: kind for path in _plain(mechanism, one) if path == one.path or _is_one(path, one, kind)}
     lengths = [path for path, kind in found.items() if kind is KINDS["length"]]
-    return found if len(united) > len(lengths) else {}
+    return found if len(united) > len(lengths) else None
 
 
 def _is_one(path: str, entry: Entry, kind: Kind) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +49,7 @@ VARIABLES: dict[str, Variable] = {
     "yield_checked": Variable((), "1", "share within all limits of fresh samples, which had no part in the choice"),
     "yield_checked_low": Variable((), "1", "yield of the fresh samples, lower end of the 95 % interval"),
     "yield_checked_high": Variable((), "1", "yield of the fresh samples, upper end of the 95 % interval"),
-    "trial_margin": Variable(T, "1", "margin in a trial, in standard deviations; the mean over the measures"),
+    "trial_margin": Variable(T, "1", "margin of the limits in a trial, in standard deviations; the mean over the measures"),
     "trial_cost": Variable(T, "1", "cost of a trial"),
     "trial_yield": Variable(T, "1", "share of the samples within all limits in a trial"),
     "trial_yield_low": Variable(T, "1", "yield of a trial, lower end of the 95 % interval"),
@@ -61,11 +61,10 @@ VARIABLES: dict[str, Variable] = {
 
 
 def cost_of(price: Price, t: float) -> float:
-    """Cost of a half width, SI; of options, of the one that has it, NaN if none has."""
+    """Cost of a half width, SI; of options, of the cheapest that keeps it, NaN if none does."""
     if price.model:
         return Cost(price.model, price.parameters).value(t)
-    same = [one.cost for one in price.choices if abs(one.tolerance - t) <= 1e-9 * one.tolerance]
-    return min(same, default=np.nan)
+    return min((one.cost for one in price.choices if one.tolerance <= t * (1 + 1e-9)), default=np.nan)
 
 
 def stated_cost(found: Allocated) -> float:
@@ -75,7 +74,7 @@ def stated_cost(found: Allocated) -> float:
 
 def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     """The result with the numbers of the allocation. known: `tolerance` of the mechanism with the tolerances found."""
-    arrays = {**_bought(found, known), **_rows(found, known), **_whole(found)}
+    arrays = {**_bought(found, known), **_rows(found, known), **_whole(found, known.sizes["measure"])}
     units = attribute(known, "parameter_units")
     variables = described(arrays, VARIABLES, {"parameter": units[0] if len(set(units)) == 1 else "", "1/": ""})
     # the criterion says what is to be kept
@@ -154,19 +153,26 @@ def _rows(found: Allocated, known: xr.Dataset) -> dict[str, Any]:
     if found.answer.found:
         shares = found.answer.used[: len(found.rows.measure)]
         prices = found.answer.price[: len(found.rows.measure)]
-        margins = found.answer.problem.margins()
+        margin = _margins(found, count)
         for k in range(count):
             own = found.rows.measure == k
             if np.any(own):
                 used[k], saving[k] = float(np.max(shares[own])), float(np.sum(prices[own]))
-                margin[k] = margins[np.flatnonzero(own)[0]]
                 placed = own & (found.rows.position >= 0)
                 curve[k, found.rows.position[placed]] = shares[placed]
     arrays = {"used": used, "used_curve": curve, "saving": saving}
     return {**arrays, "yield_margin": margin} if found.asked.criterion == "yield" else arrays
 
 
-def _whole(found: Allocated) -> Mapping[str, Any]:
+def _margins(found: Allocated, count: int, z: float | None = None) -> NDArray[np.float64]:
+    """The margin of each measure, NaN without limits: of the answer, or with another z."""
+    problem = found.answer.problem if z is None else replace(found.answer.problem, z=z)
+    margins = problem.margins()
+    first = {int(k): margins[np.flatnonzero(found.rows.measure == k)[0]] for k in np.unique(found.rows.measure)}
+    return np.array([first.get(k, np.nan) for k in range(count)])
+
+
+def _whole(found: Allocated, count: int) -> Mapping[str, Any]:
     """What is of the whole."""
     answer = found.answer
     arrays: dict[str, Any] = {
@@ -182,7 +188,7 @@ def _whole(found: Allocated) -> Mapping[str, Any]:
         arrays |= {f"yield_checked{end}": np.array(number) for end, number in ends}
     if answer.trials:
         arrays |= {
-            "trial_margin": np.array([one.z for one in answer.trials]),
+            "trial_margin": np.array([np.nanmean(_margins(found, count, one.z)) for one in answer.trials]),
             "trial_cost": np.array([one.cost for one in answer.trials]),
             "trial_yield": np.array([one.sampled.share for one in answer.trials]),
             "trial_yield_low": np.array([one.sampled.low for one in answer.trials]),

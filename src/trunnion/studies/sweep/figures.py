@@ -24,7 +24,9 @@ Arrays = Mapping[str, NDArray[Any]]
 # is looked for only if asked
 FIGURES: dict[str, Variable] = {
     "efficiency": Variable((), "1", "useful work over drive work of the cycle"),
-    "efficiency_error": Variable((), "1", "how far the errors of its integrals may have moved the efficiency"),
+    "efficiency_error": Variable(
+        (), "1", "how far the errors of its integrals and pins that do not settle may have moved it"
+    ),
     "efficiency_ideal": Variable((), "1", "efficiency of the mechanism without errors", part="errors"),
     "drive_effort_min": Variable(("driver",), "N m", "minimum drive effort"),
     "drive_effort_max": Variable(("driver",), "N m", "maximum drive effort"),

@@ -129,7 +129,7 @@ def _balance(result: xr.Dataset) -> list[dict[str, str]]:
         )
     error = column(result, "efficiency_error")
     if error is not None and np.isfinite(error):
-        meaning = "effect of the errors of the integrals over the cycle"
+        meaning = "effect of the errors of the integrals over the cycle, and of pins that do not settle"
         rows.append({"label": "Error of the efficiency", "value": quantity(float(error), "1"), "place": "",
                      "meaning": meaning})  # fmt: skip
     for name, label, unit, meaning in BALANCE:

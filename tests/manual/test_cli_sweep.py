@@ -137,7 +137,7 @@ BAD = {
     "no over": ([], "--over"),
     "two in one file": (
         ["--over", "AB=1m", *(f"--measure={one}" for one in ("efficiency", "status")), "--out=a.svg"],
-        "2 figures do not fit one file",
+        "2 figures do not fit one file — --out a makes a folder",
     ),
     "axis of a stranger": (["--over", "AB=1m,2m", "--x", "BC"], "'BC' is not swept over"),
     "curves along the axis": (["--over", "AB=1m,2m", "--x", "AB", "--family", "AB"], "both the axis and the curves"),

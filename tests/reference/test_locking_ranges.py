@@ -14,7 +14,7 @@ from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, ranges, report_figures
 from trunnion.cycle.locking_ends import ends
 from trunnion.cycle.locking_states import NO_MARGIN
-from trunnion.results.attributes import attribute
+from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.run import prepare
 
 ARM, RADIUS, FRICTION = 0.02, 0.012, 0.5
@@ -56,6 +56,46 @@ def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
     assert second.last + 1 == third.first
     assert angle[third.last] < 180 - limit < angle[fourth.first]
     assert fourth.last == 400
+
+
+def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> None:
+    """f r = |L cos θ|: the multiple of the friction is |L cos θ|/(f r), NaN where it is above 1: it does not hold."""
+    found = locking(hoist(), 401)
+    share = np.abs(ARM * np.cos(np.radians(found["drive"].values))) / (FRICTION * RADIUS)
+    np.testing.assert_allclose(found["holding_multiple"].values, np.where(share <= 1, share, np.nan), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("first", "last", "told"), [(0.2, 1.4, "end"), (1.4, 1.8, "all"), (0.2, 2.5, "")])
+def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: float, last: float, told: str) -> None:
+    """Of a hoist that stops where it holds; of one that holds all along; of one that its load drives on at the end."""
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["drivers"]["A"]["range"] = [first, last]
+    run = prepare(Mechanism(**data))
+    found = look(run, 41)
+    rows = {one.name: one for one in report_figures(run, found) if one.name.startswith("holding")}
+    if not told:
+        assert not rows
+        return
+    arms = np.abs(ARM * np.cos(np.linspace(first, last, 41)))
+    arm = np.max(arms) if told == "all" else arms[-1]
+    assert rows["holding_multiple"].value == pytest.approx(arm / (FRICTION * RADIUS), rel=1e-9)
+    assert rows["holding_coefficient"].value == pytest.approx(arm / RADIUS, rel=1e-9)
+    assert rows["holding_multiple"].aspect == ("maximum" if told == "all" else "")
+
+
+def test_friction_that_holds_a_mechanism_of_many_joints_is_what_it_holds_with() -> None:
+    """Just below that multiple of every coefficient the load drives the slide, just above it does not."""
+    data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
+    for joint in ("H", "K"):
+        data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": 0.3}
+    known = locking(Mechanism(**data), 41)["holding_multiple"].values
+    at = np.flatnonzero(np.isfinite(known))[::3]
+    assert len(at) >= 3
+    for i in at:
+        for factor, held in ((1 - 1e-6, False), (1 + 1e-6, True)):
+            for joint, own in (("A", FRICTION), ("H", 0.3), ("K", 0.3)):
+                data["joints"][joint]["friction"] = own * known[i] * factor
+            assert np.isfinite(locking(Mechanism(**data), 41)["holding_multiple"].values[i]) == held
 
 
 def expected_states(arm: np.ndarray) -> np.ndarray:
@@ -228,6 +268,41 @@ def test_a_load_beside_the_drive_is_told_where_another_is_useful(useful: bool, s
     codes = [row["code"] for row in attribute(locking(Mechanism(**data), 8), "findings")]
     assert ("locking.load_beside_drive" in codes) == said
     assert "locking.load_beside_drive" not in [row["code"] for row in attribute(locking(hoist(), 8), "findings")]
+
+
+@pytest.mark.parametrize("last", np.linspace(1.2, 2.5, 14))
+def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float) -> None:
+    """Wherever the range ends: nothing but the spring supplies work, and rounding makes no other answer."""
+    data = spring_hoist(stiffness=1e4, free_length=0.1, useful=True).with_friction("off")
+    run = prepare(data.with_values({"drivers.A.range.to": last}))
+    (row,) = [one for one in report_figures(run, look(run, 8)) if one.name == "efficiency_reverse"]
+    assert row.value == pytest.approx(1.0, rel=1e-12)
+    assert row.value <= 1.0
+    assert not row.note
+
+
+def test_work_that_other_springs_supply_backward_is_named() -> None:
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["links"]["ground"]["points"]["Q"] = [0, -0.1]
+    data["springs"] = {"s": {"between": ["ground.Q", "crank.P"], "stiffness": 1e5, "free_length": 0.1}}
+    data["drivers"]["A"]["range"] = [0.0, 1.4]
+    run = prepare(Mechanism(**data))
+    (row,) = [one for one in report_figures(run, look(run, 8)) if one.name == "efficiency_reverse"]
+    assert row.value is None
+    assert row.note == "springs supply work too"
+
+
+@pytest.mark.parametrize(("first", "last", "note"), [
+    (0.2, 1.2, ""), (1.3, 1.5, "self-locking"), (0.2, 1.5, "a mean: the ranges of `locking` differ"),
+    (0.2, 2.3, "a mean: the ranges of `locking` differ"),
+])  # fmt: skip
+def test_a_mean_is_called_self_locking_only_where_it_holds_all_along(first: float, last: float, note: str) -> None:
+    """Whatever its sign; in `analyse` as in `locking`."""
+    data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["drivers"]["A"]["range"] = [first, last]
+    run = prepare(Mechanism(**data))
+    for figures in (report_figures(run, look(run, 30)), summary_of(trunnion.analyse(Mechanism(**data), 30))):
+        assert [one.note for one in figures if one.name == "efficiency_reverse" and one.value] == [note]
 
 
 @pytest.mark.parametrize("load", [-40.0, 40.0])

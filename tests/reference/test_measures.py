@@ -18,6 +18,7 @@ from mechanisms import DURANGO, build, four_bar, slider_crank
 from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.errors import Severity
 from trunnion.measures.figures import figure, kept, known, shown, span
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.measures.positions import plan
@@ -637,6 +638,23 @@ def test_no_other_positions_than_needed(durango: Run) -> None:
 def test_places_that_are_not(driver: Any, measure: Measure, expected: str) -> None:
     with pytest.raises(MechanismError, match=expected):
         plan(press(**driver), [measure], 36)
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ({"at": 3.0}, ["171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"]),
+        ({"over": [0.5, 3.0], "as": "rms"}, ["171.887 deg is outside the range of 'A', 11.4592 to 137.51 deg"]),
+        ({"at": 2.0}, []),
+        ({"as": "maximum"}, []),
+    ],
+)
+def test_check_tells_places_that_are_not(place: dict[str, Any], said: list[str]) -> None:
+    data = press(**RISE).system.mechanism.model_dump(by_alias=True, exclude_unset=True)
+    data["measures"] = {"slide": {"slide": "C", **place}}
+    found = [one for one in trunnion.check(Mechanism(**data)).findings if one.where.startswith("measures.slide")]
+    assert [one.what for one in found] == said
+    assert all(one.severity is Severity.WARNING for one in found)
 
 
 def test_names(crank: Run) -> None:

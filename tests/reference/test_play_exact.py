@@ -7,7 +7,9 @@ import pytest
 
 import trunnion
 from mechanisms import Array, four_bar
+from mechanisms_parts import revolute
 from played import changes, offsets_of, with_play
+from trunnion import Mechanism
 from trunnion.measures.measures import named
 from trunnion.results.attributes import findings_of
 from trunnion.solve.run import prepare
@@ -45,3 +47,67 @@ def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
 def test_small_play_keeps_its_worst_case_to_first_order() -> None:
     result = trunnion.play(with_play(four_bar(), SMALL), steps=STEPS)
     assert not [one for one in findings_of(result) if one.code == "play.beyond_first_order"]
+
+
+def pressed(depth: float, play: float) -> Mechanism:
+    """A slider-crank, in line where it presses on a spring most deeply, with play between rod and slider alone."""
+    points = {"S": {"at": [0, 0], "axis": [1, 0]}}
+    return Mechanism(
+        trunnion=1,
+        links={
+            "ground": {"points": {**points, "O": [0, 0], "W": [0.15, 0]}},
+            "crank": {"points": {"O": [0, 0], "P": [0.03, 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": [0.09, 0]}},
+            "slider": {"points": {**points, "Q": [0, 0]}},
+        },
+        joints={
+            "O": revolute("ground", "crank"),
+            "P": revolute("crank", "rod"),
+            "Q": {**revolute("rod", "slider"), "pin": {"radius": 0.005, "clearance": play}},
+            "S": {"type": "prismatic", "links": ["ground", "slider"]},
+        },
+        drivers={"O": {"speed": 1.0, "range": [-0.5, 0.5]}},
+        springs={
+            "work": {
+                "between": ["ground.W", "slider.Q"], "stiffness": 1e6, "free_length": 0.03 + depth, "only": "push",
+            }
+        },
+        measures={"force": {"spring_force": "work", "at": 0.0}},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("depth", "told"), [(1e-4, True), (4e-4, False)])
+def test_a_spring_that_comes_free_is_told_by_side(depth: float, told: bool) -> None:
+    """In line the slider goes where its pin goes, by its play to either side: −k ρ, and + k ρ or all of the force."""
+    mechanism = pressed(depth, 3e-4)
+    run = prepare(mechanism)
+    (play,) = plays(run.system, run.values).values()
+    ((radius,),) = (play.radii,)
+    most = 1e6 * float(np.ravel(radius)[0])
+    result = trunnion.play(mechanism, at=0.0)
+    assert result["worst_case_total"].item() == pytest.approx(most, rel=1e-9)
+    found = [one.figures for one in findings_of(result) if one.code == "play.below_first_order"]
+    assert bool(found) == told
+    for figures in found:
+        assert figures["first"] == pytest.approx(most, rel=1e-9)
+        assert figures["low"] == pytest.approx(-most, rel=1e-9)
+        assert figures["high"] == pytest.approx(1e6 * depth, rel=1e-9)
+    of_the_model = [one.figures for one in findings_of(trunnion.play(mechanism, steps=11))]
+    places = [one for one in of_the_model if one.get("high") == pytest.approx(1e6 * depth, rel=1e-9)]
+    assert bool(places) == told
+
+
+def test_the_effort_at_a_place_is_told_where_first_order_says_little() -> None:
+    """A crank near its dead centre, against the pin put all round its hole."""
+    result = trunnion.play(pressed(1e-4, 3e-4), ["effort:O"], at=0.02)
+    (found,) = [one.figures for one in findings_of(result) if one.code.endswith("_first_order")]
+    run = prepare(pressed(1e-4, 3e-4))
+    measure = named(run.system.mechanism, ["effort:O"], run.values)[0]
+    (name,) = plays(run.system, run.values)
+    time = np.array([0.52])
+    radius = float(np.ravel(plays(run.system, run.values)[name].radii[0])[0])
+    angle = np.linspace(0, 2 * np.pi, 721)[:, None]
+    offsets = {f"seats.{name}.1.x": radius * np.cos(angle), f"seats.{name}.1.y": radius * np.sin(angle)}
+    with_pins = np.ravel(measure.curve(run.at(time, offsets))[0]) - float(measure.curve(run.solve(time))[0].item())
+    ends = (found["low"], found["high"]) if "low" in found else (-found["exact"], found["exact"])
+    assert max(map(abs, ends)) == pytest.approx(np.max(np.abs(with_pins)), rel=0.01)

@@ -6,6 +6,7 @@ import csv
 
 import numpy as np
 import pytest
+import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 from trunnion import MechanismError, Status, save
@@ -315,6 +316,27 @@ def test_tables_follow_the_figure_and_take_several_measures():
     (one,) = tables(swept({"misalignment": ANGLE}, lambda a: a, margin=False), ["pin-1.reaction_max", "efficiency"])
     assert one.head[:3] == ["misalignment [deg]", "pin-1.reaction max [N]", "efficiency"]
     assert "locking margin" not in one.head
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "shown"),
+    [
+        (0.0, 1.0, ["max"]),
+        (-2.0, 1.0, ["min", "max"]),
+        (-2.0, -1.0, ["min"]),
+        (-1e-12, 1.0, ["max"]),
+        (0.0, 0.0, ["max"]),
+    ],
+)
+def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, shown):
+    """Such as the push and the pull of a hand; what rounding leaves is none. A point without an answer has none."""
+    result = swept({"friction": FRICTION}, margin=False)
+    for end, value in (("min", least), ("max", most)):
+        given = result[f"drive_effort_{end}"]
+        result[f"drive_effort_{end}"] = xr.full_like(given, value).where(result["friction"] > 0.05)
+        result[f"drive_effort_{end}"].attrs = given.attrs
+    (table,) = tables(result)
+    assert [one for one in table.head if one.startswith("input.effort")] == [f"input.effort {k} [N m]" for k in shown]
 
 
 def test_a_measure_that_the_sweep_lacks_is_told():

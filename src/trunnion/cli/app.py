@@ -127,7 +127,7 @@ def check(
     with lines_of(file):
         found = inspect(mechanism)
     show_structure(found, mechanism.name or file.name, len(mechanism.drivers))
-    say(placed(found.findings, file, ["assembly"]), every=True)
+    say(placed(found.findings, file, ["assembly", "measures"]), every=True)
     if assemblies:
         from trunnion.views.assembly.mode_drawings import ways as drawings
         from trunnion.views.cycle.plots import save

@@ -156,7 +156,8 @@ def _files(out: Sequence[Path], measures: Sequence[str], image: str) -> dict[Pat
         kind = path.suffix.lower()
         if kind in IMAGES and len(measures) > 1:
             what = f"{len(measures)} figures do not fit one file"
-            raise MechanismError(Finding(what, str(path), "name a folder, or one --measure"))
+            remedy = f"--out {path.with_suffix('')} makes a folder with one of each; or give one --measure"
+            raise MechanismError(Finding(what, str(path), remedy))
         if kind in IMAGES:
             found[path] = measures[0]
         elif kind in FORMATS or (kind and not path.is_dir()):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,9 @@ from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions, summary
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.measures.measures import named
+from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
 from trunnion.solve.assembly_modes import GroupModes, choices
@@ -72,10 +74,21 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
         found.append(finding_for("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
-    found += shared_dimensions.findings(mechanism)
+    found += [*shared_dimensions.findings(mechanism), *_unplaced(run)]
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))
+
+
+def _unplaced(run: Run) -> Iterator[Finding]:
+    """Measures at a place, or over a range, that the cycle has not: no study can have them."""
+    for measure in named(run.system.mechanism, list(run.system.mechanism.measures), run.values):
+        if measure.in_time or (measure.at is None and measure.over is None):
+            continue
+        try:
+            plan(run, [measure], 1)
+        except MechanismError as error:
+            yield from (replace(one, severity=Severity.WARNING) for one in error.findings)
 
 
 def _gears(run: Run) -> tuple[GearPair, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.analyse import analyse_run
+from trunnion.cycle.holding import holding_figures, holding_multiples, reverse_figure
 from trunnion.cycle.locking_ends import told
 from trunnion.cycle.locking_states import (
     NEAR,
@@ -28,7 +29,6 @@ from trunnion.cycle.near_locking import (
     others,
     passage,
     reverse,
-    reverse_figure,
 )
 from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
@@ -64,6 +64,9 @@ VARIABLES = {
     "efficiency_reverse_instant": Variable(
         ("position",), "1", "power delivered to the drivers over power supplied by the useful loads, backward"
     ),
+    "holding_multiple": Variable(
+        ("position",), "1", "multiple of all friction down to which it holds the useful loads; NaN where it does not"
+    ),
     "locking_state": Variable(("position",), "1", "what friction does forward and backward", np.int8),
 }
 
@@ -97,6 +100,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         more = np.where(status <= Status.LOCKED, others(back), np.nan)
         other = reverse(run, back.walk, FrictionMethod())
     known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
+    ahead = passage(back)
     nothing = np.full(len(time), np.nan)
     efforts = [np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]
     arrays: dict[str, Any] = {
@@ -108,7 +112,8 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
         "power_given_reverse": other.given,
         "efficiency_reverse_instant": _efficiency_reverse(other),
-        "locking_state": in_order(passage(back)._replace(locked=status == Status.LOCKED), other, known),
+        "holding_multiple": holding_multiples(run, time, ahead, other),
+        "locking_state": in_order(ahead._replace(locked=status == Status.LOCKED), other, known),
     }
     found = result.assign(described(arrays, VARIABLES))
     found["locking_state"].attrs.update(codes("flag", LockingState))
@@ -161,7 +166,9 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
         subject = f"other solutions of the friction equations, {dial.intervals(np.flatnonzero(more > 0))}"
         figures.append(Figure("other_solutions", subject, np.nanmax(more), aspect="maximum"))
     figures += _turning(found)
-    backward = reverse_figure(run, _reverse(found))
+    state = found["locking_state"].values
+    figures += holding_figures(run, found["holding_multiple"].values, state, dial)
+    backward = reverse_figure(run, _reverse(found), state)
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import primal
-from trunnion.algebra.quadrature import CANCELLED, integrals
-from trunnion.errors import Finding, counted
+from trunnion.errors import Finding
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve import continuation
@@ -41,8 +40,8 @@ __all__ = [
     "look",
     "others",
     "passage",
+    "passed",
     "reverse",
-    "reverse_figure",
 ]
 
 Array = NDArray[np.float64]
@@ -190,47 +189,6 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
     return Figure(f"{joint}.critical_{parameter}", subject, multiple * value, place=place)
 
 
-def reverse_figure(run: Run, back: Passage) -> Figure | None:
-    """Power that reaches the drivers over that of the useful loads and springs, backward; None if these do not drive.
-
-    It locks, or is 0 or less: then it holds itself.
-    """
-    name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads"
-    if run.seats:  # the way back is that of the mechanism without play
-        subject += ", pins centred"
-    delivered, given = _reversed_means(run, back)
-    if np.all(np.isfinite(back.given)) and not given > 0:
-        return None
-    if np.any(back.locked):
-        places = counted(int(np.count_nonzero(back.locked)), "position")
-        return Figure(name, subject, None, place=f"at {places}", note="it locks")
-    if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
-        return Figure(name, subject, None, note="not every position is solved")
-    value = delivered / given
-    if value > 1:  # over a range what masses and springs have stored comes on top
-        return Figure(name, subject, None, note="masses and springs supply work too")
-    return Figure(name, subject, value, note="" if value > 0 else "self-locking")
-
-
-def _reversed_means(run: Run, back: Passage) -> tuple[float, float]:
-    """Mean powers, W, delivered and given, backward, 0 where they cancel; that of the loads is known where it locks."""
-    if run.cycle.duration <= 0:
-        return float(back.delivered[0]), float(back.given[0])
-    if np.any(back.locked):  # then there is no mean to be delivered, and of the other one the sign is asked for
-        return float("nan"), float(np.mean(back.given))
-
-    def powers(rows: NDArray[np.intp], time: Array) -> Array:
-        there = reverse(run, run.walk(time.ravel()), FrictionMethod())
-        return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
-
-    found = run.once("back", lambda: integrals(powers, [run.edges]))
-    delivered, given = (
-        0.0 if abs(value) <= max(error, CANCELLED * size) else value / run.cycle.duration
-        for value, error, size in zip(found.value[:, 0], found.error[:, 0], found.size[:, 0], strict=True)
-    )
-    return delivered, given
-
-
 class Passage(NamedTuple):
     """Positions passed forward or backward: effort of every driver, where it locks, and what flows where.
 
@@ -246,10 +204,15 @@ class Passage(NamedTuple):
 def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Passage:
     """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
     with them; inertia stays, for accelerations do."""
-    walk = ahead.backward()
-    time = np.asarray(walk.time, float)
-    past = histories(run.system, run.values, run.chosen.assembly, run.cycle, reverse=True)
-    deflections = {joint: history.at(run.cycle.duration - time) for joint, history in past.items()}
+    return passed(run, ahead.backward(), method)
+
+
+def passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
+    """Positions of a walk, in its direction."""
+    turned, time = walk.direction < 0, np.asarray(walk.time, float)
+    past = histories(run.system, run.values, run.chosen.assembly, run.cycle, turned)
+    time = run.cycle.duration - time if turned else time
+    deflections = {joint: history.at(time) for joint, history in past.items()}
     with np.errstate(all="ignore"):
         other = backward(walk, method, Given({}, deflections))
     return passage(other)

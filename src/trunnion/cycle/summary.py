@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss, diagnosis, near_locking, uncounted
 from trunnion.cycle.deviations import error_figures
+from trunnion.cycle.holding import reverse_figure
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import MOST_SUPPOSED, Means
@@ -315,7 +316,7 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
         if found.ideal is not None:
             yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
             yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST)
-        if near and (back := near_locking.reverse_figure(run, near.back)):
+        if near and (back := reverse_figure(run, near.back, _states(found, near))):
             yield back
         residual = balance(arrays) if np.any(counted) else None
         yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
@@ -409,19 +410,24 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
     mechanism = run.system.mechanism
     if near is None or not (useful_loads(mechanism) or useful_springs(mechanism)):
         return {}
-    known, margin = np.isfinite(near.back.given), found.arrays["locking_margin"]
-    if len(near.times) == len(found.time):
-        status = found.arrays["status"]
-        known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
-    else:  # of more positions: the smallest margin from each to the next
+    margin = found.arrays["locking_margin"]
+    if len(near.times) != len(found.time):  # of more positions: the smallest margin from each to the next
         margin = np.minimum.reduceat(margin, np.searchsorted(found.time, near.times * (1 - 1e-12)))
     dial = _dial_of(near, run, found)
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),
          "first": one.first, "count": one.last - one.first + 1}
-        for one in ranges_of(in_order(near.ahead, near.back, known), margin)
+        for one in ranges_of(_states(found, near), margin)
     ]  # fmt: skip
     return {"locking_ranges": {"of": dial.of, "positions": len(near.times), "rows": rows}}
+
+
+def _states(found: Positions, near: near_locking.Locking) -> NDArray[np.int8]:
+    """The codes of `LockingState` of the positions looked at."""
+    known, status = np.isfinite(near.back.given), found.arrays["status"]
+    if len(near.times) == len(found.time):
+        known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
+    return in_order(near.ahead, near.back, known)
 
 
 def _why(means: Means, arrays: Arrays) -> str:

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from trunnion.algebra.roots import root
+
 if TYPE_CHECKING:
     from trunnion.dynamics.solution import Solution
     from trunnion.dynamics.state import FreeMotion
@@ -242,25 +244,7 @@ def starting_time(course: Courses) -> Array:
             max(TURN, gone[max(first - len(NODES), 0)]),
             gone[min(first + len(NODES), len(gone) - 1)],
         )
-    return np.where(slow, course.at(_root(longer, low, high), 0), np.nan)
-
-
-def _root(off: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Where a number gets from above 0 to it, by regula falsi (Illinois); the low end if it is not above there."""
-    at_low, at_high = off(low), off(high)
-    found, left = np.where(at_low <= 0.0, low, high), at_low > 0.0
-    for _ in range(ROUNDS):
-        place = high - at_high * (high - low) / (at_high - at_low)
-        value = off(np.where(left, place, found))
-        found = np.where(left, place, found)
-        above = value > 0.0
-        at_high = np.where(above, 0.5 * at_high, value)
-        at_low = np.where(above, value, 0.5 * at_low)
-        low, high = np.where(above, place, low), np.where(above, high, place)
-        left = left & (np.abs(high - low) > 1e-13 * np.abs(high)) & (value != 0.0)
-        if not np.any(left):
-            break
-    return found
+    return np.where(slow, course.at(root(longer, low, high), 0), np.nan)
 
 
 def peak_effort(course: Courses) -> Array:

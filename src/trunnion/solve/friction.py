@@ -12,6 +12,7 @@ happens is reported.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
@@ -25,6 +26,7 @@ from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import replaced
 from trunnion.algebra.traced import looped
+from trunnion.joints.friction import LawFunction
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod, method_named, peak
@@ -87,6 +89,8 @@ def settle(
     start = group.reactions(pose, loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
+    if method.multiple is not None:
+        contacts = [_times(method.multiple, contact) if contact.rubs else contact for contact in contacts]
     influence = [_with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)
     if method.name == "successive-approximation":
@@ -94,6 +98,17 @@ def settle(
     if problem.one_way:
         return _at_once(problem)
     return _unrolled(problem, method) if problem.compiled else _newton(problem, method)
+
+
+def _times(multiple: Number, contact: Contact) -> Contact:
+    """The contact with a multiple of its friction."""
+    law = replace(contact.law, function=functools.partial(_multiplied, contact.law.function))
+    return contact._replace(law=law, parameters={**contact.parameters, "multiple": multiple})
+
+
+def _multiplied(function: LawFunction, normal: Number, slip: Number, *, multiple: Number, **own: Number) -> Number:
+    """A multiple of what the law says."""
+    return multiple * function(normal, slip, **own)
 
 
 def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:

@@ -30,12 +30,14 @@ class FrictionMethod:
     criterion how far the laws are missed is told by `friction_residual` alone.
     limit: most rounds; a position that needs more is not converged.
     margin_up_to: how far, in multiples of the friction, to look for the point at which it locks; 0: not at all.
+    multiple: of all friction that follows loads, instead of the friction as stated, by position.
     """
 
     name: Method = "newton"
     criterion: float | None = None
     limit: int = 200
     margin_up_to: float = 0.0
+    multiple: Number | None = None
 
 
 def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:

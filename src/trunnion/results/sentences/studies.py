@@ -61,9 +61,15 @@ PLAY = {
     ),
     "play.beyond_first_order": Sentence(
         NOTE,
-        "pins in their holes can change it by {exact:~{unit}} (at {at}), {percent:.2g} % more than the worst case to "
+        "pins in their holes can change it by {exact:~{unit}} (at {at}), {percent:~} % more than the worst case to "
         "first order, {first:~{unit}}",
         "use the larger figure",
+    ),
+    "play.below_first_order": Sentence(
+        NOTE,
+        "with the pins where first order has ±{first:~{unit}} (at {at}), it changes by {low:~{unit}} and "
+        "{high:~{unit}}",
+        "use these figures",
     ),
     "play.at_a_place": Sentence(
         NOTE,

@@ -25,7 +25,7 @@ REST = (
     ("contact_loss_number", "joint", "contact_loss_number"),
     *((name, "", name) for name in (
         "efficiency_instant", "locking_margin", "other_solutions", "power_delivered_reverse", "power_given_reverse",
-        "efficiency_reverse_instant",
+        "efficiency_reverse_instant", "holding_multiple",
         "closure_residual", "condition", "power_residual", "friction_iterations", "friction_change",
         "friction_residual", "friction_contraction", "seat_change", "seat_travel",
     )),
@@ -120,7 +120,8 @@ def locking(result: xr.Dataset) -> list[Column]:
                 values = column(result, f"drive_effort{end}", "", (i,))[2]
                 found.append((f"{driver}.effort{end}", unit, values))
     wanted = ("efficiency_instant", "efficiency_reverse_instant", "other_solutions", "power_delivered_reverse")
-    found += [column(result, name, name, ()) for name in (*wanted, "power_given_reverse") if name in result]
+    more = ("power_given_reverse", "holding_multiple")
+    found += [column(result, name, name, ()) for name in (*wanted, *more) if name in result]
     return [*found, *_locking_state(result), status_column(result)]
 
 

@@ -1,8 +1,8 @@
-"""What play does to coordinates and angles exactly, with the pins where first order has its worst case.
+"""What play does to a measure exactly, with the pins where first order has its worst case.
 
 First order adds ρ |Q| of every joint. The pins are put there, ρ Q/|Q| from the middle of their holes, on either side,
-and the mechanism is assembled again: what the measure changes by can be more, near a dead centre above all, and pins
-that lie in seats can reach it.
+and the mechanism is assembled again. What the measure changes by can be more, near a dead centre above all, and pins
+that lie in seats can reach it; it can be less, and not the same on both sides, as of a spring that comes free.
 """
 
 from __future__ import annotations
@@ -14,58 +14,90 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.errors import Finding, Severity
+from trunnion.errors import Finding, Severity, Status
+from trunnion.measures.measures import Measure
 from trunnion.measures.motion import MOTIONS
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.shifts import HOLE, carriers_of
 from trunnion.studies.play.result import relied_on
 
 if TYPE_CHECKING:
+    from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
 __all__ = ["beyond_first_order", "exact_changes"]
 
 Array = NDArray[np.float64]
-SLIGHT, GRAVE = 0.01, 0.05  # of the worst case to first order: by how much it is exceeded, to be a note, and a warning
+SLIGHT, GRAVE = (
+    0.01,
+    0.05,
+)  # of the worst case to first order: how much more is a note, and a warning; so much less is a note
 
 
-def exact_changes(effect: Effect, i: int) -> Array:
-    """Largest magnitude of the change of a measure, (position,), with the pins at the worst of first order."""
+def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Changes of a measure, (side, position), with the pins at the worst of first order, and what that has of them.
+
+    at: numbers of the positions.
+    """
+    measure, first = effect.measures[i], np.zeros(len(at))
+    offsets: tuple[dict[str, Array], dict[str, Array]] = {}, {}
+    for j, (name, one) in enumerate(effect.plays.items()):
+        moved = HOLE if measure.kind in MOTIONS else carriers_of(effect.run.system.mechanism, name)[0]
+        for k, (end, radius) in enumerate(zip(one.model.ends, one.radii, strict=True)):
+            load = {key: effect.loads[i, j, k, "xyz".index(key.rpartition(".")[2]), at] for key in end}
+            size = np.sqrt(np.sum([part**2 for part in load.values()], axis=0))
+            scale = np.asarray(primal(radius), float) / np.where(size > 0, size, np.inf)
+            first = first + scale * size**2
+            for side, own in zip((-1.0, 1.0), offsets, strict=True):
+                own |= {f"{moved}.{name}.{key}": side * scale * part for key, part in load.items()}
+    found = np.array([_value(effect.run, measure, effect.time[at], own) for own in offsets]) - effect.value[i, at]
+    if measure.turning(effect.run.system):
+        found = found - 2 * np.pi * np.round(found / (2 * np.pi))
+    return found, first
+
+
+def _value(run: Run, measure: Measure, time: Array, offsets: dict[str, Array]) -> Array:
+    """A measure at some times, s, with the pins at offsets in their holes."""
+    if not measure.of_motion:
+        value = measure.curve(run.at(time, offsets, FrictionMethod()))[0]
+    else:
+        walk = forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time)
+        value = measure.value(walk) if measure.kind in MOTIONS else measure.curve(walk)[0]
+    return np.broadcast_to(np.asarray(primal(value), float), time.shape)
+
+
+def beyond_first_order(effect: Effect, i: int) -> Iterator[Finding]:
+    """A measure that pins in their holes can change by more than the worst case of first order says, or by less on a
+    side where that is largest.
+
+    One of forces is looked at where its worst case is largest alone, and not where a joint is at rest: elsewhere the
+    pins turn the sense of the friction of joints that hardly move.
+    """
     run, measure = effect.run, effect.measures[i]
-    found: Array = np.full(len(effect.time), np.nan)
-    for side in (-1.0, 1.0):
-        offsets: dict[str, Array] = {}
-        for j, (name, one) in enumerate(effect.plays.items()):
-            for k, (end, radius) in enumerate(zip(one.model.ends, one.radii, strict=True)):
-                load = {key: effect.loads[i, j, k, "xyz".index(key.rpartition(".")[2])] for key in end}
-                size = np.sqrt(np.sum([part**2 for part in load.values()], axis=0))
-                scale = side * np.asarray(primal(radius), float) / np.where(size > 0, size, np.inf)
-                offsets |= {f"seats.{name}.{key}": scale * part for key, part in load.items()}
-        walk = forward(run.system, {**run.values, **offsets}, run.chosen.assembly, effect.time)
-        change = np.broadcast_to(np.asarray(primal(measure.value(walk)), float), effect.time.shape) - effect.value[i]
-        if measure.turning(run.system):
-            change = change - 2 * np.pi * np.round(change / (2 * np.pi))
-        found = np.fmax(found, np.abs(change))
-    return found
-
-
-def beyond_first_order(effect: Effect) -> Iterator[Finding]:
-    """Measures that pins in their holes can change by more than the worst case of first order says."""
-    for i, measure in enumerate(effect.measures):
-        if measure.kind not in MOTIONS:
-            continue
-        own, k = effect.of(i)
-        dial, totals = own.run.system.dial(own.run.values, own.time), relied_on(own.total, own.status)[k]
-        with np.errstate(all="ignore"):
-            exact = np.where(np.isfinite(totals), exact_changes(own, k), np.nan)
-            largest = np.nanmax(totals, initial=0.0)
-        if not largest > 0 or not np.any(np.isfinite(exact)):
-            continue
-        at = int(np.nanargmax(exact))
-        over = float(exact[at]) / largest - 1
-        if over > SLIGHT:
-            severity = Severity.WARNING if over > GRAVE else Severity.NOTE
-            yield finding_for(
-                "play.beyond_first_order", f"measures.{measure.name}", severity=severity, exact=float(exact[at]),
-                first=float(largest), unit=measure.unit(effect.run.system), percent=100 * over, at=dial.at(at),
-            )  # fmt: skip
+    dial, totals = run.system.dial(run.values, effect.time), relied_on(effect.total, effect.status)[i]
+    largest = float(np.nanmax(totals, initial=0.0))
+    if not largest > 0:
+        return
+    top = int(np.nanargmax(totals))
+    places = np.flatnonzero(np.isfinite(totals)) if measure.of_motion else np.array([top])
+    with np.errstate(all="ignore"):
+        both, own = exact_changes(effect, i, places)
+        exact = np.fmax(*np.abs(both))
+    if not np.any(np.isfinite(exact)) or not (measure.of_motion or effect.status[top] == Status.SOLVED):
+        return
+    at, there = int(np.nanargmax(exact)), int(np.searchsorted(places, top))
+    over = float(exact[at]) / largest - 1
+    where, unit = f"measures.{measure.name}", measure.unit(run.system)
+    if over > SLIGHT:
+        severity = Severity.WARNING if over > GRAVE else Severity.NOTE
+        yield finding_for(
+            "play.beyond_first_order", where, severity=severity, exact=float(exact[at]), first=largest, unit=unit,
+            percent=100 * over, at=dial.at(int(places[at])),
+        )  # fmt: skip
+    elif np.any(np.abs(both[:, there]) < (1 - GRAVE) * own[there]):
+        low, high = np.sort(both[:, there]).tolist()
+        yield finding_for(
+            "play.below_first_order", where, low=low, high=high, first=largest, unit=unit, at=dial.at(top)
+        )

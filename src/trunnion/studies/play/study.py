@@ -351,7 +351,8 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     yield from _limits(run, effect)
     yield from _places(run, effect)
     yield from _idle(run, effect)
-    yield from beyond_first_order(effect)
+    for i in range(len(effect.measures)):
+        yield from beyond_first_order(*effect.of(i))
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
         where = np.flatnonzero(effect.status == code)
@@ -456,6 +457,7 @@ def _places(run: Run, effect: Effect) -> Iterator[Finding]:
             unit=measure.unit(run.system),
         )  # fmt: skip
         yield from _limit_at(run, measure, worst, at)
+        yield from beyond_first_order(there, 0)
 
 
 def _idle(run: Run, effect: Effect) -> Iterator[Finding]:

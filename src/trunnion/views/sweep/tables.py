@@ -28,6 +28,7 @@ __all__ = ["SweepTable", "tables"]
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 LEAST_COLUMNS = 3
 LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
+ROUNDING = 1e-9  # of the largest effort: what is less has no sign
 BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
 
 
@@ -55,8 +56,7 @@ def tables(
 
 def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> SweepTable:
     found = figures(result)
-    efforts = [name for name in found if name.endswith(".effort_max")]
-    shown = [*measures, "efficiency", "efficiency_ideal", *efforts, *BESIDE]
+    shown = [*measures, "efficiency", "efficiency_ideal", *_efforts(found), *BESIDE]
     shown = [name for name in dict.fromkeys(shown) if name in found or name in measures]
     drawn = [_drawn(found[name][0]) for name in shown]
     columns = [factor * grid(result, plan, name)[1][:, 0] for name, (factor, _) in zip(shown, drawn, strict=True)]
@@ -71,6 +71,17 @@ def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Swe
         rows.append([_number(plan.x.values[i]), *cells, *([words[i]] if any(words) else [])])
     said = ", ".join(name.replace("_", " ") for name in measures)
     return SweepTable(_titled(f"{said} over {plan.x.name}", plan.at()), head, rows, len(plan.x.values) - len(picked))
+
+
+def _efforts(found: dict[str, tuple[str, Any]]) -> list[str]:
+    """The ends of every driver's effort that lie beyond 0 at any point: both where its sign changes."""
+    shown = []
+    for driver in (name.removesuffix(".effort_max") for name in found if name.endswith(".effort_max")):
+        ends = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
+        beyond = {name: float(np.nanmax(sign * found[name][1], initial=0.0)) for name, sign in ends.items()}
+        least = ROUNDING * max(beyond.values())
+        shown += [name for name, most in beyond.items() if most > least] or [f"{driver}.effort_max"]
+    return shown
 
 
 def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, room: int) -> list[SweepTable]:

@@ -211,7 +211,7 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, near,
+        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, arrays["locking_margin"], near,
         felt(run.system, run.values),
     )  # fmt: skip
     found += near_locking.findings(near, run.system.dial(run.values, near.times)) if near else []

@@ -16,9 +16,10 @@ from trunnion.solve.loads import Stated
 from trunnion.solve.shifts import hole, play_of
 from trunnion.solve.system import System, Values, rubbing
 
-__all__ = ["DRAWN", "pitch_circles", "planar", "spatial"]
+__all__ = ["COURSE", "DRAWN", "courses", "pitch_circles", "planar", "spatial"]
 
 DRAWN = 360  # positions at which a load that varies is looked at for the drawing
+COURSE = 3600  # positions up to which it is drawn as it is at each of them
 
 
 def planar(system: System, values: Values, walk: Forward, useful: Sequence[str]) -> dict[str, Any]:
@@ -130,7 +131,7 @@ def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str])
         path = f"loads.{name}"
         force = _vector(stated, f"{path}.force", mechanism.coordinates)
         moment = _vector(stated, f"{path}.moment", 3) if mechanism.space == "spatial" else _number(stated, path)
-        varies = not values.keys() >= {p for p in mechanism.parameter_set.entries if p.startswith(f"{path}.")}
+        varies = _varies(system, values, name)
         found[name] = {
             "link": load.link,
             "joint": load.joint,
@@ -142,6 +143,34 @@ def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str])
             "useful": name in useful,
         }
     return found
+
+
+def _varies(system: System, values: Values, load: str) -> bool:
+    """Whether a load has numbers that speak of the motion."""
+    return not values.keys() >= {p for p in system.mechanism.parameter_set.entries if p.startswith(f"loads.{load}.")}
+
+
+def courses(system: System, values: Values, walk: Forward) -> dict[str, dict[str, list[list[float | None]]]]:
+    """Of each load that varies the components of its force, N, and moment, N m, at every position of a walk, to seven
+    digits; None where there is no value."""
+    stated, space = Stated(walk), system.mechanism.space == "spatial"
+    found: dict[str, dict[str, list[list[float | None]]]] = {}
+    for name in [one for one in system.mechanism.loads if _varies(system, values, one)]:
+        axes = "xyz"[: system.mechanism.coordinates]
+        paths = {"force": [f".force.{axis}" for axis in axes]}
+        paths["moment"] = [f".moment.{axis}" for axis in axes] if space else [".moment"]
+        parts = {what: [stated.get(f"loads.{name}{path}") for path in own] for what, own in paths.items()}
+        found[name] = {
+            what: [_plain_numbers(one, np.shape(walk.time)) for one in own]
+            for what, own in parts.items()
+            if all(one is not None for one in own)
+        }
+    return found
+
+
+def _plain_numbers(number: Number, shape: tuple[int, ...]) -> list[float | None]:
+    values = np.broadcast_to(np.asarray(primal(number), float), shape).tolist()
+    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values]
 
 
 def _vector(stated: Stated, path: str, count: int) -> list[float] | None:

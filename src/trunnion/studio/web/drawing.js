@@ -276,7 +276,7 @@ export function pose(view, scene, index) {
     circles.forEach((one) => set(one, { r: radius * frame.scale }));
   });
   parts.loads.forEach((one) => {
-    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed) ?? 0);
+    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed) ?? 0, view.posed);
     poseLoad(one, spots(one.keys), frame);
   });
   parts.drives.forEach((one) => poseDrive(view, one, spot(one.joint.at)));

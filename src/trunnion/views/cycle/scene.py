@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.results.attributes import attribute
-from trunnion.views.common.cycle import abscissa, column, intervals, layout, names, numbers, series
+from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.deviations import losses
 from trunnion.views.cycle.deviations_scene import built
@@ -75,7 +75,11 @@ def scene(
         "efficiency": _single(result, "efficiency"),
         "built": built(kept, _lost(result, picked)),
     }  # fmt: skip
-    return shown | space_scene(kept) if is_spatial(result) else shown
+    if is_spatial(result):
+        shown |= space_scene(kept)
+    for load in shown["loads"]:
+        load["course"] = course(result, picked, load["name"])
+    return shown
 
 
 def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:

@@ -129,7 +129,9 @@ def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str])
     for name, load in mechanism.loads.items():
         path = f"loads.{name}"
         force = _vector(stated, f"{path}.force", mechanism.coordinates)
-        moment = _vector(stated, f"{path}.moment", 3) if mechanism.space == "spatial" else _number(stated, path)
+        moment = (
+            _vector(stated, f"{path}.moment", 3) if mechanism.space == "spatial" else _number(stated, path, "moment")
+        )
         varies = not values.keys() >= {p for p in mechanism.parameter_set.entries if p.startswith(f"{path}.")}
         found[name] = {
             "link": load.link,
@@ -137,6 +139,8 @@ def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str])
             "at": load.at,
             "force": force,
             "moment": moment,
+            "resists": _number(stated, path, "resisting_torque", "resisting_force"),
+            "only": load.only,
             "frame": load.frame,
             "varies": varies,
             "useful": name in useful,
@@ -149,9 +153,10 @@ def _vector(stated: Stated, path: str, count: int) -> list[float] | None:
     return None if any(part is None for part in parts) else _largest(*parts)
 
 
-def _number(stated: Stated, path: str) -> float | None:
-    moment = stated.get(f"{path}.moment")
-    return None if moment is None else _largest(moment)[0]
+def _number(stated: Stated, path: str, *keys: str) -> float | None:
+    """The one of some numbers that is stated."""
+    found = next((number for key in keys if (number := stated.get(f"{path}.{key}")) is not None), None)
+    return None if found is None else _largest(found)[0]
 
 
 def _largest(*components: Number) -> list[float]:

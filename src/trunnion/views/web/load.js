@@ -1,6 +1,7 @@
 // Loads in the drawing: a force as an arrow at its point, a moment as a bent one on its link. Their length is no scale.
 
 import { arrow, bentArrow } from "./arrow.js";
+import { at, guide } from "./data.js";
 import { set, svg } from "./dom.js";
 import { stated } from "./format.js";
 
@@ -10,32 +11,46 @@ const CHARACTER = 7.6; // px, a wide mean of the labels' letters, until the brow
 const EDGE = 5; // px between a label and the edge of the picture
 
 /**
- * What can be drawn of the loads, [{keys, node, aim, label}]; a load stands at the middle of the points `keys`. `aim`, of a
- * force that follows its link, turns it with the link's angle.
+ * What can be drawn of the loads, [{name, keys, node, aim, label}]; a load stands at the middle of the points `keys`.
+ * `aim(index)` turns it as it is at a position of a scene of the same structure.
  */
 export function loadsOf(scene) {
   return scene.loads.flatMap((load) => {
     const body = scene.links.find((link) => link.name === load.link)?.points ?? [];
     const parts = [];
-    if (load.at && Math.hypot(...load.force) > 0) parts.push({ keys: [load.at], ...force(load) });
-    if (load.moment && body.length) parts.push({ keys: load.at ? [load.at] : body, ...moment(load) });
-    return parts;
+    const [x, y] = load.force ?? [0, 0];
+    const turned = (now, index) => (load.frame === "link" ? (at(now.links.find((link) => link.name === load.link).angle, index) ?? 0) : 0);
+    if (load.at && Math.hypot(x, y) > 0)
+      parts.push({ keys: [load.at], ...force(load, Math.hypot(x, y), (now, index) => Math.atan2(y, x) + turned(now, index)) });
+    if (load.moment && body.length) parts.push({ keys: load.at ? [load.at] : body, ...moment(load, load.moment, () => load.moment) });
+    return [...parts, ...resisting(scene, load)];
   });
 }
 
-function force({ name, force: [x, y], frame, varies, link }) {
-  const text = value(Math.hypot(x, y), "N", varies);
+/** What opposes the motion of a joint, on its second link; it is hidden where it does not act. */
+function resisting(scene, load) {
+  const joint = load.resists && scene.joints.find(({ name }) => name === load.joint);
+  if (!joint) return [];
+  const sense = (now, index) => at(now.loads.find(({ name }) => name === load.name)?.acts, index) || null;
+  if (joint.type !== "prismatic") return [{ keys: [joint.at], ...moment(load, load.resists, sense) }];
+  const angle = (now, index) => sense(now, index) && guide(now, joint, index) + (sense(now, index) < 0 ? Math.PI : 0);
+  return [{ keys: [joint.at], ...force(load, load.resists, angle) }];
+}
+
+/** An arrow in the direction angle(scene, index), rad; null where it does not act. */
+function force({ name, varies }, size, angle) {
+  const text = value(size, "N", varies);
   const shaft = svg("path");
   const label = { node: svg("text", { dy: "0.32em" }, text), size: text.length * CHARACTER, tip: [0, 0], left: false };
-  const aim = (angle) => {
-    const direction = Math.atan2(y, x) + angle;
+  const node = svg("g", { class: "load" }, svg("title", {}, `${name}: ${text}`), shaft, label.node);
+  const aim = (scene, index) => {
+    const direction = angle(scene, index);
     const [dx, dy] = [LENGTH * Math.cos(direction), -LENGTH * Math.sin(direction)];
+    set(node, { display: direction === null ? "none" : null });
     set(shaft, { d: arrow(0, 0, dx, dy) });
     Object.assign(label, { tip: [dx, dy], left: dx < -0.3 * LENGTH });
   };
-  aim(0);
-  const node = svg("g", { class: "load" }, svg("title", {}, `${name}: ${text}`), shaft, label.node);
-  return { node, aim: frame === "link" ? aim : null, link, label };
+  return { name, node, aim, label };
 }
 
 /** A load's size; of one that varies, its largest. */
@@ -43,20 +58,22 @@ function value(size, unit, varies) {
   return varies ? `≤ ${stated(size, unit)}` : stated(size, unit);
 }
 
-function moment({ name, moment: size, varies }) {
-  const { shaft, head } = bentArrow(RADIUS, size);
-  const side = size > 0 ? 1 : -1; // beside the arc, away from its head
+/** A bent arrow counter-clockwise where sense(scene, index) is positive; null where it does not act. */
+function moment({ name, varies }, size, sense) {
   const text = value(size, "N m", varies);
-  const words = svg("text", { dy: "0.32em" }, text);
-  const node = svg(
-    "g",
-    { class: "load" },
-    svg("title", {}, `${name}: ${text}`),
-    svg("path", { class: "arc", d: shaft }),
-    svg("path", { d: head }),
-    words,
-  );
-  return { node, label: { node: words, size: text.length * CHARACTER, tip: [side * RADIUS, 2], left: side < 0 } };
+  const [words, arc, tip] = [svg("text", { dy: "0.32em" }, text), svg("path", { class: "arc" }), svg("path")];
+  const label = { node: words, size: text.length * CHARACTER, tip: [0, 2], left: false };
+  const node = svg("g", { class: "load" }, svg("title", {}, `${name}: ${text}`), arc, tip, words);
+  const aim = (scene, index) => {
+    const way = sense(scene, index);
+    const { shaft, head } = bentArrow(RADIUS, way);
+    set(node, { display: way === null ? "none" : null });
+    set(arc, { d: shaft });
+    set(tip, { d: head });
+    const side = way > 0 ? 1 : -1; // beside the arc, away from its head
+    Object.assign(label, { tip: [side * RADIUS, 2], left: side < 0 });
+  };
+  return { name, node, aim, label };
 }
 
 /** Set a label beside the tip of its load; where it would leave the picture, inside it and clear of the tip. */

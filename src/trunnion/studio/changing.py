@@ -59,7 +59,8 @@ def put_value(sketch: Sketch, given: Given) -> str:
     stated = spoken(path)
     if value is not None:
         group[last] = _typed(value)
-        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else value}"
+        told = ("no", "yes")[value] if isinstance(value, bool) else value
+        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else told}"
     if way == ["dimensions"] and (users := list(_users(sketch.entries, str(last)))):
         what = f"is in use: by {', '.join(users[:3])}{' and others' if users[3:] else ''}"
         raise refused(what, path, "type another value, or change what uses it first")

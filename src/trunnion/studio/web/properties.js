@@ -3,7 +3,7 @@
 import { useRef, useState } from "preact/hooks";
 import { edit, setValue } from "./actions.js";
 import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, written } from "./fields.js";
-import { dictionary } from "./geometry.js";
+import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
 import { removePart } from "./tools.js";
@@ -34,6 +34,8 @@ function Chosen({ kind, name }) {
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
+        ${kind === "joints" && !state.spatial.value && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
+        ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
         ${(kind === "joints" || kind === "points") && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
@@ -41,6 +43,14 @@ function Chosen({ kind, name }) {
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore
+}
+
+/** The slides and pivots on the ground that a load with a direction could oppose. */
+function against(entries, name) {
+  const { link } = entries?.loads?.[name] ?? {};
+  const ground = groundOf(entries);
+  const joints = Object.entries(dictionary(entries?.joints));
+  return link && !state.spatial.value ? joints.filter(([, one]) => one?.links?.includes(link) && one.links.includes(ground)).map(([joint]) => joint) : [];
 }
 
 function Name({ kind, name }) {
@@ -64,11 +74,16 @@ const units = new Map();
 
 /** A value, or the parts of a list, with what is wrong about it. */
 function Row({ row, findings }) {
-  const { path, label, value, example, fixed, common } = row;
+  const { path, label, value, example, fixed, common, choices } = row;
   const wrong = findingsOf(findings, path).filter(({ severity }) => severity !== "note");
   const id = `value-${path.join("-")}`;
   const list = Array.isArray(value ?? example);
   if (fixed) return html`<div class="row"><span class="label">${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
+  if (choices)
+    return html`<div class="row"><label class="label" for=${`${id}-0`}>${label}</label><span class="values">
+      <select id=${`${id}-0`} value=${value ?? ""} onChange=${({ target }) => setValue(path, { "": null, true: true, false: false }[target.value] ?? (target.value || null))}>
+        ${Object.entries({ ...choices, ...(value && !(value in choices) && { [value]: value }) }).map(([one, words]) => html`<option value=${one}>${words}</option>`)}
+      </select></span></div>`; // prettier-ignore
   const parts = list ? (value ?? example.map(() => "")) : [value ?? ""];
   if (!wrong.length) parts.forEach((_, order) => unitOf(row, order) && units.set(`${id}-${order}`, unitOf(row, order)));
   const put = (order) => async ({ target }) => {

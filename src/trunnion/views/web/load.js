@@ -1,80 +1,101 @@
 // Loads in the drawing: a force as an arrow at its point, a moment as a bent one on its link. Their length is no scale.
 
 import { arrow, bentArrow } from "./arrow.js";
+import { at, guide } from "./data.js";
 import { set, svg } from "./dom.js";
 import { stated } from "./format.js";
 
 const LENGTH = 44; // px
 const RADIUS = 19; // px
 const CHARACTER = 7.6; // px, a wide mean of the labels' letters, until the browser tells
-const NONE = 1e-9; // of the largest value: a load that is less is none
 const EDGE = 5; // px between a label and the edge of the picture
 
 /**
- * What can be drawn of the loads, [{keys, node, aim, label}]; a load stands at the middle of the points `keys`. `aim(angle,
- * index)` turns a force that follows its link with the link's angle, and shows one that varies as it is at a position.
+ * What can be drawn of the loads, [{name, keys, node, aim, label}]; a load stands at the middle of the points `keys`.
+ * `aim(scene, index)` makes it what it is at a position of a scene of the same structure, hidden where it does not act.
  */
 export function loadsOf(scene) {
   return scene.loads.flatMap((load) => {
     const body = scene.links.find((link) => link.name === load.link)?.points ?? [];
+    const joint = load.resists ? scene.joints.find(({ name }) => name === load.joint) : null;
     const parts = [];
-    if (load.at && Math.hypot(...load.force) > 0) parts.push({ keys: [load.at], ...force(load) });
-    if (load.moment && body.length) parts.push({ keys: load.at ? [load.at] : body, ...moment(load) });
+    if (load.at && Math.hypot(...load.force) > 0) parts.push({ keys: [load.at], ...force(load, pushed) });
+    if (load.moment && body.length) parts.push({ keys: load.at ? [load.at] : body, ...moment(load, turned) });
+    if (joint) parts.push({ keys: [joint.at], ...(joint.type === "prismatic" ? force(load, (...now) => along(joint, ...now)) : moment(load, opposed)) });
     return parts;
   });
 }
 
-function force({ name, force: stated_, frame, varies, course, link }) {
-  const parts = drawn(name, "N");
-  const [shaft] = parts.paths;
-  const aim = (angle, index) => {
-    const [x, y] = now(course?.force, index) ?? stated_;
-    const direction = Math.atan2(y, x) + (frame === "link" ? angle : 0);
-    const [dx, dy] = [LENGTH * Math.cos(direction), -LENGTH * Math.sin(direction)];
+/** The components of a load's `force`, its `moment` or what it `resists` at a position: of one that varies those there. */
+function present(load, key, index) {
+  const course = load.course?.[key];
+  return course ? course.map((values) => at(values, index)) : [load[key] ?? 0].flat();
+}
+
+/** A force in the plane as {size, angle}, N and rad. */
+function pushed(scene, load, index) {
+  const [x, y] = present(load, "force", index);
+  const link = load.frame === "link" ? scene.links.find(({ name }) => name === load.link) : null;
+  return { size: Math.hypot(x, y), angle: Math.atan2(y, x) + (link ? (at(link.angle, index) ?? 0) : 0) };
+}
+
+/** A moment, N m; positive counter-clockwise. */
+function turned(_, load, index) {
+  return present(load, "moment", index)[0];
+}
+
+/** What opposes the motion of a joint, on its second link: N m or N. */
+function opposed(_, load, index) {
+  return present(load, "resists", index)[0] * at(load.acts, index);
+}
+
+function along(joint, scene, load, index) {
+  const size = opposed(scene, load, index);
+  return { size: Math.abs(size), angle: guide(scene, joint, index) + (size < 0 ? Math.PI : 0) };
+}
+
+function force(load, course) {
+  const shaft = svg("path");
+  const put = (scene, one, index, label) => {
+    const { size, angle } = course(scene, one, index);
+    const [dx, dy] = [LENGTH * Math.cos(angle), -LENGTH * Math.sin(angle)];
     set(shaft, { d: arrow(0, 0, dx, dy) });
-    Object.assign(parts.label, { tip: [dx, dy], left: dx < -0.3 * LENGTH });
-    parts.say(Math.hypot(x, y), varies && !course, Math.hypot(...stated_));
+    Object.assign(label, { tip: [dx, dy], left: dx < -0.3 * LENGTH });
+    return size;
   };
-  aim(0, 0);
-  return { ...parts, aim: frame === "link" || course ? aim : null, link };
+  return part(load, "N", [shaft], put);
 }
 
-function moment({ name, moment: size, varies, course, link }) {
-  const parts = drawn(name, "N m", "arc");
-  const aim = (_, index) => {
-    const [here] = now(course?.moment, index) ?? [size];
-    const { shaft, head } = bentArrow(RADIUS, here);
-    [shaft, head].forEach((d, order) => set(parts.paths[order], { d }));
-    const side = here > 0 ? 1 : -1; // beside the arc, away from its head
-    Object.assign(parts.label, { tip: [side * RADIUS, 2], left: side < 0 });
-    parts.say(Math.abs(here), varies && !course, Math.abs(size));
+function moment(load, course) {
+  const [arc, tip] = [svg("path", { class: "arc" }), svg("path")];
+  const put = (scene, one, index, label) => {
+    const size = course(scene, one, index);
+    const { shaft, head } = bentArrow(RADIUS, size);
+    set(arc, { d: shaft });
+    set(tip, { d: head });
+    const side = size > 0 ? 1 : -1; // beside the arc, away from its head
+    Object.assign(label, { tip: [side * RADIUS, 2], left: side < 0 });
+    return Math.abs(size);
   };
-  aim(0, 0);
-  return { ...parts, aim: course ? aim : null, link };
+  return part(load, "N m", [arc, tip], put);
 }
 
-/** The components of a load that varies at a position, 0 where it has no value; null of one that does not vary. */
-function now(components, index) {
-  return components?.length ? components.map((values) => values[index] || 0) : null;
-}
-
-/** The nodes of a load, and `say(size, most, peak)`: its size, of one that is not known at each position its largest. */
-function drawn(name, unit, kind) {
-  const title = svg("title");
-  const paths = kind ? [svg("path", { class: kind }), svg("path")] : [svg("path")];
-  const label = { node: svg("text", { dy: "0.32em" }), size: 0, measured: 0, tip: [0, 0], left: false };
-  const node = svg("g", { class: "load" }, title, ...paths, label.node);
-  let said = "";
-  const say = (size, most, peak) => {
-    const words = `${most ? "≤ " : ""}${stated(size, unit)}`;
-    if (words === said) return;
-    said = words;
-    title.textContent = `${name}: ${words}`;
-    label.node.textContent = words;
-    Object.assign(label, { size: words.length * CHARACTER, measured: 0 });
-    node.classList.toggle("no-load", size <= NONE * peak); // nothing acts here
+/** A part of the drawing with its label; `put(scene, load, index, label)` shapes it and returns its size. */
+function part({ name, varies, course }, unit, shapes, put) {
+  const [words, title] = [svg("text", { dy: "0.32em" }), svg("title")];
+  const label = { node: words, size: 0, measured: 0, tip: [0, 0], left: false };
+  const node = svg("g", { class: "load" }, title, ...shapes, words);
+  const most = varies && !course ? "≤ " : ""; // of one whose course is not known its largest
+  const aim = (scene, index) => {
+    const size = put(scene, scene.loads.find((one) => one.name === name) ?? {}, index, label);
+    const text = `${most}${stated(size, unit)}`;
+    set(node, { display: size > 0 ? null : "none" });
+    if (text === words.textContent) return;
+    words.textContent = text;
+    title.textContent = `${name}: ${text}`;
+    Object.assign(label, { size: text.length * CHARACTER, measured: 0 });
   };
-  return { node, paths, label, say };
+  return { name, node, aim, label };
 }
 
 /** Set a label beside the tip of its load; where it would leave the picture, inside it and clear of the tip. */

@@ -2,6 +2,7 @@
 
 import { useRef, useState } from "preact/hooks";
 import { edit, setValue } from "./actions.js";
+import { AddDimension } from "./adding.js";
 import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, written } from "./fields.js";
 import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
@@ -12,6 +13,7 @@ import { Button, html } from "./ui.js";
 const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Driver", loads: "Load", springs: "Spring", gears: "Gear pair" };
 const SECTIONS = ["links", "joints", "drivers", "loads", "springs", "gears"];
 const MOST = 300; // parts in a list
+const ROOMY = 9; // letters that every field has room for
 
 export function Properties() {
   const chosen = state.selection.value;
@@ -94,7 +96,7 @@ function Row({ row, findings }) {
   return html`<div class="row">
     <label class="label" for=${`${id}-0`}>${label}</label>
     <span class="values">
-      ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
+      ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} style=${`--wide: ${String(one).length > ROOMY ? String(one).length + 3 : 0}ch`} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
         aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${hintOf(units.get(`${id}-${order}`))}
         aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>
@@ -126,9 +128,9 @@ function Model() {
   const { entries, findings } = state.answer.value ?? {};
   const dimensions = Object.entries(dictionary(entries?.dimensions));
   return html`<section><h2>Model</h2><${Rows} rows=${rowsOf(entries, "model")} findings=${findings} /></section>
-    ${dimensions.length > 0 && html`<section><h2>Dimensions</h2><div class="rows">
+    <section><h2>Dimensions</h2><div class="rows">
       ${dimensions.map(([name, value]) => html`<${Dimension} key=${name} name=${name} value=${value} findings=${findings} />`)}
-    </div></section>`}
+    </div><${AddDimension} /></section>
     <section><h2>Parts</h2>${SECTIONS.map((kind) => html`<${Parts} kind=${kind} names=${Object.keys(dictionary(entries?.[kind]))} />`)}</section>
     ${others.value.length > 0 && html`<section><h2>Other assemblies</h2><p class="row-of-buttons">
       ${others.value.map(({ name }) => html`<${Button} label=${`Take ${name}`} onClick=${() => takeOther(name)} />`)}</p></section>`}`; // prettier-ignore

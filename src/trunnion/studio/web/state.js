@@ -80,6 +80,7 @@ export function commit(name, before, next, merge = null) {
   const last = past.value[past.value.length - 1];
   batch(() => {
     if (!merge || last?.merge !== merge) past.value = [...past.value, { name, merge, ...before }].slice(-STEPS);
+    else past.value = [...past.value.slice(0, -1), { ...last, name }]; // what it came to
     future.value = [];
     text.value = next.text;
     places.value = next.places;
@@ -129,6 +130,7 @@ export function begin({ name, saved, content, steps = null }) {
     index.value = 0;
     tool.value = "select";
     photo.value = undefined;
+    if (opened.value) variant.value = null; // of another sheet; a page that is loaded again has the one it had
     opened.value += 1;
     recovered.value = steps && content !== saved ? steps.time : null;
     variant.value = steps?.variant ?? variant.value;

@@ -42,10 +42,12 @@ export function choose(id) {
   say(hint());
 }
 
-/** What to do next, in a sentence. */
+/** What to do next, in a sentence; where fingers are all there is, without what asks for keys. */
 export function hint() {
   const { hint: words } = toolOf();
-  return words[pending.value ? words.length - 1 : 0];
+  const own = words[pending.value ? words.length - 1 : 0];
+  const touched = matchMedia("(hover: none) and (pointer: coarse)").matches;
+  return touched ? own.replace(/ [^.]*\b(Shift|Alt)\b[^.]*\./g, "").replace(/\bClick\b/g, "Touch") : own;
 }
 
 /** A click at a spot; `part` is the {kind, name, link} under it. */

@@ -86,6 +86,30 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.idle()
         assert np.abs(effort(user) - torque).max() <= PEAK * np.abs(torque).max()
 
+    def test_a_load_against_the_motion_is_put_on_a_pivot_and_on_its_link(user):
+        user.box = {"x": 0, "y": 0}
+        for spot in (user.handle("D"), None):
+            (dx, dy), (cx, cy) = user.handle("D"), user.handle("C")
+            user.keys("f")
+            steps = user.state("s.past.value.length")
+            user.click(*(spot or (0.5 * (cx + dx), 0.5 * (cy + dy))))
+            user.page.keyboard.type("2 kNm" if spot else "300")
+            assert "against the motion of D" in user.page.locator(".measure").text_content()
+            user.click(*(spot or (0.5 * (cx + dx), 0.5 * (cy + dy))))
+            user.until(f"s.past.value.length > {steps} && s.answer.value.text === s.text.value")
+            user.keys("v")
+        loads = entries_of(user.state("s.text.value"))[0]["loads"]
+        assert {"joint": "D", "resisting_torque": "2 kNm"} in loads.values()
+        assert loads["load2"] == {"joint": "D", "resisting_torque": "300 N m"}
+        assert user.state("s.selection.value.name") == "load2"
+        user.page.select_option("#value-loads-load2-only-0", label="clockwise")
+        user.until("s.answer.value.text === s.text.value && s.text.value.includes('only: negative')")
+        acts = user.state("s.answer.value.scene.loads.find(one => one.name === 'load2').acts")
+        assert {0.0, 1.0} == set(acts)
+        for sense in (0.0, 1.0):
+            user.of("motion", "m.crank.go(given)", acts.index(sense))
+            assert user.page.locator('[data-kind="loads"][data-name="load2"]').is_visible() == bool(sense)
+
     @pytest.mark.slow
     def test_a_pin_clicked_after_its_link_slides_along_it(user):
         user.new_sheet()

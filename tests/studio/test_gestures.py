@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import trunnion
 from studio.asking import ask, edited, solved
 from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
 
 WHITWORTH = (
     {"do": "link", "from": {"ground": [0, 0.04]}, "to": [0.06, 0.1]},
@@ -112,7 +114,8 @@ def test_gears_mesh_as_they_are_drawn(typed, written, ratio):
         {"do": "slide", "joint": "link2.D", "along": "link2"}, {"do": "slide", "joint": "E", "angle": 0.0},
         {"do": "slide", "joint": {"on": "link2", "at": [0, 0]}, "along": "link2"},
         {"do": "spring", "between": ["A", {"ground": [0.2, 0.2]}]}, {"do": "load", "at": [0, 0], "force": ["1 N", 0]},
-        {"do": "lock", "point": "nothing"}, {"do": "rename", "what": ["joints", "A"], "to": "B"},
+        {"do": "load", "against": "Q"}, {"do": "lock", "point": "nothing"},
+        {"do": "rename", "what": ["joints", "A"], "to": "B"},
         {"do": "set", "path": ["gears", "gear1", "ratio"], "value": None},
         {"do": "move", "point": "D", "to": [0, 0]}, {"do": "move", "point": "link1.Z", "to": [0, 0.04]},
     ],
@@ -295,3 +298,26 @@ def test_everything_that_is_drawn_has_a_name_of_its_own():
     assert entries["loads"]["cut"]["at"] == "tool"
     assert entries["springs"]["return"]["between"][0] == "rod.tool"
     np.testing.assert_allclose(np.array(solved(text)["scene"]["drivers"][0]["effort"], float), before, rtol=1e-6)
+
+
+def test_a_load_against_the_motion_takes_power_from_a_slide_whichever_way_it_goes():
+    text, places = edited("", {}, *WHITWORTH, {"do": "load", "at": "F", "force": ["-150 N", "200 N"]})
+    text, places = edited(text, places, {"do": "set", "path": ["loads", "load1", "useful"], "value": True})
+    text, places = edited(text, places, {"do": "load", "against": "G", "instead": "load1"})
+    text, places = edited(text, places, {"do": "load", "against": "C", "size": "2 N m"})
+    assert entries_of(text)[0]["loads"] == {
+        "load1": {"joint": "G", "resisting_force": "250 N", "useful": True},
+        "load2": {"joint": "C", "resisting_torque": "2 N m"},
+    }
+    found = solved(text)
+    loads = {load["name"]: load for load in found["scene"]["loads"]}
+    assert [loads[name]["resists"] for name in ("load1", "load2")] == [250.0, 2.0]
+    x = tracks(found, "block2.F")[:, 0]
+    ahead = np.roll(x, -1) - np.roll(x, 1)
+    clear = np.abs(ahead) > 0.02 * np.abs(ahead).max()
+    np.testing.assert_array_equal(np.array(loads["load1"]["acts"])[clear], -np.sign(ahead)[clear])
+    work = trunnion.analyse(Mechanism(**entries_of(text)[0]), 720)["useful_power_mean"].item() * 1.0  # of a turn in 1 s
+    assert work == pytest.approx(250.0 * 2 * np.ptp(x), rel=1e-4)
+    text, _ = edited(text, places, {"do": "set", "path": ["loads", "load1", "only"], "value": "negative"})
+    (acts,) = (load["acts"] for load in solved(text)["scene"]["loads"] if load["name"] == "load1")
+    np.testing.assert_array_equal(np.array(acts)[clear], np.where(ahead < 0, 1, 0)[clear])

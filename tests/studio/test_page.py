@@ -102,9 +102,12 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.keys("Control+z")
         assert user.state("s.text.value") == drawn
 
-    def test_unsaved_work_on_a_file_is_offered_beside_another_sheet(user):
+    def test_unsaved_work_on_a_file_is_offered_beside_another_sheet_with_its_variant(user):
         user.of("actions", "m.save(given)", "lever.yaml")
+        user.page.click("role=tab[name=Plots]")
+        user.page.click("button:has-text('Keep as variant A')")
         user.idle()
+        variant = user.state("s.variant.value.text")
         changed = user.state("s.text.value").replace("friction: 0.1", "friction: 0.2") + "# mine\n"
         user.of("actions", "m.typed(given)", changed)
         user.idle()
@@ -117,6 +120,9 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.click("button:has-text('Open it')")
         user.until("s.fileName.value === 'lever.yaml'")
         assert user.state("s.text.value") == changed
+        assert user.state("s.variant.value.text") == variant != changed
+        user.page.click("role=tab[name=Plots]")
+        user.page.wait_for_selector(".changes td")
         user.of("actions", "m.save(given)", "lever.yaml")
         user.idle()
 

@@ -152,11 +152,12 @@ def findings(
     status: NDArray[Any],
     condition: NDArray[np.float64],
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
+    margin: NDArray[np.float64],
     near: Locking | None = None,
     felt: Sequence[str] | None = None,
 ) -> list[Finding]:
-    """One finding for each cause. efforts: least and largest effort and unit of every driver; felt: joints with
-    friction that is not 0, all that have a law if not given."""
+    """One finding for each cause. efforts: least and largest effort and unit of every driver; margin: multiple of all
+    friction at which a position locks; felt: joints with friction that is not 0, all that have a law if not given."""
     felt = rubbing(causes.system) if felt is None else felt
     found = [_not_assembled(causes, dial, part) for part in causes.open_modules().values()]
     stuck = causes.stuck()
@@ -174,7 +175,8 @@ def findings(
         code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
         found.append(finding_for(code, path, at=dial.intervals(positions)))
     for number, (positions, share) in causes.locked().items():
-        found.append(_locked(causes.system, dial, number, positions, share, near, felt))
+        whole = float(np.nanmin(margin[positions], initial=np.inf))
+        found.append(_locked(causes.system, dial, number, positions, share, whole, near, felt))
     late = np.flatnonzero(status == Status.NOT_CONVERGED)
     if len(late):
         found.append(finding_for("friction.not_converged", "joints", at=dial.intervals(late)))
@@ -246,6 +248,7 @@ def _locked(
     number: int,
     positions: Positions,
     share: NDArray[np.float64],
+    whole: float,
     near: Locking | None,
     felt: Sequence[str],
 ) -> Finding:
@@ -261,7 +264,7 @@ def _locked(
             decides, multiple = responsible
     return finding_for(
         "friction.locked", f"links {', '.join(module.links)}", at=dial.intervals(positions), share=np.min(share),
-        joints=joints, reverse=reverse, decides=decides, multiple=multiple,
+        joints=joints, reverse=reverse, decides=decides, multiple=multiple, whole=whole,
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction import FrictionProblem, frictionless, identity_minus, scaled
-from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.friction_method import MARGIN, FrictionMethod, peak
 from trunnion.solve.loads import useful_powers
 from trunnion.solve.system import Dial, law_of
 
@@ -55,7 +55,8 @@ SAME = 1e-6  # of the largest force: two solutions nearer than this are one
 def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
     """For each joint the multiple of its own friction at which it locks its module, the others' being as they are.
 
-    ∞ where it does not up to `most`, 0 where the module locks even without friction in this joint.
+    ∞ where it does not up to `most`, 0 where the module locks even without friction in this joint, NaN where it has no
+    loads, because another one locks.
     """
     system, positions = back.walk.system, np.shape(back.walk.time)
     found: dict[str, Array] = {}
@@ -67,7 +68,9 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
         if not places:  # nothing but gears pushed apart
             continue
         own = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
+        loads = peak(settled.problem.state([0.0] * len(contacts)).normals)
         for place, multiple in zip(places, _alone(settled.problem, own, most), strict=True):
+            multiple = np.where(np.isfinite(loads), multiple, np.nan)
             found[system.places[number][place].joint] = np.broadcast_to(multiple, positions)
     return {joint: found[joint] for joint in system.joints if joint in found}
 

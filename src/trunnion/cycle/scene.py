@@ -16,9 +16,10 @@ from trunnion.solve.loads import Stated
 from trunnion.solve.shifts import hole, play_of
 from trunnion.solve.system import System, Values, rubbing
 
-__all__ = ["DRAWN", "pitch_circles", "planar", "spatial"]
+__all__ = ["COURSE", "DRAWN", "courses", "pitch_circles", "planar", "spatial"]
 
 DRAWN = 360  # positions at which a load that varies is looked at for the drawing
+COURSE = 3600  # positions up to which it is drawn as it is at each of them
 
 
 def planar(system: System, values: Values, walk: Forward, useful: Sequence[str]) -> dict[str, Any]:
@@ -129,14 +130,18 @@ def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str])
     for name, load in mechanism.loads.items():
         path = f"loads.{name}"
         force = _vector(stated, f"{path}.force", mechanism.coordinates)
-        moment = _vector(stated, f"{path}.moment", 3) if mechanism.space == "spatial" else _number(stated, path)
-        varies = not values.keys() >= {p for p in mechanism.parameter_set.entries if p.startswith(f"{path}.")}
+        moment = (
+            _vector(stated, f"{path}.moment", 3) if mechanism.space == "spatial" else _number(stated, path, "moment")
+        )
+        varies = _varies(system, values, name)
         found[name] = {
             "link": load.link,
             "joint": load.joint,
             "at": load.at,
             "force": force,
             "moment": moment,
+            "resists": _number(stated, path, "resisting_torque", "resisting_force"),
+            "only": load.only,
             "frame": load.frame,
             "varies": varies,
             "useful": name in useful,
@@ -144,14 +149,46 @@ def _loads(system: System, values: Values, walk: Forward, useful: Sequence[str])
     return found
 
 
+def _varies(system: System, values: Values, load: str) -> bool:
+    """Whether a load has numbers that speak of the motion."""
+    return not values.keys() >= {p for p in system.mechanism.parameter_set.entries if p.startswith(f"loads.{load}.")}
+
+
+def courses(system: System, values: Values, walk: Forward) -> dict[str, dict[str, list[list[float | None]]]]:
+    """Of each load that varies the components of its force, N, and moment, N m, and what resists its joint, at every
+    position of a walk, to seven digits; None where there is no value."""
+    stated, space = Stated(walk), system.mechanism.space == "spatial"
+    found: dict[str, dict[str, list[list[float | None]]]] = {}
+    for name in [one for one in system.mechanism.loads if _varies(system, values, one)]:
+        axes = "xyz"[: system.mechanism.coordinates]
+        paths = {"force": [f".force.{axis}" for axis in axes]}
+        paths["moment"] = [f".moment.{axis}" for axis in axes] if space else [".moment"]
+        paths["resists"] = [
+            ".resisting_torque" if f"loads.{name}.resisting_torque" in stated.entries else ".resisting_force"
+        ]
+        parts = {what: [stated.get(f"loads.{name}{path}") for path in own] for what, own in paths.items()}
+        found[name] = {
+            what: [_plain_numbers(one, np.shape(walk.time)) for one in own]
+            for what, own in parts.items()
+            if all(one is not None for one in own)
+        }
+    return found
+
+
+def _plain_numbers(number: Number, shape: tuple[int, ...]) -> list[float | None]:
+    values = np.broadcast_to(np.asarray(primal(number), float), shape).tolist()
+    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in values]
+
+
 def _vector(stated: Stated, path: str, count: int) -> list[float] | None:
     parts = [stated.get(f"{path}.{axis}") for axis in "xyz"[:count]]
     return None if any(part is None for part in parts) else _largest(*parts)
 
 
-def _number(stated: Stated, path: str) -> float | None:
-    moment = stated.get(f"{path}.moment")
-    return None if moment is None else _largest(moment)[0]
+def _number(stated: Stated, path: str, *keys: str) -> float | None:
+    """The one of some numbers that is stated."""
+    found = next((number for key in keys if (number := stated.get(f"{path}.{key}")) is not None), None)
+    return None if found is None else _largest(found)[0]
 
 
 def _largest(*components: Number) -> list[float]:

@@ -16,7 +16,7 @@ from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import MOST_SUPPOSED, Means
 from trunnion.cycle.positions import Positions
-from trunnion.cycle.scene import DRAWN
+from trunnion.cycle.scene import COURSE, DRAWN, courses
 from trunnion.errors import Finding, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -96,6 +96,7 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
     found, near = findings(run, found_positions)
     measured = watched(run, time, method, arrays["status"], found_positions.compiled)
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
+    drawn = drawn | _courses(run, time)
     attributes = encoded(
         {
             **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
@@ -209,7 +210,7 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, near,
+        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, arrays["locking_margin"], near,
         felt(run.system, run.values),
     )  # fmt: skip
     found += near_locking.findings(near, _dial_of(near, run, at)) if near else []
@@ -480,6 +481,14 @@ def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
             value = float(values[path]) if path in values else None  # an expression of the motion has many
             rows.append({"path": path, "value": value, "unit": unit, "text": text})
     return rows
+
+
+def _courses(run: Run, time: NDArray[np.float64]) -> dict[str, Any]:
+    """Loads that vary at every position, for the drawing; beyond COURSE positions it shows their largest value."""
+    if len(time) > COURSE:
+        return {}
+    found = courses(run.system, run.values, stated_walk(run.system, run.values, run.chosen.assembly, time))
+    return {"load_courses": found} if found else {}
 
 
 def scene_of(run: Run) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
+from trunnion.solve.margin import locking_margin
 from trunnion.solve.status import status_of
 from trunnion.solve.system import System
 
@@ -88,7 +89,7 @@ def _fill_settled(arrays: Into, back: Backward, window: slice) -> None:
     ):
         worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
         arrays[key][window] = worst
-    arrays["locking_margin"][window] = functools.reduce(np.minimum, (one.margin for one in settled), np.inf)
+    arrays["locking_margin"][window] = locking_margin(back)
 
 
 def link_numbers(system: System) -> list[tuple[int, int]]:

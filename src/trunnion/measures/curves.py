@@ -21,6 +21,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import springs, useful_powers
+from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["CURVES", "Course"]
@@ -185,7 +186,7 @@ def locking_margin(measure: MotionRequest, back: Backward) -> tuple[Number, ...]
 
     The search for it has no derivatives: they are NaN where dual numbers ask for some below MARGIN.
     """
-    margin: Number = functools.reduce(np.minimum, (one.margin for one in back.settled), MARGIN)
+    margin: Number = np.minimum(multiple_that_locks(back), MARGIN)
     forces: Number = functools.reduce(operator.add, (*back.friction.values(), *back.efforts.values()), 0.0)
     if isinstance(forces, Dual):
         return (Dual(margin, np.where(margin < MARGIN, np.nan, 0.0)),)

@@ -70,6 +70,9 @@ FUNCTIONS: Final[Mapping[str, _Function]] = {
     "max": _Function("maximum", (2, _MANY), "same", "same"),
     "between": _Function("between", (3, 3), "same", "number"),
 }
+# what says the same, of functions that other languages have
+SIGN = "the sign of a speed v is max(-1, min(1, v / (1 mm/s))); what opposes a motion is resisting_force: or _torque:"
+INSTEAD: Final[Mapping[str, str]] = dict.fromkeys(("sign", "sgn", "signum", "tanh"), SIGN)
 RESERVED = frozenset({"pi", *FUNCTIONS})  # names a dimension cannot have
 MOTION = ("drive", "speed", "time")  # nor these: in loads, coordinate and rate of the first driver, and time
 PLACED = "."  # in a name: of a joint or a point, as in the columns of a result: S.slide, ram.Q.x, O.rotation_velocity
@@ -265,7 +268,8 @@ def _call(name: Literal | str, arguments: list[Evaluator]) -> Evaluator:
     if isinstance(name, Literal):
         raise UnitError("an operator is missing before a parenthesis", "write a product as 2 * (a + b)")
     if name not in FUNCTIONS:
-        raise UnitError(f"'{name}' is not a function", "the functions are " + ", ".join(sorted(FUNCTIONS)))
+        instead = INSTEAD.get(name, "the functions are " + ", ".join(sorted(FUNCTIONS)))
+        raise UnitError(f"'{name}' is not a function", instead)
     function = FUNCTIONS[name]
     least, most = function.arguments
     if not least <= len(arguments) <= most:

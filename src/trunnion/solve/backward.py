@@ -33,10 +33,12 @@ __all__ = [
     "backward",
     "body_loads",
     "held",
+    "pass_on",
     "sense_of",
     "solve",
     "stated_actions",
     "under",
+    "unloaded",
 ]
 
 
@@ -129,7 +131,9 @@ class Backward:
     friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
     N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
     that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart;
-    module_reactions: reactions as their modules see them, of `under` alone.
+    module_reactions: reactions as their modules see them, of `under` alone. stated: loads before any joint was passed;
+    rubbed: contacts per module, those of gear pairs last, as `settled`; margin_up_to: as in the method; margin: that of
+    `locking_margin`, once it was asked for.
     """
 
     walk: Forward
@@ -154,6 +158,10 @@ class Backward:
     passed: dict[str, Number] = field(default_factory=dict)
     gear_power: Number = 0.0
     module_reactions: dict[str, Any] = field(default_factory=dict)
+    stated: dict[str, Any] = field(default_factory=dict)
+    rubbed: list[tuple[list[Contact], list[Rubbing]]] = field(default_factory=list)
+    margin_up_to: float = 0.0
+    margin: Number | None = None
 
     def friction_power(self, joint: str) -> Number:
         """Power lost in a joint, W."""
@@ -197,7 +205,7 @@ def solve(
 def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
-    back = Backward(walk, _unloaded(walk), travels=bool(given.travel))
+    back = Backward(walk, unloaded(walk), travels=bool(given.travel), margin_up_to=method.margin_up_to)
     back.contacts.update((joint, list(system.geometry.contacts(walk, joint))) for joint in rubbing(system))
     back.slips.update((joint, _slip(back, joint)) for joint in system.joints)
     _add_body_loads(back)
@@ -205,6 +213,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     for name, action in given.acting(walk) if given.acting else ():
         back.load_powers[name] = action.power
         _act(back, name, action)
+    back.stated = dict(back.loads)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, given)
     return back
@@ -216,7 +225,7 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
     They are what moves with the play of joints, so gear pairs pass torques alone.
     """
     system = walk.system
-    back = Backward(walk, _unloaded(walk) | dict(loads))
+    back = Backward(walk, unloaded(walk) | dict(loads))
     for number in reversed(range(len(system.plan.modules))):
         module, places, group = system.plan.modules[number], system.places[number], system.groups[number]
         if isinstance(group, General):
@@ -233,20 +242,20 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
 
 def body_loads(walk: Forward) -> dict[str, Any]:
     """Gravity and inertia of every link."""
-    back = Backward(walk, _unloaded(walk))
+    back = Backward(walk, unloaded(walk))
     _add_body_loads(back)
     return back.loads
 
 
 def stated_actions(walk: Forward, zero_slip: Mapping[str, Sense]) -> tuple[dict[str, Any], Number, Number]:
     """What the stated loads and springs do to every link, and the power of both, W. zero_slip: see `Given`."""
-    back = Backward(walk, _unloaded(walk))
+    back = Backward(walk, unloaded(walk))
     _add_stated_loads(back, zero_slip, ())
     powers = sum(back.load_powers.values(), 0.0), sum((state.power for state in back.springs.values()), 0.0)
     return back.loads, *powers
 
 
-def _unloaded(walk: Forward) -> dict[str, Any]:
+def unloaded(walk: Forward) -> dict[str, Any]:
     return dict.fromkeys(walk.system.mechanism.effective_links, walk.algebra.ZERO_LOAD)
 
 
@@ -323,15 +332,29 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     if module.spinning:
         torques = cast(SpatialGroup, group).spin_torques(pose, loads)
         back.spins.update((link, torque) for (link, _, _), torque in zip(module.spinning, torques, strict=True))
-    parts = list(zip(contacts, rubbed, settled.forces, strict=False))
+    back.rubbed.append((contacts, rubbed))
+    pass_on(back, number, settled.reactions, contacts, rubbed, settled.forces)
+
+
+def pass_on(
+    back: Backward,
+    number: int,
+    reactions: Sequence[Any],
+    contacts: Sequence[Contact],
+    rubbed: Sequence[Rubbing],
+    forces: Sequence[Number],
+) -> None:
+    """Keep the reactions of a module and the friction of its contacts, and load the links it hangs on with both."""
+    walk, module, places = back.walk, back.walk.system.plan.modules[number], back.walk.system.places[number]
+    parts = list(zip(contacts, rubbed, forces, strict=False))
     for k, place in enumerate(places):
         if not place.witness:
             own = [part for part in parts if part[0].joint == k]
-            _record(back, place, walk.wrench(place, settled.reactions[k]), own, place.joint in module.driven)
-    forces = {contact.joint: force for contact, force in zip(contacts, settled.forces, strict=True)}
+            _record(back, place, walk.wrench(place, reactions[k]), own, place.joint in module.driven)
+    apart = {contact.joint: force for contact, force in zip(contacts, forces, strict=True)}
     for i, name in enumerate(module.gears):
         k = len(places) + i
-        back.gears[name], done = gear_load(walk, number, i, settled.reactions[k][-1], forces.get(k, 0.0))
+        back.gears[name], done = gear_load(walk, number, i, reactions[k][-1], apart.get(k, 0.0))
         if back.travels:
             back.gear_power = back.gear_power + power_of(walk, number, done)
         _push(back, number, done)

@@ -24,6 +24,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import forward
 from trunnion.solve.friction import STUBBORN
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.margin import locking_margin
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.status import (
@@ -119,7 +120,8 @@ class CompiledKernel(ABC):
             status = status_number(back) if self.forces else pose_status_number(back.walk)
             doubtful = (status > self.gravest) | (worst_condition(back.walk) > BORDER)
             for settled in back.settled:
-                doubtful = doubtful | np.logical_not(settled.certain) | np.isnan(settled.margin)
+                doubtful = doubtful | np.logical_not(settled.certain)
+            doubtful = doubtful | np.isnan(locking_margin(back))
             return Lanes({name: figure(back) for name, figure in self.figures.items()}, status, doubtful)
 
     def _back(self, values: Values, time: Number) -> Backward:

@@ -37,11 +37,14 @@ __all__ = [
     "FrictionMethod",
     "FrictionProblem",
     "Settled",
+    "balance",
     "frictionless",
     "identity_minus",
     "method_named",
+    "primal_of",
     "scaled",
     "settle",
+    "with_own",
 ]
 
 OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
@@ -62,8 +65,7 @@ class Settled(NamedTuple):
     """Reactions (friction not included) and friction forces, with the figures of the iteration.
 
     share: largest share of the friction for which a solution that starts frictionless was found, 1 unless the
-    module locks; margin: multiple of the friction at which it would lock, ∞ beyond what was asked for;
-    contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
+    module locks; contraction: ∞-norm of the derivative of φ → law(N(R(φ))) (Newton), or the ratio of the last two
     changes (successive approximation). residual: largest difference between a friction and what its law says for the
     load that is found, N; where converged below OBEYED of the largest friction, unless a criterion is given. certain:
     whether it is proved that there is no other solution; problem: the equations themselves.
@@ -77,7 +79,6 @@ class Settled(NamedTuple):
     converged: Number
     residual: Number = 0.0
     share: Number = 1.0
-    margin: Number = np.inf
     certain: Number = True
     problem: FrictionProblem | None = None
 
@@ -91,7 +92,7 @@ def settle(
         return Settled(start, [], 0, 0.0, 0.0, True)
     if method.multiple is not None:
         contacts = [_times(method.multiple, contact) if contact.rubs else contact for contact in contacts]
-    influence = [_with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
+    influence = [with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)
     if method.name == "successive-approximation":
         return _successive(problem, method)
@@ -111,7 +112,8 @@ def _multiplied(function: LawFunction, normal: Number, slip: Number, *, multiple
     return multiple * function(normal, slip, **own)
 
 
-def _with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
+def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
+    """What 1 N of friction changes in the reactions of a module, with what the joint itself feels of it."""
     if contact.own is not None:
         column[contact.joint] = added(column[contact.joint], contact.own)
     return column
@@ -123,7 +125,7 @@ def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     So are certain lanes that kinks keep from settling: their continuation leads to the same, only solution. The rounds
     counted are Newton's. A followed lane gets as many as it needs to obey its laws, as the others do.
     """
-    real = _primal(problem)
+    real = primal_of(problem)
     none: list[Number] = [0.0] * len(real.contacts)
     # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
     state = real.state(none)
@@ -160,7 +162,6 @@ def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         converged=converged & (shares >= 1.0),
         residual=real.misfit(found.gaps),
         share=shares,
-        margin=_margin(real, bound, method.margin_up_to, shares),
         certain=certain,
         problem=real,
     )
@@ -238,7 +239,7 @@ def _unrolled(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     Lanes that need more, and those without the certificate, are for whoever compiles to compute again; so are those
     whose margin comes out as NaN.
     """
-    real = _primal(problem)
+    real = primal_of(problem)
     forces: list[Number] = [0.0] * len(real.contacts)
     state = real.state(forces)
     bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
@@ -269,7 +270,6 @@ def _unrolled(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         converged=certain & ~(real.excess(gaps, plain) > SETTLED),
         residual=real.misfit(gaps),
         share=1.0,
-        margin=_compiled_margin(real, bound, method.margin_up_to),
         certain=certain,
         problem=real,
     )
@@ -285,7 +285,7 @@ def _at_once(problem: FrictionProblem) -> Settled:
     """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
     forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
     reactions = problem.reactions(forces, problem.state(forces))
-    return Settled(reactions, forces, 1, 0.0, 0.0, True, problem=_primal(problem))
+    return Settled(reactions, forces, 1, 0.0, 0.0, True, problem=primal_of(problem))
 
 
 def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequence[Sequence[Number]]) -> list[Number]:
@@ -319,7 +319,7 @@ def _successive(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     done = ~(problem.excess(gaps, forces) > OBEYED) if method.criterion is None else change <= method.criterion
     measurable = np.isfinite(previous) & (previous > 0)
     ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
-    real = _primal(problem)
+    real = primal_of(problem)
     bound = np.where(np.isfinite(peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
     return Settled(
         reactions=problem.reactions(forces, state),
@@ -329,28 +329,9 @@ def _successive(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         contraction=ratio,
         converged=done & np.isfinite(change),  # not so where it ran off to infinity
         residual=problem.misfit(gaps),
-        margin=_margin(real, bound, method.margin_up_to),
         certain=~(bound >= 1.0),
+        problem=real,
     )
-
-
-def _margin(problem: FrictionProblem, bound: Number, most: float, shares: Number = 1.0) -> Number:
-    """Multiple of the friction at which the module locks; ∞ where it does not up to `most`.
-
-    shares: those at which lanes are known to lock, 1 of the others.
-    """
-    if most <= 0:
-        return np.inf
-    known = np.asarray(shares) < 1.0
-    margin = np.where(known, shares, np.inf)
-    doubtful = (bound * most >= 1.0) & ~known
-    if not np.any(doubtful):
-        return margin
-    part, chosen = problem.picked(doubtful)
-    _, reached = continuation.follow(scaled(part), frictionless(part, chosen), most)
-    margin = np.broadcast_to(margin, chosen.shape).copy()
-    margin[chosen] = np.where(reached >= most, np.inf, reached)
-    return margin
 
 
 def _follow(
@@ -384,14 +365,14 @@ def scaled(problem: FrictionProblem, weights: Weights | None = None) -> continua
 
         def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
             found = [share] * len(part.contacts) if weights is None else weights(share, lanes)
-            return _balance(part, forces, *laws(forces), found)
+            return balance(part, forces, *laws(forces), found)
 
         return system
 
     return family
 
 
-def _balance(
+def balance(
     problem: FrictionProblem,
     forces: Sequence[Number],
     target: Sequence[Number],
@@ -403,23 +384,6 @@ def _balance(
     residual = [f - s * t for f, s, t in zip(forces, shares, target, strict=True)]
     rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
     return residual, identity_minus(rows)
-
-
-def _compiled_margin(problem: FrictionProblem, bound: Number, most: float) -> Number:
-    """`_margin` of numbers that are compiled; NaN where the search does not come to an end."""
-
-    def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
-        state = problem.state(forces)
-        laws = problem.target(state.normals), problem.map_derivative(state)
-        return _balance(problem, forces, *laws, [share] * len(problem.contacts))
-
-    if most <= 0:
-        return np.inf
-    none: list[Number] = [0.0] * len(problem.contacts)
-    target = problem.target(problem.state(none).normals)
-    start = [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
-    reached = continuation.followed(system, start, (bound * most >= 1.0) & (bound < 1.0), most)
-    return np.where(reached >= most, np.inf, reached)
 
 
 def frictionless(problem: FrictionProblem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
@@ -438,6 +402,6 @@ def _depth(problem: FrictionProblem) -> int:
     return max((n.depth for n in problem.numbers if isinstance(n, Dual)), default=0)
 
 
-def _primal(problem: FrictionProblem) -> FrictionProblem:
+def primal_of(problem: FrictionProblem) -> FrictionProblem:
     """The problem without derivatives."""
     return problem.mapped(primal) if _depth(problem) or problem.compiled else problem

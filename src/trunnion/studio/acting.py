@@ -41,14 +41,36 @@ def _turned(sketch: Sketch, joint: str) -> float:
 
 
 def load(sketch: Sketch, given: Given) -> str:
-    """A force at a joint, a point or a place of a moving link."""
+    """A force at a joint, a point or a place of a moving link; or what opposes the motion of the joint `against`.
+
+    size: of that, N or N m, as it was typed; instead: the load that it takes the place of, with its size.
+    """
+    before = str(given.get("instead") or "")
+    name = before if before in sketch.of("loads") else numbered(sketch, "loads", "load")
+    sketch.section("loads")[name] = _resisting(sketch, given, name) if "against" in given else _force(sketch, given)
+    sketch.made = ("loads", name)
+    return f"Change {name}" if name == before else f"Add {name}"
+
+
+def _force(sketch: Sketch, given: Given) -> dict[str, Any]:
     link, point = point_of(sketch, given["at"])
     if link == sketch.ground:
         raise refused("would act on the ground", "the force", "choose a point of a moving link")
-    name = numbered(sketch, "loads", "load")
-    sketch.section("loads")[name] = {"link": link, "at": point, "force": list(given["force"])}
-    sketch.made = ("loads", name)
-    return f"Add {name}"
+    return {"link": link, "at": point, "force": list(given["force"])}
+
+
+def _resisting(sketch: Sketch, given: Given, name: str) -> dict[str, Any]:
+    joint = str(given["against"])
+    kind = sketch.joints.get(joint, {}).get("type", "revolute")
+    if joint not in sketch.joints or kind not in ("revolute", "prismatic"):
+        raise refused("does not turn or slide", joint, "choose a pin or a slide")
+    turns = kind == "revolute"
+    size = given.get("size") or ("10 N m" if turns else "100 N")
+    parts = [sketch.numbers.get(f"loads.{name}.force.{axis}") for axis in "xy"]
+    if not turns and None not in parts:
+        size = f"{hypot(*map(float, parts)):.6g} N"  # type: ignore[arg-type]  # none of them is None
+    marked = {"useful": True} if sketch.of("loads").get(name, {}).get("useful") else {}
+    return {"joint": joint, "resisting_torque" if turns else "resisting_force": size, **marked}
 
 
 def spring(sketch: Sketch, given: Given) -> str:

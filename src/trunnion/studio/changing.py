@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.expression import MOTION, RESERVED
 from trunnion.studio.ends import free, held, refused, vector
 from trunnion.studio.sketch import Sketch
 from trunnion.studio.words import spoken
@@ -18,6 +20,7 @@ SECTIONS = {
 }  # fmt: skip
 NAMES = (("name",), ("notes",), ("references",))  # texts for readers
 NAMED = ("links", "link", "joint", "joints", "between", "at", "type")  # names of other parts, beside coordinates
+DEFINED = re.compile(r"\s*([^\W\d]\w*)\s*=(.+)")  # crank = 30 mm
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
@@ -58,8 +61,12 @@ def put_value(sketch: Sketch, given: Given) -> str:
     path, value = ".".join(map(str, given["path"])), given.get("value")
     stated = spoken(path)
     if value is not None:
+        if path not in ("name", "notes") and way != ["dimensions"]:
+            before = group.get(last) if isinstance(group, dict) else group[last]
+            value = _named(sketch, value, before)
         group[last] = _typed(value)
-        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else value}"
+        told = ("no", "yes")[value] if isinstance(value, bool) else value
+        return f"Set {stated} to {', '.join(map(str, value)) if isinstance(value, list) else told}"
     if way == ["dimensions"] and (users := list(_users(sketch.entries, str(last)))):
         what = f"is in use: by {', '.join(users[:3])}{' and others' if users[3:] else ''}"
         raise refused(what, path, "type another value, or change what uses it first")
@@ -81,6 +88,28 @@ def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:
     elif isinstance(group, str) and way[:1] not in NAMES and way[-1] not in NAMED:
         stated = way != ("dimensions", name) and re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", group)
         yield from [spoken(".".join(way))] if stated else []
+
+
+def _named(sketch: Sketch, value: Any, before: Any) -> Any:
+    """The name of a dimension that "crank = 30 mm" makes, or a new name alone, with the value that was there."""
+    if isinstance(value, list):
+        there = before if isinstance(before, list) else value
+        return [_named(sketch, *pair) for pair in zip(value, there, strict=False)]
+    found = DEFINED.fullmatch(value) if isinstance(value, str) else None
+    if found:
+        sketch.section("dimensions")[found[1]] = _typed(found[2].strip())
+        return found[1]
+    number = isinstance(before, (int, float)) or (isinstance(before, str) and re.match(NUMBER, before.strip()))
+    if not number or not isinstance(value, str) or not value.isidentifier() or value in _spoken_for(sketch):
+        return value
+    sketch.section("dimensions")[value] = before
+    return value
+
+
+def _spoken_for(sketch: Sketch) -> set[str]:
+    """Words that are no new name of a dimension."""
+    words = {"off", "none", "yes", "no", "true", "false", *FRICTION_LAWS}
+    return {*sketch.section("dimensions"), *sketch.of("tables"), *RESERVED, *MOTION, *words}
 
 
 def _typed(value: Any) -> Any:

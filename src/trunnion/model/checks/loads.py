@@ -92,6 +92,13 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
         return Finding(what, path, remedy)
     if name not in MOTION and name not in mechanism.tables:
         remedy = nearest(name, [*known, *(motion_dimensions(mechanism, known) if section == "loads" else ())])
+        if not known and section != "loads":
+            remedy = f"state it, as in dimensions: {{{as_key(name)}: 30 mm}}"
+        if remedy.startswith("known:") and section == "loads":
+            placed = [one for one, _ in _placed_dimensions(mechanism)]
+            remedy = nearest(name, [*known, *MOTION, *mechanism.tables]).removesuffix(", …")
+            moves = [one for one in placed if one.endswith("slide_velocity")] or placed[1:2]
+            remedy += f"; the motion of a joint or point, such as {', '.join(moves[:2] + placed[-2:-1])}"
         return Finding(what, path, remedy)
     if section == "loads":
         return Finding(f"'{source}' refers to '{name}', but the model has no driver", path, "state a driver")

@@ -11,6 +11,8 @@ from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["CYCLE"]
 
+NEXT = 1e-3  # of the multiple at which one group locks: another that locks at less is told beside it
+
 
 def _centred(joints: Sequence[str], seatable: Sequence[str]) -> str:
     """What may be stated instead of pins in the middle of their play; seatable: where a seat may be taken."""
@@ -20,7 +22,9 @@ def _centred(joints: Sequence[str], seatable: Sequence[str]) -> str:
     return f"for pins pressed to one side by their loads state seat: loaded{of}"
 
 
-def _locked(at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None) -> str:
+def _locked(
+    at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None, whole: float
+) -> str:
     at_most = f"there is a solution only up to {share:.4g} times the friction of {', '.join(joints)}"
     jammed = {"": "", "all": "; driven backward it locks there too (jammed)"}
     return f"locked by friction {at}: {at_most}" + jammed.get(
@@ -28,7 +32,15 @@ def _locked(at: str, share: float, joints: Sequence[str], reverse: str, decides:
     )
 
 
-def _unlocked(at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None) -> str:
+def _unlocked(
+    at: str, share: float, joints: Sequence[str], reverse: str, decides: str, multiple: float | None, whole: float
+) -> str:
+    """whole: multiple of all friction below which no group locks."""
+    if whole < (1 - NEXT) * share:
+        return (
+            f"lower the coefficients of all joints below {whole:.3g} times their values (where {', '.join(joints)} no "
+            "longer lock, other joints do), shorten the arms or lengthen the guides"
+        )
     remedy = f"lower these coefficients below {share:.3g} times their values, shorten the arms or lengthen the guides"
     if decides:
         return f"lower the coefficient of {decides} alone below {multiple:.3g} times its value; or {remedy}"

@@ -77,7 +77,8 @@ async function answered() {
   const found = await link.ask("model", asked);
   if (!found || sent !== state.text.value) return;
   if (found.error) return state.say(found.error, true);
-  state.answer.value = { ...found, text: sent, friction: asked.friction };
+  const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
+  state.answer.value = { ...found, numbers: read ? found.numbers : (state.answer.value?.numbers ?? {}), text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
   const count = found.scene?.count ?? 1;
   if (state.index.value >= count) state.index.value = 0;
@@ -272,7 +273,7 @@ export async function openLink(address) {
 export async function copyLink() {
   try {
     await navigator.clipboard.writeText(await linkOf(state.text.value, `${location.origin}/`));
-    state.say("The link is in the clipboard. It holds the model itself; whoever opens it needs a studio of their own.");
+    state.say("The link is in the clipboard. It holds the model itself: File, Open takes it, or put its part from #m= on behind the address that trunnion studio prints.");
   } catch (problem) {
     state.say(problem.message, true);
   }

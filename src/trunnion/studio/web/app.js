@@ -8,6 +8,7 @@ import { Motion } from "./motion.js";
 import { PhotoCard } from "./photo.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
+import { sheet } from "./sheet.js";
 import { Space } from "./space.js";
 import { Stage } from "./stage.js";
 import * as state from "./state.js";
@@ -15,6 +16,7 @@ import { Text } from "./text.js";
 import { choose } from "./tools.js";
 import { Button, focusOn, html } from "./ui.js";
 
+const TOP = 140; // px, where messages stand
 const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
 
 export function App() {
@@ -61,7 +63,9 @@ function Messages() {
   const lacks = state.tool.value === "select" ? state.missing.value : [];
   const clock = (one) => new Date(one).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   const waiting = state.waiting.value;
-  return html`<div class="messages">
+  const held = state.live.value?.to; // what is written makes room for the hand
+  const below = held && sheet.view?.frame.to(held)[1] < TOP;
+  return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
     ${state.stopped.value && html`<div class="message-card bad" role="alert">The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.</div>`}
     ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.

@@ -24,6 +24,7 @@ export function TopBar() {
       <${Button} label="Save" title="Save (Ctrl+S)" onClick=${() => save()} />
       <${Button} label="Save as …" onClick=${() => (dialog.value = "save")} />
       <${Button} label="Copy a link" title="The model as a link, to be opened in another studio" disabled=${!state.text.value.trim()} onClick=${copyLink} />
+      <${Button} label="Keys …" title="What the keys do (?)" onClick=${() => (dialog.value = "keys")} />
     <//>
     <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}${unsaved.value ? html`<span class="changed" title="There are changes that are not saved"> · changed</span>` : ""}</span>
     <${Button} kind="icon" label=${before ? `Undo: ${before}` : "Undo"} title=${before ? `Undo: ${before} (Ctrl+Z)` : "Nothing to undo"} disabled=${!before} onClick=${undo}><${Icon} name="undo" /><//>

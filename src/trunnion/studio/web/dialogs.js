@@ -4,6 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { openFile, openLink, openText, save } from "./actions.js";
 import { Examples } from "./gallery.js";
 import { stemOf } from "./geometry.js";
+import { Keys } from "./keysheet.js";
 import { carries } from "./links.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
@@ -11,7 +12,7 @@ import { Button, html } from "./ui.js";
 export function Dialogs() {
   const name = state.dialog.value;
   if (!name) return null;
-  const Body = { examples: Examples, open: Open, save: Save }[name];
+  const Body = { examples: Examples, keys: Keys, open: Open, save: Save }[name];
   return html`<${Frame} key=${name}><${Body} /><//>`;
 }
 

@@ -116,17 +116,11 @@ function allParts(scene, view) {
     points: scene.links.flatMap((link) => link.free.map((key) => ({ key, node: svg("g", { class: "point" }, svg("circle", { r: link.ground ? 3 : 4 })) }))),
     joints: scene.joints.map((one) => joint(one)),
     springs: scene.springs.map((one) => spring(one)),
-    loads: loadsOf(scene).map((one, order) => marked(one, "loads", scene.loads.filter(drawn(scene))[order]?.name)),
+    loads: loadsOf(scene).map((one) => marked(one, "loads", one.name)),
     drives: scene.drivers.map((driver) => ({ driver, joint: scene.joints.find(({ name }) => name === driver.name), node: svg("path", { class: "drive" }) })).filter((one) => one.joint),
     vectors: scene.joints.map((one) => ({ joint: one, node: svg("path", { class: `reaction ${view.kinds.get(one.name) ?? "k0"}` }) })),
     names: [...scene.joints.map((one) => nameOf(one.at, one.on, one.name, fixed(one), slides(one))), ...moving.flatMap((link) => link.free.map((key) => nameOf(key, key, key.slice(link.name.length + 1), false, false)))],
   }; // prettier-ignore
-}
-
-/** Loads that `loadsOf` draws, in its order, as many times as it draws them. */
-function drawn(scene) {
-  const spots = (load) => load.at || scene.links.find((link) => link.name === load.link)?.points?.length;
-  return (load) => (load.at && Math.hypot(...load.force) > 0) || (load.moment && spots(load));
 }
 
 function simpleParts() {
@@ -276,7 +270,7 @@ export function pose(view, scene, index) {
     circles.forEach((one) => set(one, { r: radius * frame.scale }));
   });
   parts.loads.forEach((one) => {
-    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed) ?? 0);
+    one.aim(scene, view.posed);
     poseLoad(one, spots(one.keys), frame);
   });
   parts.drives.forEach((one) => poseDrive(view, one, spot(one.joint.at)));

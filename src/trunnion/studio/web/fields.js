@@ -1,6 +1,6 @@
 // The file as written, as fields: a row for each value that is there, and for the usual ones that are not.
 
-import { dictionary } from "./geometry.js";
+import { dictionary, groundOf } from "./geometry.js";
 
 /** Values a part may well have: path within it, and an example. */
 const USUAL = {
@@ -8,7 +8,8 @@ const USUAL = {
   joints: [["friction.coefficient", "0.1"], ["pin.radius", "5 mm"], ["pin.clearance", "0.02 mm"]],
   slides: [["friction.coefficient", "0.1"], ["guide.length", "40 mm"], ["guide.clearance", "0.02 mm"]],
   drivers: [["speed", "60 rpm"], ["range", ["0 deg", "90 deg"]], ["start", "0 deg"]],
-  loads: [["force", ["0 N", "-100 N"]], ["moment", "1 N m"]],
+  loads: [["force", ["0 N", "-100 N"]], ["moment", "1 N m"], ["useful", null]],
+  resistances: [["resisting_force", "100 N"], ["resisting_torque", "10 N m"], ["only", null], ["useful", null]],
   springs: [["stiffness", "1 N/mm"], ["free_length", "50 mm"], ["preload", "0 N"]],
   gears: [["ratio", "-1/2"], ["phase", "0 deg"]],
   model: [["name", "Slider-crank"], ["gravity", ["0", "-9.81"]], ["joint_defaults.friction", "0.1"], ["joint_defaults.pin.radius", "5 mm"], ["joint_defaults.guide.length", "40 mm"]],
@@ -17,8 +18,21 @@ const USUAL = {
 const FIXED = new Set(["type", "links", "link", "at", "between", "joint", "joints"]); // drawn, not typed
 const OWN_PLACE = ["links", "joints", "drivers", "loads", "springs", "gears", "dimensions", "assembly", "notes", "references", "trunnion", "space", "ground"];
 
+/** Values that are chosen, with the words for them, "" for none; nothing of a value that is typed. */
+function choicesOf(kind, key, part, entries) {
+  if (kind === "springs" && key === "only") return { "": "either way", pull: "pull", push: "push" };
+  if (kind === "loads" && key === "useful") return { "": "—", true: "yes", false: "no" };
+  if (kind !== "loads" || key !== "only") return null;
+  const { type, links } = dictionary(entries?.joints)[part.joint] ?? {};
+  if (type !== "prismatic") return { "": "either way", positive: "counterclockwise", negative: "clockwise" };
+  const axis = links?.[0] === groundOf(entries) ? (entries.links?.[links[0]]?.points?.[part.joint]?.axis ?? [1, 0]) : [];
+  const angle = Math.round((Math.atan2(axis[1], axis[0]) * 180) / Math.PI);
+  const to = (by) => (Number.isFinite(angle) ? `, towards ${(angle + by + 360) % 360}°` : "");
+  return { "": "either way", positive: `forward${to(0)}`, negative: `backward${to(180)}` };
+}
+
 /**
- * Rows of a part, [{path, label, value, example, fixed}]; value is a text, a list of texts, or null where the file says
+ * Rows of a part, [{path, label, value, example, fixed, choices}]; value is a text, a list of texts, or null where the file says
  * nothing. kind: a section of the file, or "model" for what is in no section.
  */
 export function rowsOf(entries, kind, name) {
@@ -26,14 +40,22 @@ export function rowsOf(entries, kind, name) {
   const from = kind === "model" ? [] : [kind, name];
   const there = leaves(part, from).map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const usual = USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [];
+  const usual = usualOf(kind, part);
   const missing = usual
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))
     .filter(({ path }) => !known(path));
   const ways = usual.map(([way]) => [...from, ...way.split(".")]);
   const order = ({ path }) => ways.findIndex((way) => starts(way, path) || starts(path, way));
   const rows = [...there, ...missing].sort((a, b) => order(a) - order(b)); // a row stays where it is when it is filled
-  return rows.map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)) }));
+  return rows.map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)), choices: choicesOf(kind, row.path[2], part, entries) }));
+}
+
+function usualOf(kind, part) {
+  if (kind === "loads" && part?.joint) {
+    const other = "resisting_force" in part ? "resisting_torque" : "resisting_force";
+    return USUAL.resistances.filter(([way]) => way !== other);
+  }
+  return USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [];
 }
 
 /** What all joints have that state nothing of their own; null where that is nothing. */

@@ -46,6 +46,7 @@ function ordinary(event) {
   if (key === "Escape") return leave(target);
   if ((key === "Delete" || key === "Backspace") && state.selection.value) return removeChosen();
   if (key === " " && !target.closest?.("button, summary, a, [role=tab]")) return act(() => crank.toggle());
+  if (key === "?") return act(() => (state.dialog.value = "keys"));
   if (target.closest?.("input, button, [role=tab]")) return false;
   if (key === "," || key === ".") return act(() => crank.go(state.index.value + (key === "." ? 1 : -1)));
   if (key === "0") return act(() => sheet.view && sheet.fit());

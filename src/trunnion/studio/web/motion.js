@@ -26,6 +26,7 @@ export function Motion() {
       const index = state.index.value;
       if (crank.player && crank.player.index() !== index) crank.player.go(index);
     }), []); // prettier-ignore
+  useEffect(() => effect(() => follow(state.live.value)), []);
   return html`<div class="motion" ref=${holder}></div>`;
 }
 
@@ -58,9 +59,31 @@ function fill(holder) {
     Object.assign(crank, { count: scene.count, once: Boolean(scene.motion), words: figures.words, show });
     crank.strip.replaceChildren(...strips(scene));
     holder.replaceChildren(crank.player.element, figures.element);
+    crank.own = crank.figures = figures.element;
     figures.show(state.index.value);
     if (!same) crank.player.go(Math.min(state.index.value, scene.count - 1));
   });
+}
+
+/** While a joint is dragged the figures are those of the dragged mechanism; what is not known yet is a dash. */
+function follow(live) {
+  const scene = untracked(() => (state.solved.value ? state.answer.value.scene : null));
+  if (!scene || !crank.figures?.isConnected) return;
+  const dragged = live?.efforts ? readout(draggedOf(scene, live)) : null;
+  dragged?.show(state.index.peek());
+  const element = dragged?.element ?? crank.own;
+  if (element === crank.figures) return;
+  crank.figures.replaceWith(element);
+  crank.figures = element;
+}
+
+function draggedOf(scene, { efforts }) {
+  const known = untracked(() => state.friction.value) !== "off"; // a drag is answered with the friction that is stated
+  return {
+    ...scene,
+    drivers: scene.drivers.map((one) => ({ ...one, effort: (known && efforts[one.name]) || [null] })),
+    joints: scene.joints.map((one) => ({ ...one, friction_power: [null] })),
+  };
 }
 
 /** A strip under the slider for the positions that cannot be reached. */

@@ -118,7 +118,7 @@ function centres(view, list, wanted) {
       const title = svg("title", {}, `instant centre of ${pair[1]} against ${pair[0]}`);
       if (a !== null && b !== null) {
         const spot = frame.to([a, b]);
-        if (!inside(frame, spot)) return edge(frame, spot, kind, `${name}, ${stated(Math.hypot(...less(frame, spot)) / frame.scale, "m")} away`);
+        if (!inside(frame, spot)) return edge(frame, spot, kind, `${name}, ${stated(Math.hypot(...less(frame, spot)) / frame.scale, "m")} from the middle of the sheet`);
         const mark = svg("path", { class: kind, d: `M${spot[0].toFixed(1)},${spot[1].toFixed(1)}m-6,0l6,-6l6,6l-6,6Z` }, title);
         return joint ? [mark] : [mark, words(spot[0] + 10, spot[1] + 16, name)];
       }

@@ -2,8 +2,9 @@
 
 import { useRef, useState } from "preact/hooks";
 import { edit, setValue } from "./actions.js";
+import { AddDimension } from "./adding.js";
 import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, written } from "./fields.js";
-import { dictionary } from "./geometry.js";
+import { dictionary, groundOf } from "./geometry.js";
 import { others, takeOther } from "./ghosts.js";
 import * as state from "./state.js";
 import { removePart } from "./tools.js";
@@ -12,6 +13,7 @@ import { Button, html } from "./ui.js";
 const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Driver", loads: "Load", springs: "Spring", gears: "Gear pair" };
 const SECTIONS = ["links", "joints", "drivers", "loads", "springs", "gears"];
 const MOST = 300; // parts in a list
+const ROOMY = 9; // letters that every field has room for
 
 export function Properties() {
   const chosen = state.selection.value;
@@ -34,6 +36,8 @@ function Chosen({ kind, name }) {
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
+        ${kind === "joints" && !state.spatial.value && html`<${Button} label="Load against its motion" onClick=${() => edit([{ do: "load", against: name }])} />`}
+        ${kind === "loads" && against(entries, name).map((joint) => html`<${Button} label=${`Let it oppose the motion of ${joint}`} onClick=${() => edit([{ do: "load", against: joint, instead: name }])} />`)}
         ${(kind === "joints" || kind === "points") && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
@@ -41,6 +45,14 @@ function Chosen({ kind, name }) {
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore
+}
+
+/** The slides and pivots on the ground that a load with a direction could oppose. */
+function against(entries, name) {
+  const { link } = entries?.loads?.[name] ?? {};
+  const ground = groundOf(entries);
+  const joints = Object.entries(dictionary(entries?.joints));
+  return link && !state.spatial.value ? joints.filter(([, one]) => one?.links?.includes(link) && one.links.includes(ground)).map(([joint]) => joint) : [];
 }
 
 function Name({ kind, name }) {
@@ -64,11 +76,16 @@ const units = new Map();
 
 /** A value, or the parts of a list, with what is wrong about it. */
 function Row({ row, findings }) {
-  const { path, label, value, example, fixed, common } = row;
+  const { path, label, value, example, fixed, common, choices } = row;
   const wrong = findingsOf(findings, path).filter(({ severity }) => severity !== "note");
   const id = `value-${path.join("-")}`;
   const list = Array.isArray(value ?? example);
   if (fixed) return html`<div class="row"><span class="label">${label}</span><span class="fixed">${list ? value.join(", ") : value}</span></div>`;
+  if (choices)
+    return html`<div class="row"><label class="label" for=${`${id}-0`}>${label}</label><span class="values">
+      <select id=${`${id}-0`} value=${value ?? ""} onChange=${({ target }) => setValue(path, { "": null, true: true, false: false }[target.value] ?? (target.value || null))}>
+        ${Object.entries({ ...choices, ...(value && !(value in choices) && { [value]: value }) }).map(([one, words]) => html`<option value=${one}>${words}</option>`)}
+      </select></span></div>`; // prettier-ignore
   const parts = list ? (value ?? example.map(() => "")) : [value ?? ""];
   if (!wrong.length) parts.forEach((_, order) => unitOf(row, order) && units.set(`${id}-${order}`, unitOf(row, order)));
   const put = (order) => async ({ target }) => {
@@ -79,7 +96,7 @@ function Row({ row, findings }) {
   return html`<div class="row">
     <label class="label" for=${`${id}-0`}>${label}</label>
     <span class="values">
-      ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
+      ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} style=${`--wide: ${String(one).length > ROOMY ? String(one).length + 3 : 0}ch`} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
         aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${hintOf(units.get(`${id}-${order}`))}
         aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>
@@ -111,9 +128,9 @@ function Model() {
   const { entries, findings } = state.answer.value ?? {};
   const dimensions = Object.entries(dictionary(entries?.dimensions));
   return html`<section><h2>Model</h2><${Rows} rows=${rowsOf(entries, "model")} findings=${findings} /></section>
-    ${dimensions.length > 0 && html`<section><h2>Dimensions</h2><div class="rows">
+    <section><h2>Dimensions</h2><div class="rows">
       ${dimensions.map(([name, value]) => html`<${Dimension} key=${name} name=${name} value=${value} findings=${findings} />`)}
-    </div></section>`}
+    </div><${AddDimension} /></section>
     <section><h2>Parts</h2>${SECTIONS.map((kind) => html`<${Parts} kind=${kind} names=${Object.keys(dictionary(entries?.[kind]))} />`)}</section>
     ${others.value.length > 0 && html`<section><h2>Other assemblies</h2><p class="row-of-buttons">
       ${others.value.map(({ name }) => html`<${Button} label=${`Take ${name}`} onClick=${() => takeOther(name)} />`)}</p></section>`}`; // prettier-ignore

@@ -91,6 +91,18 @@ export function linkOf({ kind, name, link }, own = null) {
   return moving.length === 1 ? moving[0] : null;
 }
 
+/** The slide or pivot on the ground that a clicked joint, or the link at a clicked place, moves in; undefined where there is none. */
+export function resisted({ kind, name, on }) {
+  const { scene, posed } = sheet.view;
+  const ground = scene.links.find((one) => one.ground)?.name;
+  const grounded = scene.joints.filter((one) => one.links.includes(ground) && ["prismatic", "revolute"].includes(one.type));
+  const clicked = scene.joints.find((one) => kind === "joints" && one.name === name);
+  const spot = clicked && place(scene, clicked.at, posed);
+  const held = (one) => (on ? one.links.includes(on) : clicked && String(place(scene, one.at, posed)) === String(spot));
+  const found = grounded.filter((one) => held(one));
+  return found.find(({ type }) => type === "prismatic") ?? found[0];
+}
+
 /** Points with names of their own. */
 function prefixed(points, order) {
   return Object.fromEntries(Object.entries(points).map(([key, track]) => [`${order} ${key}`, track]));

@@ -5,6 +5,7 @@ import { batch, computed, effect, signal } from "@preact/signals";
 
 const STEPS = 100; // that can be undone
 const ROOM = 2e6; // characters of them that are kept over a reload
+const VARIANT = "trunnion studio variant A";
 
 export const connected = signal(false);
 /** Whether the program behind the page is gone, or runs anew with another address. */
@@ -53,6 +54,8 @@ export const notice = signal({ words: "", bad: false });
 export const waiting = signal(null);
 /** When the recovered work was left, or null. */
 export const recovered = signal(null);
+/** Variant A, {text, friction, time}: the state that was kept to compare with; or null. It is kept with the work. */
+export const variant = signal(read(sessionStorage, VARIANT));
 
 export const unsaved = computed(() => text.value !== savedText.value);
 export const spatial = computed(() => answer.value?.scene?.space === "spatial");
@@ -77,6 +80,7 @@ export function commit(name, before, next, merge = null) {
   const last = past.value[past.value.length - 1];
   batch(() => {
     if (!merge || last?.merge !== merge) past.value = [...past.value, { name, merge, ...before }].slice(-STEPS);
+    else past.value = [...past.value.slice(0, -1), { ...last, name }]; // what it came to
     future.value = [];
     text.value = next.text;
     places.value = next.places;
@@ -126,8 +130,10 @@ export function begin({ name, saved, content, steps = null }) {
     index.value = 0;
     tool.value = "select";
     photo.value = undefined;
+    if (opened.value) variant.value = null; // of another sheet; a page that is loaded again has the one it had
     opened.value += 1;
     recovered.value = steps && content !== saved ? steps.time : null;
+    variant.value = steps?.variant ?? variant.value;
   });
 }
 
@@ -135,7 +141,7 @@ export function begin({ name, saved, content, steps = null }) {
 export const keyOf = (name) => `trunnion studio ${folder.value.folder} ${name ?? ""}`;
 const LAST = "trunnion studio last sheet";
 
-/** What was left of a sheet when the page was closed: {text, saved, places, locked, past, future, time}, or null. */
+/** What was left of a sheet when the page was closed: {text, saved, places, locked, past, future, variant, time}, or null. */
 export function kept(name) {
   return read(localStorage, keyOf(name));
 }
@@ -165,10 +171,11 @@ export function forget(name) {
 export function keepSteps() {
   effect(() => {
     const [saved, name] = [savedText.value, fileName.value];
-    const work = { text: text.value, saved, places: places.peek(), locked: locked.value, past: past.value, future: future.value };
+    const work = { text: text.value, saved, places: places.peek(), locked: locked.value, past: past.value, future: future.value, variant: variant.value };
     while (work.past.length > 5 && size(work) > ROOM) work.past = work.past.slice(Math.ceil(work.past.length / 2));
     try {
       sessionStorage.setItem(LAST, JSON.stringify({ folder: folder.value.folder, name }));
+      sessionStorage.setItem(VARIANT, JSON.stringify(variant.value));
       if (work.text === saved && !work.past.length && !work.future.length && name) return;
       localStorage.setItem(keyOf(name), JSON.stringify({ ...work, time: new Date().toISOString() }));
     } catch {

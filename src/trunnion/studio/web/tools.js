@@ -4,11 +4,12 @@ import { signal } from "@preact/signals";
 import { edit } from "./actions.js";
 import { gridStep, lengthOf, lengthText, lengthUnit } from "./geometry.js";
 import { numberOf, plainNumber } from "./fields.js";
-import { linkOf } from "./sheet.js";
+import { linkOf, resisted } from "./sheet.js";
 import { pending, say, selection, tool } from "./state.js";
 
 const TURN = Math.PI / 12; // guides and forces turn by 15°
 const FORCE = "100 N"; // of a load that is drawn without a number
+const TORQUE = "10 N m"; // of one against the motion of a joint that turns
 
 /** Letters typed while something is drawn: its length, force, stiffness, ratio or angle. */
 export const typed = signal("");
@@ -27,7 +28,7 @@ export const TOOLS = [
   { id: "gear", label: "Gears", key: "E", hint: ["Click the pivot of the first gear, or its link.", "Click the pivot of the second gear. For a ratio type the teeth first, as 20:40."], click: gear, tells: tellRatio, begins: /[0-9.,+]/, on: true },
   { id: "driver", label: "Drive", key: "D", hint: ["Click the joint that is driven."], click: drive },
   { id: "point", label: "Point", key: "C", hint: ["Click the link that the point belongs to.", "Click where on it, or beside it, the point is."], click: addPoint, on: true },
-  { id: "load", label: "Load", key: "F", hint: ["Click the joint, point or link that the force acts on.", "Click the direction of the force; type its size first, as 250 N."], click: load, tells: tellForce, begins: /[0-9.,]/, on: true },
+  { id: "load", label: "Load", key: "F", hint: ["Click the joint, point or link that the force acts on.", "Click the direction of the force, or the same slide, pivot or link again for one against its motion; type its size first, as 250 N."], click: load, tells: tellForce, begins: /[0-9.,]/, on: true },
   { id: "spring", label: "Spring", key: "S", hint: ["Click the first end of a spring: a point, a link, or the ground.", "Click the second end; type the stiffness first, as 2 N/mm."], click: spring, tells: tellStiffness, begins: /[0-9.,]/, on: true },
   { id: "lock", label: "Lock", key: "K", hint: ["Click a joint to keep it where it is while others are dragged, or to let it go again."], click: lock },
   { id: "delete", label: "Delete", key: "X", hint: ["Click what is to go."], click: remove },
@@ -41,10 +42,12 @@ export function choose(id) {
   say(hint());
 }
 
-/** What to do next, in a sentence. */
+/** What to do next, in a sentence; where fingers are all there is, without what asks for keys. */
 export function hint() {
   const { hint: words } = toolOf();
-  return words[pending.value ? words.length - 1 : 0];
+  const own = words[pending.value ? words.length - 1 : 0];
+  const touched = matchMedia("(hover: none) and (pointer: coarse)").matches;
+  return touched ? own.replace(/ [^.]*\b(Shift|Alt)\b[^.]*\./g, "").replace(/\bClick\b/g, "Touch") : own;
 }
 
 /** A click at a spot; `part` is the {kind, name, link} under it. */
@@ -208,26 +211,38 @@ function load(spot) {
   begin(spot);
 }
 
-/** A force as it is typed, {value, unit}; null if it is none. */
-function forceOf(letters) {
+/** A force or torque as it is typed, {value, unit}; null if it is none. */
+function effortOf(letters, turns = false) {
   const found = numberOf(plainNumber(letters));
-  return found && found.value > 0 && /^([kM]?N|lbf)?$/.test(found.rest) ? { value: found.value, unit: found.rest || "N" } : null;
+  const units = turns ? /^([kM]?N ?m|lbf ft)?$/ : /^([kM]?N|lbf)?$/;
+  return found && found.value > 0 && units.test(found.rest) ? { value: found.value, unit: found.rest || (turns ? "N m" : "N") } : null;
+}
+
+/** The joint whose motion a load opposes that points back at where it was begun; null where it has a direction. */
+function opposed(from, aim) {
+  const far = Math.hypot(aim[0] - from.at[0], aim[1] - from.at[1]);
+  return far <= (from.on ? (pointer.value?.near ?? 0) / 2 : 0) ? resisted(from) : null; // half, for one step of the grid is a direction
 }
 
 function putLoad(aim) {
-  const { at, written } = pending.value;
-  const size = forceOf(typed.value || FORCE);
+  const from = pending.value;
+  const joint = opposed(from, aim);
+  const turns = Boolean(joint) && joint.type !== "prismatic";
+  const size = effortOf(typed.value || (turns ? TORQUE : FORCE), turns);
   if (!size) return false;
-  const angle = Math.hypot(aim[0] - at[0], aim[1] - at[1]) > 0 ? turnTo(aim) : -Math.PI / 2;
+  const angle = Math.hypot(aim[0] - from.at[0], aim[1] - from.at[1]) > 0 ? turnTo(aim) : -Math.PI / 2;
   const force = [Math.cos(angle), Math.sin(angle)].map((part) => `${Number((size.value * part).toFixed(9)) + 0} ${size.unit}`);
   finish();
-  edit([{ do: "load", at: written, force }]);
+  edit([joint ? { do: "load", against: joint.name, size: `${size.value} ${size.unit}` } : { do: "load", at: from.written, force }]);
   return true;
 }
 
-function tellForce(_, b) {
-  const letters = typed.value || FORCE;
-  return `${letters}${/[a-z]/i.test(letters) ? "" : " N"}, ${Math.round((turnTo(b.at) * 180) / Math.PI)}°${typed.value ? " ⏎" : ""}`;
+function tellForce(from, b) {
+  const joint = opposed(from, b.at);
+  const turns = joint && joint.type !== "prismatic";
+  const letters = typed.value || (turns ? TORQUE : FORCE);
+  const size = `${letters}${/[a-z]/i.test(letters) ? "" : turns ? " N m" : " N"}`;
+  return `${size}${joint ? ` against the motion of ${joint.name}` : `, ${Math.round((turnTo(b.at) * 180) / Math.PI)}°`}${typed.value ? " ⏎" : ""}`;
 }
 
 function spring(spot) {

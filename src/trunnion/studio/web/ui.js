@@ -19,6 +19,18 @@ export function Button({ label, title, onClick, disabled = false, pressed, kind 
   </button>`;
 }
 
+/** Go to the choice of a menu that an arrow key, Home or End means; the menu opens. Whether the key was one of these. */
+function stepTo(menu, key) {
+  const by = { ArrowDown: 1, ArrowUp: -1, Home: 0, End: -1 }[key];
+  if (by === undefined) return false;
+  menu.open = true;
+  const choices = [...menu.querySelectorAll(".choices button:not(:disabled), .choices input")];
+  const here = key === "Home" || key === "End" ? -1 : choices.indexOf(document.activeElement);
+  const next = here < 0 ? (by < 0 ? choices.length - 1 : 0) : (here + by + choices.length) % choices.length;
+  choices[next]?.focus();
+  return true;
+}
+
 /** A menu that opens below its label; a choice or a click elsewhere closes it. */
 export function Menu({ label, disabled = false, children }) {
   const element = useRef(null);
@@ -32,14 +44,17 @@ export function Menu({ label, disabled = false, children }) {
   const close = (event) => {
     if (event.target.closest("button")) event.currentTarget.open = false;
   };
-  const escape = (event) => {
-    if (event.key !== "Escape" || !event.currentTarget.open) return;
+  const keys = (event) => {
+    const menu = event.currentTarget;
+    if (event.key === "Escape" && menu.open) {
+      menu.open = false;
+      menu.firstElementChild.focus();
+    } else if (!stepTo(menu, event.key)) return;
+    event.preventDefault();
     event.stopPropagation();
-    event.currentTarget.open = false;
-    event.currentTarget.firstElementChild.focus();
   };
   if (disabled) return html`<span class="menu"><button type="button" class="plain" disabled>${label}</button></span>`;
-  return html`<details class="menu" ref=${element} onClick=${close} onKeyDown=${escape}>
+  return html`<details class="menu" ref=${element} onClick=${close} onKeyDown=${keys}>
     <summary class="plain">${label}</summary>
     <div class="choices">${children}</div>
   </details>`;

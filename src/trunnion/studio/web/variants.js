@@ -6,10 +6,6 @@ import { laid } from "./layers.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
-const PLACE = "trunnion studio variant A";
-
-/** {text, friction, time} of the state that was kept, or null. */
-export const kept = signal(stored());
 /** Variants beside the present scene: [{name, ghost, heads, scene, margin, shifted, why, rows}]. */
 export const compared = signal([]);
 
@@ -19,27 +15,12 @@ const moves = computed(() => {
   return point ? JSON.stringify(point.link ? { place: { link: point.link, start: point.start, local: point.local } } : { point: point.key }) : "";
 });
 
-function stored() {
-  try {
-    return JSON.parse(sessionStorage.getItem(PLACE) ?? "null");
-  } catch {
-    return null; // storage is off, or of another version
-  }
-}
-
 /** Ask for the variants whenever one is wanted and there is a new answer. */
 export function keepCompared() {
   effect(() => {
-    try {
-      sessionStorage.setItem(PLACE, JSON.stringify(kept.value));
-    } catch {
-      // no storage or no room: the variant lives as long as the page
-    }
-  });
-  effect(() => {
     const found = state.solved.value ? state.answer.value : null;
     const moving = moves.value ? JSON.parse(moves.value) : {};
-    const wanted = found ? variants(kept.value, found, state.friction.value === "compare") : [];
+    const wanted = found ? variants(state.variant.value, found, state.friction.value === "compare") : [];
     untracked(() => {
       if (!wanted.length) compared.value = [];
       else
@@ -61,20 +42,20 @@ export function variants(own, { text, friction }, free) {
 
 function keep() {
   const { text, friction } = state.answer.value;
-  kept.value = { text, friction, time: new Date().toISOString() };
+  state.variant.value = { text, friction, time: new Date().toISOString() };
   state.say("Kept as variant A: change the mechanism, and both are shown.");
 }
 
 /** The buttons that keep a variant, and the tables of what it changes. */
 export function Variants() {
-  const own = kept.value;
+  const own = state.variant.value;
   const clock = own && new Date(own.time).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
   const same = own && state.answer.value?.text === own.text && state.answer.value.friction === own.friction;
   return html`<section class="variants" aria-label="Variants">
     <p class="row-of-buttons">
       <${Button} label=${own ? "Keep this instead" : "Keep as variant A"} title="Keep the present state as variant A, to compare with what follows" disabled=${!state.solved.value || same} onClick=${keep} />
       ${own && html`<${Button} label="Go back to A" disabled=${state.text.value === own.text} onClick=${() => takeText(own.text, "Go back to variant A")} />
-        <${Button} label="Drop A" onClick=${() => (kept.value = null)} />
+        <${Button} label="Drop A" onClick=${() => (state.variant.value = null)} />
         <span class="calm">${same ? `Variant A, kept ${clock}, is what is shown.` : `A kept ${clock}.`}</span>`}
     </p>
     ${compared.value.map((one) => html`<${Changes} one=${one} />`)}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "Abscissa", "Interval", "abscissa", "intervals", "layout", "mean_friction", "numbers", "series",
+    "Abscissa", "Interval", "abscissa", "course", "intervals", "layout", "mean_friction", "numbers", "series",
     "status_text", "thin", "valid",
 ]  # fmt: skip
 
@@ -71,6 +71,14 @@ def layout(result: xr.Dataset) -> dict[str, Any]:
     """The mechanism as a small dict: ground, links with points, joints with links, loads."""
     stated: dict[str, Any] = attribute(result, "scene", "{}")
     return {"ground": "", "links": {}, "joints": {}, "loads": {}, "springs": {}, "gears": {}} | stated
+
+
+def course(result: xr.Dataset, picked: NDArray[np.intp], load: str) -> dict[str, list[list[float | None]]] | None:
+    """Force and moment of a load that varies at the picked positions, by component; None if they are not known."""
+    known = attribute(result, "load_courses", "{}").get(load)
+    if known is None or any(len(one) != result.sizes["position"] for parts in known.values() for one in parts):
+        return None
+    return {what: [[one[k] for k in picked] for one in parts] for what, parts in known.items()}
 
 
 def names(result: xr.Dataset, dim: str) -> list[str]:

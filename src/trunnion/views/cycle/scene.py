@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.joints.pairs import GUIDED
 from trunnion.results.attributes import attribute
-from trunnion.views.common.cycle import abscissa, column, intervals, layout, names, numbers, series
+from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.deviations import losses
 from trunnion.views.cycle.deviations_scene import built
@@ -28,6 +29,7 @@ __all__ = ["scene"]
 FORMAT = 1
 SUMS = ("useful_power", "efficiency_instant", "closure_residual", "condition", "power_residual",
         "friction_iterations", "friction_change", "friction_residual", "friction_contraction")  # fmt: skip
+STILL = 1e-9  # of the largest speed: a joint that is slower rests
 DRIVEN = ("efficiency_instant",)  # of a steady cycle it says nothing: the flywheel does the work at each position
 
 
@@ -67,7 +69,7 @@ def scene(
         "points": points,
         "links": _links(stated, kept, points),
         "joints": _joints(stated, kept, other),
-        "loads": _loads(stated, points),
+        "loads": _loads(stated, kept, points),
         "springs": _springs(kept, stated, points),
         "gears": [{"name": name, **circle} for name, pair in stated["gears"].items() for circle in pair],
         "drivers": _drivers(kept, other, stated),
@@ -75,7 +77,11 @@ def scene(
         "efficiency": _single(result, "efficiency"),
         "built": built(kept, _lost(result, picked)),
     }  # fmt: skip
-    return shown | space_scene(kept) if is_spatial(result) else shown
+    if is_spatial(result):
+        shown |= space_scene(kept)
+    for load in shown["loads"]:
+        load["course"] = course(result, picked, load["name"])
+    return shown
 
 
 def _lost(result: xr.Dataset, picked: NDArray[np.intp]) -> list[int]:
@@ -149,8 +155,9 @@ def _moment(result: xr.Dataset, joint: str) -> Any:
     return {axis: series(column(result, "reaction_moment", joint=joint, axis=axis)) for axis in names(result, "axis")}
 
 
-def _loads(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:
-    """Loads that can be drawn: a force at a known point, a moment on a link; those in space are told apart."""
+def _loads(stated: dict[str, Any], result: xr.Dataset, points: dict[str, Any]) -> list[dict[str, Any]]:
+    """Loads that can be drawn: a force at a known point, a moment on a link, what resists a joint, with the sign in
+    which it `acts`; those in space are told apart."""
     rows: list[dict[str, Any]] = []
     if stated.get("space") == "spatial":
         return rows
@@ -160,8 +167,22 @@ def _loads(stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any
         rows.append({"name": name, "link": load.get("link"), "at": at if at in points else None,
                      "force": force, "moment": float(load.get("moment") or 0.0),
                      "frame": load.get("frame", "global"), "varies": bool(load.get("varies")),
-                     "useful": bool(load.get("useful"))})  # fmt: skip
+                     "useful": bool(load.get("useful")), "joint": load.get("joint"), "resists": load.get("resists"),
+                     "acts": _acts(stated, result, load)})  # fmt: skip
     return rows
+
+
+def _acts(stated: dict[str, Any], result: xr.Dataset, load: dict[str, Any]) -> list[float | None]:
+    """The sign in which a load that resists a joint acts on its second link; 0 where it does not."""
+    joint = str(load.get("joint"))
+    motion = "joint_slide" if stated["joints"].get(joint, {}).get("type") in GUIDED else "joint_rotation"
+    speed = column(result, f"{motion}_velocity", joint=joint) if joint in names(result, "joint") else None
+    if speed is None:
+        return []
+    still = np.abs(speed) <= STILL * np.nanmax(np.abs(speed), initial=0.0)
+    sense = np.where(still, 0.0, np.sign(speed))
+    only = {"positive": 1.0, "negative": -1.0}.get(str(load.get("only")), 0.0)
+    return series(-np.where(sense * only < 0, 0.0, sense))
 
 
 def _springs(result: xr.Dataset, stated: dict[str, Any], points: dict[str, Any]) -> list[dict[str, Any]]:

@@ -1,6 +1,7 @@
 // Loads in the drawing: a force as an arrow at its point, a moment as a bent one on its link. Their length is no scale.
 
 import { arrow, bentArrow } from "./arrow.js";
+import { at, guide } from "./data.js";
 import { set, svg } from "./dom.js";
 import { stated } from "./format.js";
 
@@ -10,53 +11,91 @@ const CHARACTER = 7.6; // px, a wide mean of the labels' letters, until the brow
 const EDGE = 5; // px between a label and the edge of the picture
 
 /**
- * What can be drawn of the loads, [{keys, node, aim, label}]; a load stands at the middle of the points `keys`. `aim`, of a
- * force that follows its link, turns it with the link's angle.
+ * What can be drawn of the loads, [{name, keys, node, aim, label}]; a load stands at the middle of the points `keys`.
+ * `aim(scene, index)` makes it what it is at a position of a scene of the same structure, hidden where it does not act.
  */
 export function loadsOf(scene) {
   return scene.loads.flatMap((load) => {
     const body = scene.links.find((link) => link.name === load.link)?.points ?? [];
+    const joint = load.resists ? scene.joints.find(({ name }) => name === load.joint) : null;
     const parts = [];
-    if (load.at && Math.hypot(...load.force) > 0) parts.push({ keys: [load.at], ...force(load) });
-    if (load.moment && body.length) parts.push({ keys: load.at ? [load.at] : body, ...moment(load) });
+    if (load.at && Math.hypot(...load.force) > 0) parts.push({ keys: [load.at], ...force(load, pushed) });
+    if (load.moment && body.length) parts.push({ keys: load.at ? [load.at] : body, ...moment(load, turned) });
+    if (joint) parts.push({ keys: [joint.at], ...(joint.type === "prismatic" ? force(load, (...now) => along(joint, ...now)) : moment(load, opposed)) });
     return parts;
   });
 }
 
-function force({ name, force: [x, y], frame, varies, link }) {
-  const text = value(Math.hypot(x, y), "N", varies);
+/** The components of a load's `force`, its `moment` or what it `resists` at a position: of one that varies those there. */
+function present(load, key, index) {
+  const course = load.course?.[key];
+  return course ? course.map((values) => at(values, index)) : [load[key] ?? 0].flat();
+}
+
+/** A force in the plane as {size, angle}, N and rad. */
+function pushed(scene, load, index) {
+  const [x, y] = present(load, "force", index);
+  const link = load.frame === "link" ? scene.links.find(({ name }) => name === load.link) : null;
+  return { size: Math.hypot(x, y), angle: Math.atan2(y, x) + (link ? (at(link.angle, index) ?? 0) : 0) };
+}
+
+/** A moment, N m; positive counter-clockwise. */
+function turned(_, load, index) {
+  return present(load, "moment", index)[0];
+}
+
+/** What opposes the motion of a joint, on its second link: N m or N. */
+function opposed(_, load, index) {
+  return present(load, "resists", index)[0] * at(load.acts, index);
+}
+
+function along(joint, scene, load, index) {
+  const size = opposed(scene, load, index);
+  return { size: Math.abs(size), angle: guide(scene, joint, index) + (size < 0 ? Math.PI : 0) };
+}
+
+function force(load, course) {
   const shaft = svg("path");
-  const label = { node: svg("text", { dy: "0.32em" }, text), size: text.length * CHARACTER, tip: [0, 0], left: false };
-  const aim = (angle) => {
-    const direction = Math.atan2(y, x) + angle;
-    const [dx, dy] = [LENGTH * Math.cos(direction), -LENGTH * Math.sin(direction)];
+  const put = (scene, one, index, label) => {
+    const { size, angle } = course(scene, one, index);
+    const [dx, dy] = [LENGTH * Math.cos(angle), -LENGTH * Math.sin(angle)];
     set(shaft, { d: arrow(0, 0, dx, dy) });
     Object.assign(label, { tip: [dx, dy], left: dx < -0.3 * LENGTH });
+    return size;
   };
-  aim(0);
-  const node = svg("g", { class: "load" }, svg("title", {}, `${name}: ${text}`), shaft, label.node);
-  return { node, aim: frame === "link" ? aim : null, link, label };
+  return part(load, "N", [shaft], put);
 }
 
-/** A load's size; of one that varies, its largest. */
-function value(size, unit, varies) {
-  return varies ? `≤ ${stated(size, unit)}` : stated(size, unit);
+function moment(load, course) {
+  const [arc, tip] = [svg("path", { class: "arc" }), svg("path")];
+  const put = (scene, one, index, label) => {
+    const size = course(scene, one, index);
+    const { shaft, head } = bentArrow(RADIUS, size);
+    set(arc, { d: shaft });
+    set(tip, { d: head });
+    const side = size > 0 ? 1 : -1; // beside the arc, away from its head
+    Object.assign(label, { tip: [side * RADIUS, 2], left: side < 0 });
+    return Math.abs(size);
+  };
+  return part(load, "N m", [arc, tip], put);
 }
 
-function moment({ name, moment: size, varies }) {
-  const { shaft, head } = bentArrow(RADIUS, size);
-  const side = size > 0 ? 1 : -1; // beside the arc, away from its head
-  const text = value(size, "N m", varies);
-  const words = svg("text", { dy: "0.32em" }, text);
-  const node = svg(
-    "g",
-    { class: "load" },
-    svg("title", {}, `${name}: ${text}`),
-    svg("path", { class: "arc", d: shaft }),
-    svg("path", { d: head }),
-    words,
-  );
-  return { node, label: { node: words, size: text.length * CHARACTER, tip: [side * RADIUS, 2], left: side < 0 } };
+/** A part of the drawing with its label; `put(scene, load, index, label)` shapes it and returns its size. */
+function part({ name, varies, course }, unit, shapes, put) {
+  const [words, title] = [svg("text", { dy: "0.32em" }), svg("title")];
+  const label = { node: words, size: 0, measured: 0, tip: [0, 0], left: false };
+  const node = svg("g", { class: "load" }, title, ...shapes, words);
+  const most = varies && !course ? "≤ " : ""; // of one whose course is not known its largest
+  const aim = (scene, index) => {
+    const size = put(scene, scene.loads.find((one) => one.name === name) ?? {}, index, label);
+    const text = `${most}${stated(size, unit)}`;
+    set(node, { display: size > 0 ? null : "none" });
+    if (text === words.textContent) return;
+    words.textContent = text;
+    title.textContent = `${name}: ${text}`;
+    Object.assign(label, { size: text.length * CHARACTER, measured: 0 });
+  };
+  return { name, node, aim, label };
 }
 
 /** Set a label beside the tip of its load; where it would leave the picture, inside it and clear of the tip. */

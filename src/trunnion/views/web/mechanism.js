@@ -360,7 +360,7 @@ function pose(view) {
   parts.points.forEach((one) => moveTo(one.node, spotOf(view, one.key)));
   parts.joints.forEach((one) => poseJoint(view, one));
   parts.loads.forEach((one) => {
-    one.aim?.(at(scene.links.find((link) => link.name === one.link).angle, view.posed));
+    one.aim(scene, view.posed);
     poseLoad(one, spotsOf(view, one.keys), frame);
   });
   parts.springs.forEach((one) => {

@@ -381,15 +381,16 @@ function loads(view) {
     const pose = poseOf(view.links.get(load.link), view.posed);
     if (!pose) return [];
     const [x, y] = spot(view, plus(apply(pose.turn, load.at), pose.place));
+    const now = (what) => load.course?.[what]?.map((values) => values[view.posed] || 0) ?? load[what];
     return [
-      [load.force, "N", false],
-      [load.moment, "N m", true],
+      [now("force"), "N", false],
+      [now("moment"), "N m", true],
     ].flatMap(([vector, unit, twice]) => {
       const size = Math.hypot(...vector);
       if (!(size > 0)) return [];
       const turned = load.frame === "link" ? apply(pose.turn, vector) : vector;
       const [dx, dy] = apply(view.project.matrix, scaled(turned, LOAD / size));
-      const text = `${load.varies ? "≤ " : ""}${stated(size, unit)}`;
+      const text = `${load.varies && !load.course ? "≤ " : ""}${stated(size, unit)}`;
       const [tx, ty] = [x + dx + (dx < 0 ? -7 : 7), y - dy + (dy < 0 ? 9 : -3)];
       return [
         svg(

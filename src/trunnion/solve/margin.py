@@ -1,0 +1,107 @@
+"""The locking margin: the multiple of all friction of a mechanism at which one of its modules locks.
+
+The friction of every module grows at once, so a module is loaded by what those behind it pass on at the same multiple.
+The reactions of the whole row are linear in the friction forces, as those of one module are; their equations are one
+problem, φ = s law(N(R₀ + G φ)), whose G is triangular by modules, and it is followed from s = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from trunnion.algebra.namespace import Number
+from trunnion.joints.pairs import Reaction
+from trunnion.solve import continuation
+from trunnion.solve.backward import Backward, pass_on, unloaded
+from trunnion.solve.friction import (
+    Contact,
+    FrictionProblem,
+    balance,
+    frictionless,
+    primal_of,
+    scaled,
+    with_own,
+)
+from trunnion.solve.friction_method import peak
+from trunnion.solve.friction_problem import largest
+
+__all__ = ["locking_margin"]
+
+
+def locking_margin(back: Backward) -> Number:
+    """Multiple of all friction at which a position locks, ∞ where it does not up to the method's `margin_up_to`.
+
+    Below 1 where the position is locked; NaN of numbers that are compiled where the search does not come to an end.
+    """
+    if back.margin is None:
+        back.margin = _found(back)
+    return back.margin
+
+
+def _found(back: Backward) -> Number:
+    most = back.margin_up_to
+    iterated = [k for k, one in enumerate(back.settled) if one.problem is not None and not one.problem.one_way]
+    if most <= 0 or not iterated:
+        return np.inf
+    first, last = iterated[0], iterated[-1]
+    alone = first == last and not any(contacts for contacts, _ in back.rubbed[:first])
+    problems = [one.problem for one in back.settled[: last + 1] if one.problem is not None]
+    problem = problems[-1] if alone else _together(back, last + 1)
+    # of a triangular row the certificates of its modules are enough
+    bound = largest([one.bound() for one in problems])
+    bound = np.where(np.isfinite(peak(problem.state([0.0] * len(problem.contacts)).normals)), bound, 0.0)
+    if problem.compiled:
+        return _compiled(problem, bound, most)
+    return _followed(problem, bound, most, back.settled[first].share if alone else 1.0)
+
+
+def _together(back: Backward, count: int) -> FrictionProblem:
+    """The equations of the first `count` modules that were settled, as one problem."""
+    walk = back.walk
+    bare, flows = Backward(walk, dict(back.stated)), list[Backward]()  # without friction, and 1 N of each friction
+    contacts, start, influence = list[Contact](), list[Reaction](), list[list[Reaction]]()
+    for number, (own, rubbed) in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
+        group, links = walk.reacting(walk.system.groups[number]), walk.system.plan.modules[number].links
+        before = len(start)
+        for found, flow in [(start, bare), *zip(influence, flows, strict=True)]:
+            reactions = group.reactions(walk.poses[number], [flow.loads[link] for link in links])
+            found += reactions
+            pass_on(flow, number, reactions, (), (), ())
+        for i, contact in enumerate(own):
+            column = with_own(contact, list(group.reactions(walk.poses[number], contact.unit_loads)))
+            flows.append(Backward(walk, unloaded(walk)))
+            pass_on(flows[-1], number, column, [contact], rubbed[i : i + 1], [1.0])
+            influence.append([(0.0,) * len(reaction) for reaction in start[:before]] + column)
+            contacts.append(contact._replace(joint=before + contact.joint))
+    return primal_of(FrictionProblem(contacts, start, influence))
+
+
+def _followed(problem: FrictionProblem, bound: Number, most: float, shares: Number) -> Number:
+    """The multiple for each lane. shares: those at which lanes are known to lock, 1 of the others."""
+    known = np.asarray(shares) < 1.0
+    margin = np.where(known, shares, np.inf)
+    doubtful = (bound * most >= 1.0) & ~known
+    if not np.any(doubtful):
+        return margin
+    part, chosen = problem.picked(doubtful)
+    _, reached = continuation.follow(scaled(part), frictionless(part, chosen), most)
+    margin = np.broadcast_to(margin, chosen.shape).copy()
+    margin[chosen] = np.where(reached >= most, np.inf, reached)
+    return margin
+
+
+def _compiled(problem: FrictionProblem, bound: Number, most: float) -> Number:
+    """The same of numbers that are compiled; lanes whose bound is 1 or more are NumPy's."""
+
+    def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
+        state = problem.state(forces)
+        laws = problem.target(state.normals), problem.map_derivative(state)
+        return balance(problem, forces, *laws, [share] * len(problem.contacts))
+
+    none: list[Number] = [0.0] * len(problem.contacts)
+    target = problem.target(problem.state(none).normals)
+    start = [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
+    reached = continuation.followed(system, start, (bound * most >= 1.0) & (bound < 1.0), most)
+    return np.where(reached >= most, np.inf, reached)

@@ -1,0 +1,88 @@
+"""Menus by keys, the list of keys, and what is shown while a joint is dragged or the model has a mistake."""
+
+from __future__ import annotations
+
+import pytest
+
+from browsing import CHROMIUM
+from served import served
+from studio.whitworth import TEXT
+
+if CHROMIUM:  # not a skip: this is the page's own part
+
+    @pytest.fixture(scope="module")
+    def studio(tmp_path_factory):
+        folder = tmp_path_factory.mktemp("rams")
+        (folder / "ram.yaml").write_text(TEXT, encoding="utf-8")
+        with served(folder, "ram.yaml") as own:
+            yield own
+
+    def focused(user):
+        return user.page.evaluate("document.activeElement.textContent.trim()")
+
+    def test_a_menu_is_gone_through_by_arrows(user):
+        user.page.focus("summary:has-text('File')")
+        seen = []
+        for key in ("ArrowDown", "ArrowDown", "ArrowUp", "End", "ArrowDown"):
+            user.keys(key)
+            seen.append(focused(user))
+        assert seen == ["New sheet", "Open …", "New sheet", "Keys …", "New sheet"]
+        user.keys("Escape")
+        assert focused(user) == "File"
+        assert user.page.locator("details[open]").count() == 0
+
+    def test_a_question_mark_lists_the_keys(user):
+        user.page.locator(".sheet > svg").focus()
+        user.keys("?")
+        words = user.page.text_content("dialog")
+        assert all(one in words for one in ("move the cross", "pin it to the ground", "play or pause", "undo"))
+        user.keys("Escape")
+        assert user.state("s.dialog.value") is None
+        user.page.focus("#value-name-0")
+        user.keys("?")  # in a field it is a letter
+        assert user.state("s.dialog.value") is None
+
+    def test_torque_is_that_of_the_dragged_mechanism(user):
+        user.until("s.solved.value")
+        torque = user.page.locator(".readout div:has-text('torque A') dd")
+        friction = user.page.locator(".readout div:has-text('friction power') dd")
+        before = torque.text_content()
+        x, y = user.handle("D")
+        user.page.mouse.move(x, y)
+        user.page.mouse.down()
+        for step in range(1, 9):
+            user.page.mouse.move(x, y - 4 * step)
+            user.page.wait_for_timeout(60)
+        user.until("s.live.value?.efforts")
+        dragged = torque.text_content()
+        assert dragged != before
+        assert friction.text_content() == "—"
+        user.page.mouse.up()
+        user.until("s.live.value === null && s.past.value.length === 1")
+        assert torque.text_content().split()[0][:3] == dragged.split()[0][:3]
+        assert friction.text_content() != "—"
+
+    def test_with_a_mistake_the_mechanism_stays_as_it_was_drawn(user):
+        user.until("s.solved.value")
+        slot = "document.querySelector('.slot .slit').getAttribute('d').match(/-?[\\d.]+/g).map(Number)"
+        x1, y1, x2, y2 = user.page.evaluate(slot)
+        user.of("actions", "m.typed(given)", TEXT.replace("[100 mm, 0]", "[rodd, 0]"))
+        user.until("s.answer.value.findings.some(({ severity }) => severity === 'error')")
+        a1, b1, a2, b2 = user.page.evaluate(slot)
+        assert (b2 - b1) * (x2 - x1) == pytest.approx((y2 - y1) * (a2 - a1), abs=1.0)
+
+    def test_a_step_of_many_is_named_by_what_it_came_to(user):
+        for value in ("31 mm", "32 mm", "33 mm"):
+            user.of("actions", "m.setValue(['dimensions', 'crank'], given, 'slider crank')", value)
+            user.idle()
+        assert user.state("s.past.value.map(({ name }) => name)") == ["Set crank to 33 mm"]
+
+    def test_variant_a_is_not_compared_with_another_sheet(user):
+        user.until("s.solved.value")
+        user.page.click("role=tab[name=Plots]")
+        user.page.click("button:has-text('Keep as variant A')")
+        user.idle()
+        user.page.reload()
+        user.until("s.solved.value && s.variant.value")
+        user.new_sheet()
+        assert user.state("s.variant.value") is None

@@ -113,8 +113,8 @@ MEASURES: dict[str, MeasureKind] = {
         "`as` place-of-minimum, smallest", "dead centre of a joint", MOTION, "joint", rule="dead centre", reduced=True,
     ),
     "time_ratio": MeasureKind(
-        "joint whose time ratio is watched: of its ways forth and back the longer over the shorter, by the coordinate of "
-        "the first driver", "time ratio of a joint", MOTION, "joint", rule="time ratio",
+        "joint whose time ratio is watched: of its ways forth and back the longer over the shorter, by the coordinate "
+        "of the first driver", "time ratio of a joint", MOTION, "joint", rule="time ratio",
         reduced=True,
     ),
     "rate": MeasureKind(

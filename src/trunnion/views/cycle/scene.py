@@ -136,6 +136,7 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
                 "moment": _moment(result, name),
                 "friction_power": series(column(result, "friction_power", joint=name)),
                 "slide": series(column(result, "joint_slide", joint=name)) if joint["type"] == "prismatic" else [],
+                "friction": series(column(result, "friction_force", joint=name)) if joint["type"] == "prismatic" else [],
             }
         )  # fmt: skip
     return rows

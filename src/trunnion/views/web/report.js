@@ -112,7 +112,9 @@ function reactionChart(scene, kinds) {
     values: magnitude(joint.reaction, scene.count),
     kind: kinds.get(joint.name),
   }));
-  return { title: "Joint reactions, magnitude", unit: "N", series: joined(series) };
+  const slides = scene.joints.some(({ friction }) => peak(full(friction, scene.count)) > 0);
+  const note = slides ? "Of a slide the normal force; its friction is not in it." : "";
+  return { title: "Joint reactions, magnitude", unit: "N", series: joined(series), note };
 }
 
 /** Series that are the same, drawn once with the names of all: "A = B". */

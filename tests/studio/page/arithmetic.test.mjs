@@ -82,6 +82,13 @@ assert.equal(fields.findingsOf(found, ["links", "bar"]).length, 1);
 assert.deepEqual(fields.partOf({ where: "links.bar.mass" }, { links: { bar: {} } }), { kind: "links", name: "bar" });
 assert.equal(fields.partOf({ where: "drivers" }, {}), null);
 
+// ---- the force in a slide, with its friction along the guide
+const { forceAt } = await load("web/data.js");
+const sliding = { links: ["lever", "block"], axis: [0, 1], reaction: { x: [3], y: [1, null] }, friction: [2] };
+const lever = { links: [{ name: "lever", angle: [Math.PI / 2] }] };
+assert.deepEqual(forceAt(lever, sliding, 0).map((part) => Number(part.toFixed(12))), [1, 1]);
+assert.equal(forceAt(lever, sliding, 1), null);
+
 // ---- the locking margin in words
 const { told } = await load("studio/words.js");
 assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 0), "4 here, least 0.5 at 90°");

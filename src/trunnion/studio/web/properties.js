@@ -33,6 +33,7 @@ function Chosen({ kind, name }) {
         <${Name} kind=${kind} name=${name} />
       </h2>
       <${Rows} rows=${rows} findings=${findings} />
+      ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(entries?.joints?.[name])}</p>`}
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
@@ -45,6 +46,11 @@ function Chosen({ kind, name }) {
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore
+}
+
+/** What the arrow at a joint is. */
+function arrowOf({ type, links: [first, second] }) {
+  return `Its arrow is the force on ${second} by ${first}${type === "prismatic" ? ", the friction along the guide included" : ""}.`;
 }
 
 /** The slides and pivots on the ground that a load with a direction could oppose. */

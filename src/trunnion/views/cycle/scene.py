@@ -139,6 +139,8 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
                 "ideal": None if ideal is None else _reaction(ideal, name),
                 "moment": _moment(result, name),
                 "friction_power": series(column(result, "friction_power", joint=name)),
+                "slide": series(column(result, "joint_slide", joint=name)) if joint["type"] == "prismatic" else [],
+                "friction": series(column(result, "friction_force", joint=name)) if joint["type"] == "prismatic" else [],
             }
         )  # fmt: skip
     return rows

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.columns import Column
-from trunnion.rig.reading.log import Account, counted, runs
+from trunnion.rig.reading.faults import outliers
+from trunnion.rig.reading.log import Account, counted, runs, times
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.scale import SensorScale, default_unit, scale
 from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
@@ -179,6 +180,10 @@ def _stretches(where: str, zero: Zero, readings: Array, line: Timeline, account:
         low, high = np.searchsorted(line.seconds, (begin.value, end.value))
         known = np.isfinite(readings[low:high])
         part, when = readings[low:high][known], line.seconds[low:high][known]
+        if (spikes := outliers(part)).any():
+            what = f"spikes: {counted(int(spikes.sum()), 'reading')} of {part.size:,} in the unloaded stretch, "
+            account.warn("data.readings.spikes", where, f"{what}{times(when[spikes])}; left out", "check shielding")
+            part, when = part[~spikes], when[~spikes]
         if part.size:  # a stretch may be stated longer than the file has it
             rows.append((float(np.mean(when)), float(np.mean(part)), mean_uncertainty(part)))
         else:
@@ -276,7 +281,7 @@ def resolution(readings: Array) -> float:
     if levels.size < FEWEST_LEVELS:
         return 0.0
     apart = np.diff(levels)
-    apart = apart[apart > 1e-9 * float(np.ptp(levels))]
+    apart = apart[apart > 1e-9 * float(np.ptp(np.percentile(levels, (1, 99))))]
     step = float(apart.min())
     whole = np.rint(apart / step)
     few = levels.size < LEVELS

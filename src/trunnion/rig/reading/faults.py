@@ -17,11 +17,13 @@ from trunnion.rig.reading.arcs import arcs
 from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.log import Account, counted, places, runs
 
-__all__ = ["FaultSpan", "cells", "signal"]
+__all__ = ["NO_FAULT", "BeyondRange", "FaultSpan", "beyond", "cells", "outliers", "signal"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 CLIP = 0.9995  # of the range, from which a reading is at it: the top code of 12 bits is 2047/2048
+CODE = 2.0  # times the range, from which a number is no reading but a code for an overload
+OVERLOAD = (9.9e37, 1e38)  # what SCPI instruments write for an overload or no number lies between (SCPI 1999.0, 7.2.1)
 MOST = 0.5  # of the readings at the end of the range: more is no load that is now and then too large
 STUCK = 30  # equal readings in a row at least
 WIDTH = 7  # samples of the median that spikes are told from: up to three in a row are found
@@ -39,7 +41,7 @@ class FaultSpan:
     """The rows in which the drive runs, and when its turns begin and end there, s.
 
     angle: coordinate of the driver by row of the file, rad, None where the cycle is a time; start, cycle: rad; unit: of
-    the readings.
+    the readings; beside: rows before and after them that reach into the turns, by interpolation or a filter.
     """
 
     low: int
@@ -50,6 +52,7 @@ class FaultSpan:
     start: float = 0.0
     cycle: float = 2 * np.pi
     unit: str = ""
+    beside: int = 0
 
     @property
     def turns(self) -> int:
@@ -61,10 +64,41 @@ class FaultSpan:
         return np.asarray(((time - self.begin[turn]) / (self.end - self.begin)[turn]) % 1.0)
 
 
+@dataclass(frozen=True)
+class BeyondRange:
+    """Readings at the end of the range or beyond it, by row. codes: those too far beyond to be readings, with one."""
+
+    rows: Mask
+    codes: Mask
+    example: float
+
+
+NO_FAULT = BeyondRange(np.zeros(0, np.bool_), np.zeros(0, np.bool_), 0.0)
+
+
+def beyond(readings: Array, limit: float | None) -> BeyondRange:
+    """The readings at the end of the range, in readings, or beyond it, made NaN in all rows where they are not most."""
+    if limit is None:
+        return NO_FAULT
+    size = np.abs(readings)
+    rows, codes = size >= CLIP * limit, size > CODE * limit
+    example = float(readings[np.nanargmax(size)]) if codes.any() else 0.0
+    if np.count_nonzero(rows) <= MOST * np.count_nonzero(np.isfinite(readings)):
+        readings[rows] = np.nan
+    return BeyondRange(rows, codes, example)
+
+
+def outliers(readings: Array) -> Mask:
+    """Single readings, none of them NaN, that are far off the median of those around them, beyond any doubt."""
+    off = np.abs(readings - median_filter(readings, size=WIDTH, mode="mirror"))
+    return np.asarray(off > FAR * float(np.percentile(off, 99))) if readings.size > WIDTH else off > np.inf
+
+
 def cells(where: str, column: Column, readings: Array, seconds: Array, account: Account) -> None:
     """Tell of cells without a finite number, and make the infinite ones NaN."""
-    infinite = np.isinf(readings)
-    readings[infinite] = np.nan
+    infinite, codes = np.isinf(readings), (np.abs(readings) >= OVERLOAD[0]) & (np.abs(readings) < OVERLOAD[1])
+    example = float(readings[np.argmax(codes)])
+    readings[infinite | codes] = np.nan
     missing = np.isnan(readings)
     count = int(np.count_nonzero(missing))
     if not count:
@@ -72,8 +106,9 @@ def cells(where: str, column: Column, readings: Array, seconds: Array, account: 
     kinds = [text for number, text in (
         (column.texts, f"{counted(column.texts, 'text')} such as '{column.example}'"),
         (int(np.count_nonzero(infinite)), f"{np.count_nonzero(infinite):,} infinite"),
+        (int(np.count_nonzero(codes)), f"{counted(int(np.count_nonzero(codes)), 'overload code')} such as {example:g}"),
     ) if number]  # fmt: skip
-    empty = count - column.texts - int(np.count_nonzero(infinite))
+    empty = count - column.texts - int(np.count_nonzero(infinite | codes))
     kinds += [f"{empty:,} empty or NaN"] * (empty > 0 and bool(kinds))
     told = f" ({', '.join(kinds)})" if kinds else ""
     what = f"dropouts: {counted(count, 'cell')} of {readings.size:,} without a number{told}, {places(missing, seconds)}"
@@ -88,12 +123,16 @@ def signal(
     limit: float | None,
     account: Account,
     steady: bool = False,
+    out: BeyondRange = NO_FAULT,
 ) -> None:
     """Look for faults in the rows of a span, and make the readings that they spoil NaN.
 
-    limit: the end of the range, in readings; steady: whether one reading throughout is nothing strange, as of a speed.
+    limit: the end of the range, in readings; out: what was beyond it; steady: whether one reading throughout is nothing
+    strange, as of a speed.
     """
     part, time = readings[span.low : span.high], seconds[span.low : span.high]
+    if limit is not None:
+        _clipped(where, part, seconds, limit, span, out, account)
     finite = np.isfinite(part)
     if np.count_nonzero(finite) < 10:
         return
@@ -111,12 +150,11 @@ def signal(
         )
         return
     wide = max(high - low, 1e-300)
-    if limit is not None:
-        _clipped(where, part, time, limit, span.unit or "in the unit of the readings", account)
     _zeros(where, part, time, wide, span, account)
     _stuck(where, part, time, span, account)
     _plateaus(where, part, time, wide, span, limit, account)
-    _spikes(where, part, time, wide, span, account)
+    near = slice(max(span.low - span.beside, 0), span.high + span.beside)
+    _spikes(where, readings[near], seconds[near], wide, span, account)
 
 
 def _leave_out(part: Array, mask: Mask) -> None:
@@ -154,22 +192,32 @@ def _recurring(phase: Array) -> Mask:
     return own
 
 
-def _clipped(where: str, part: Array, time: Array, limit: float, unit: str, account: Account) -> None:
-    mask = np.abs(part) >= CLIP * limit
-    count, finite = int(np.count_nonzero(mask)), int(np.count_nonzero(np.isfinite(part)))
+def _clipped(
+    where: str, part: Array, seconds: Array, limit: float, span: FaultSpan, out: BeyondRange, account: Account
+) -> None:
+    """Tell of readings at the end of the range and beyond; an error where they are most of the channel."""
+    end = f"the range of {limit:.6g} {span.unit or 'in the unit of the readings'}"
+    rows = out.rows[span.low : span.high]
+    count, finite = int(np.count_nonzero(rows)), int(np.count_nonzero(rows | np.isfinite(part)))
     if count > MOST * finite:  # what is left says nothing of the channel
-        end = f"the end of the range of {limit:.6g} {unit}"
-        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond {end}"
+        what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of {end}"
         figures = {"count": count, "readings": finite}
         remedy = "check unit, gain and range of the channel in the mapping; else use a larger range"
         raise MechanismError(
             Finding(what, where, remedy, file=account.file, code="data.readings.clipped", figures=figures)
         )
-    if count:
-        what = f"clipped: {counted(count, 'reading')} of {part.size:,} at the end of the range, {places(mask, time)}"
-        what = f"{what}; left out, so that means there are too small"
+    near = slice(max(span.low - span.beside, 0), span.high + span.beside)
+    codes, time = out.codes[near], seconds[near]
+    if codes.any():
+        told = f"{counted(int(np.count_nonzero(codes)), 'reading')} of {part.size:,} far beyond {end}, such as "
+        what = f"overload: {told}{out.example:.6g}, {places(codes, time)}; left out"
+        remedy = "check cable and logger; where the load is beyond the range, means are too small: use a larger range"
+        account.warn("data.readings.overload", where, what, remedy)
+    mask = out.rows[near] & ~codes
+    if mask.any():
+        what = f"clipped: {counted(int(np.count_nonzero(mask)), 'reading')} of {part.size:,} at the end of the range"
+        what = f"{what}, {places(mask, time)}; left out, so that means there are too small"
         account.warn("data.readings.clipped", where, what, "use a larger range or a smaller load")
-        _leave_out(part, mask)
 
 
 def _plateaus(
@@ -275,7 +323,7 @@ def _spikes(where: str, part: Array, time: Array, wide: float, span: FaultSpan, 
     if np.count_nonzero(finite) < 2 * WIDTH:
         return
     known = part[finite]
-    off = np.abs(known - median_filter(known, size=WIDTH, mode="nearest"))
+    off = np.abs(known - median_filter(known, size=WIDTH, mode="mirror"))
     spread = 1.4826 * float(np.median(off))
     usual = float(np.percentile(off, 99))
     far = off > max(FAR * spread, 2.5 * usual, SEEN * wide)
@@ -287,6 +335,6 @@ def _spikes(where: str, part: Array, time: Array, wide: float, span: FaultSpan, 
     far = bad[finite]
     if not far.any():
         return
-    what = f"spikes: {counted(int(far.sum()), 'reading')} of {part.size:,} up to {off[far].max() / wide:.2g} times the "
-    what += f"usual span off their neighbours, {places(bad, time)}"
+    what = f"spikes: {counted(int(far.sum()), 'reading')} of {span.high - span.low:,} up to "
+    what += f"{off[far].max() / wide:.2g} times the usual span off their neighbours, {places(bad, time)}"
     account.warn("data.readings.spikes", where, f"{what}; {_doubtful(part, bad, span)}", "check shielding and earth")

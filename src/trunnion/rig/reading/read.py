@@ -48,6 +48,7 @@ FEW_HARMONICS = 5.0
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
 SAME = 1e-3  # of a step: turns that scatter less read the same
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
+PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
 UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
 
 
@@ -157,12 +158,14 @@ class _File:
         self.lag, self.step, self.cut = 0.0, 0.0, 0.0
         self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
+        self.beyond: dict[str, faults.BeyondRange] = {}
         self.steps: dict[str, float] = {}
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
             self.readings[name] = np.array(self.line.rows(column.values))
             faults.cells(f"channels.{name}", column, self.readings[name], self.line.seconds, account)
+            self.beyond[name] = faults.beyond(self.readings[name], self.own[name].limit)
         self.table = table
 
     def conditions(self) -> list[Condition]:
@@ -333,11 +336,14 @@ class _File:
         begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
         low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
         start, cycle = float(mapping.start.evaluate()), float(mapping.cycle.evaluate())
-        span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit)
+        reach = float(np.median(end - begin)) / mapping.positions
+        reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
+        beside = faults.WIDTH + int(reach / line.step)
+        span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit, beside)
         readings = self.readings.pop(name)
-        step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
         speed = channel.measures.startswith("rate:")
-        faults.signal(where, readings, line.seconds, span, own.limit, account, speed)
+        faults.signal(where, readings, line.seconds, span, own.limit, account, speed, self.beyond[name])
+        step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)

@@ -90,9 +90,11 @@ def sides_of(known: Reference, times: Array, cycle: Cycle) -> Sides:
     laps = np.arange(1 + time[-1] // cycle.duration) if period is None and cycle.periodic else np.zeros(1)
     around = laps[:, None] * cycle.duration + BESIDE * cycle.duration * np.array([-1.0, 1.0])
     found = (times[..., None, None] + around).reshape(len(times), -1)
+    apart = 4 * BESIDE * cycle.duration
     if period is None:
-        found = np.where((found >= time[0]) & (found <= time[-1]), found, np.nan)
-    return Sides(found, 4 * BESIDE * cycle.duration)
+        return Sides(np.where((found >= time[0]) & (found <= time[-1]), found, np.nan), apart)
+    begin = time[0] - apart  # so that the sides of a bend where the period ends are together
+    return Sides((found - begin) % period + begin, apart)
 
 
 def _at(known: Reference, time: Array, look: Look) -> Array:
@@ -161,7 +163,7 @@ def _highest(known: Reference, course: Array, sides: Sides, there: Array, look: 
 
     course: at the positions; there: beside bends, both sides of which are one place.
     """
-    (beside, apart) = sides
+    beside, apart = sides
     time, period = known.window.time, known.window.period
     rows, count, index = np.arange(len(course)), len(time), np.arange(len(time))
     around = np.concatenate([index[-1:], index, index[:1]]) if period is not None else index[[0, *index, -1]]
@@ -177,8 +179,8 @@ def _highest(known: Reference, course: Array, sides: Sides, there: Array, look: 
         place, value = at[rows, top], signed[rows, top]
         if not np.any(value > best - near):
             break
-        before = np.maximum(np.searchsorted(extended, place, side="left") - 1, 0)
-        after = np.minimum(np.searchsorted(extended, place, side="right"), count + 1)
+        before = np.maximum(np.searchsorted(extended, place - apart, side="left") - 1, 0)
+        after = np.minimum(np.searchsorted(extended, place + apart, side="right"), count + 1)
         away = beside - place[:, None]
         if period is not None:
             away -= period * np.rint(away / period)

@@ -183,6 +183,16 @@ def test_few_positions_and_many_parts_agree(steps: int, monkeypatch: pytest.Monk
     agree(*both(seated("fourbar-with-play"), steps))
 
 
+def test_measures_with_pins_in_seats_agree() -> None:
+    """Of the slider's place and the drive torque, in steps that are each other's neighbours."""
+    one, other = (
+        trunnion.analyse(seated("toleranced-slider-crank"), 3000, engine=engine).measure_value.values
+        for engine in ("numpy", "compiled")
+    )
+    peak = np.nanmax(np.abs(one), axis=1, keepdims=True)
+    np.testing.assert_allclose(other / peak, one / peak, atol=1e-9)
+
+
 def test_means_with_pins_in_seats_agree() -> None:
     one, other = (
         positions(prepare(seated("fourbar-with-play")), 90, engine=engine) for engine in ("numpy", "compiled")

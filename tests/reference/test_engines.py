@@ -115,6 +115,13 @@ def test_functions_of_special_pairs(name: str) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-15)
 
 
+@pytest.mark.parametrize("name", ["maximum", "minimum"])
+def test_the_larger_of_a_special_number_and_a_constant(name: str) -> None:
+    larger = getattr(np, name)
+    found = compiled(lambda x: [larger(*pair) for c in SPECIAL for pair in ((x, c), (c, x))], SPECIAL)
+    np.testing.assert_array_equal(found, [larger(SPECIAL, c) for c in SPECIAL for _ in range(2)])
+
+
 def test_angles_on_the_axes() -> None:
     y, x = (grid.ravel() for grid in np.meshgrid(SPECIAL[np.isfinite(SPECIAL)], SPECIAL[np.isfinite(SPECIAL)]))
     (found,) = compiled(lambda y, x: (np.arctan2(y, x),), y, x)

@@ -77,9 +77,10 @@ def find(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> list[Loss]:
     """Losses of contact of every joint that its load seats; written into `contact_lost` and the status."""
     found: list[Loss] = []
     joints = list(run.system.joints)
-    arrays["contact_loss_number"][:] = _numbers(arrays, run, time)
+    _fill_numbers(arrays, run, time)
     arrays["contact_loss_number"][:, arrays["status"] == Status.ZERO_SLIP] = np.nan  # friction jumps there
-    largest = float(np.nanmax(np.abs(arrays["reaction_force"]), initial=0.0))
+    force = arrays["reaction_force"]
+    largest = float(max(np.nanmax(force, initial=0.0), -np.nanmin(force, initial=0.0)))
     # where a joint turns round, the sense of its friction is what does not settle; where forces have no answer, nothing
     status = arrays["status"]
     open_ = (status < Status.NOT_CONVERGED) & (status != Status.ZERO_SLIP)
@@ -174,18 +175,18 @@ def valid(found: Seated, run: Run, near: NDArray[np.float64], time: NDArray[np.f
 
 def _lifted(forces: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.intp]:
     """Positions at which the load of an end points away from the wall that its pin lies at."""
-    across = np.sum(forces * offsets, axis=1)
-    size = np.sqrt(np.sum(forces**2, axis=1) * np.sum(offsets**2, axis=1))
-    return np.flatnonzero(np.any(across < -OFF * size, axis=0))
+    across, *sizes = (
+        np.einsum("eap,eap->ep", *two) for two in ((forces, offsets), (forces, forces), (offsets, offsets))
+    )
+    return np.flatnonzero(np.any(across < -OFF * np.sqrt(sizes[0] * sizes[1]), axis=0))
 
 
-def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fill_numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> None:
     """The figure of Earles and Wu of every joint: of its reaction without play, in space of the force on an end.
 
     NaN of fewer than three positions, and at the ends of a cycle that does not close: there the load has no rate.
     """
-    count = len(time)
-    found = np.full((len(run.system.joints), count), np.nan)
+    count, found = len(time), arrays["contact_loss_number"]
     for low in range(0, count if count > 2 else 0, CHUNK):
         inner = slice(low, min(low + CHUNK, count))
         if run.system.mechanism.space == "planar":
@@ -196,7 +197,6 @@ def _numbers(arrays: Arrays, run: Run, time: NDArray[np.float64]) -> NDArray[np.
         found[:, inner] = functools.reduce(np.fmax, (_earles_wu(force, time[1] - time[0]) for force in ends))
     if not run.cycle.periodic:
         found[:, [0, -1]] = np.nan
-    return found
 
 
 def _with_neighbours(force: NDArray[np.float64], inner: slice) -> NDArray[np.float64]:
@@ -324,7 +324,7 @@ def _end_loads(seat: GivenSeat, forces: NDArray[np.float64]) -> Iterator[tuple[i
 
 
 def _size(load: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.sum(load * load, axis=0)))
+    return np.asarray(np.sqrt(sum(row * row for row in load)))
 
 
 def _passages(
@@ -334,18 +334,21 @@ def _passages(
 
     near: how near, of the peak.
     """
-    after = np.roll(load, -1, axis=1)
-    step = after - load
-    square = np.sum(step * step, axis=0)
-    with np.errstate(all="ignore"):
-        share = np.clip(-np.sum(load * step, axis=0) / square, 0.0, 1.0)
-    nearest = _size(load + share * step)
-    turns = (np.sum(load * after, axis=0) < 0) & (nearest <= near * peak)
+    after, size = np.roll(load, -1, axis=1), _size(load)
+    turns = np.sum(load * after, axis=0) < 0
     if not periodic and len(turns):
         turns[-1] = False
-    nothing = _size(load) <= NO_LOAD * peak
-    for k in np.flatnonzero(turns | nothing):
-        yield (float(k), float(_size(load)[k])) if nothing[k] else (float(k + share[k]), float(nearest[k]))
+    places = np.flatnonzero(turns | (size <= NO_LOAD * peak))
+    load, size = load[:, places], size[places]
+    step = after[:, places] - load
+    with np.errstate(all="ignore"):
+        share = np.clip(-np.sum(load * step, axis=0) / np.sum(step * step, axis=0), 0.0, 1.0)
+    nearest = _size(load + share * step)
+    for i, k in enumerate(places):
+        if size[i] <= NO_LOAD * peak:
+            yield float(k), float(size[i])
+        elif nearest[i] <= near * peak:
+            yield float(k + share[i]), float(nearest[i])
 
 
 def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> Iterator[Finding]:
@@ -382,11 +385,11 @@ def _jump(offsets: NDArray[np.float64], held: NDArray[np.intp], joints: Sequence
 
     offsets: of pins from the middle of their holes, (joint, end, axis, position), m.
     """
-    step = np.sqrt(np.sum(np.diff(offsets, axis=-1) ** 2, axis=-2))  # (joint, end, step)
-    if not step.shape[-1]:
+    if offsets.shape[-1] < 2:
         return joints[0], 0.0
-    beside = np.unique(np.clip([held - 1, held], 0, step.shape[-1] - 1))
-    furthest = np.nan_to_num(step[..., beside]).max(axis=(1, 2), initial=0.0)
+    beside = np.unique(np.clip([held - 1, held], 0, offsets.shape[-1] - 2))
+    step = np.sqrt(np.sum((offsets[..., beside + 1] - offsets[..., beside]) ** 2, axis=-2))  # (joint, end, step)
+    furthest = np.nan_to_num(step).max(axis=(1, 2), initial=0.0)
     return joints[int(np.argmax(furthest))], float(np.max(furthest))
 
 

@@ -137,7 +137,7 @@ def _machine() -> Any:
     target = llvm.Target.from_default_triple()
     # with the small code model, code that is loaded far from the tables it reads ends the process
     model = "large" if platform.machine().lower() in ("x86_64", "amd64") else "jitdefault"
-    # kernels run no faster with more than the first level, and take a tenth longer to compile
+    # with more than the first level kernels take a tenth longer to compile and run as fast, within 4 %
     return target.create_target_machine(cpu=name, features=features, opt=1, reloc="pic", codemodel=model)
 
 

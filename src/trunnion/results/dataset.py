@@ -33,7 +33,6 @@ class Variable:
     part: str = ""
     space: str = ""
 
-    @functools.cache  # noqa: B019 - of a few constants
     def over(self, *dims: str) -> Variable:
         """The same with more dimensions, last."""
         return replace(self, dims=(*self.dims, *dims))

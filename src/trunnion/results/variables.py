@@ -6,6 +6,7 @@ z), component (of a quaternion: w, x, y, z), driver, spring (only of a mechanism
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -169,6 +170,11 @@ def variables(space: str) -> dict[str, Variable]:
     return {**both, **IN_SPACE} if space == "spatial" else both
 
 
+@functools.cache
+def _along_positions(space: str) -> dict[str, Variable]:
+    return {name: one.over("position") for name, one in variables(space).items()}
+
+
 def _space(labels: Labels) -> str:
     return "spatial" if "component" in labels else "planar"
 
@@ -228,7 +234,7 @@ def dataset(
     every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
     taken out of their dict one by one, so that both need not be in memory.
     """
-    known = {name: one.over("position") for name, one in variables(_space(labels)).items()}
+    known = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]
     own = {name: arrays[name] if dtype == "float64" else _as(arrays.pop(name), dtype) for name in names}
     found = described(own, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)

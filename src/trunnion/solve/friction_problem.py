@@ -110,8 +110,10 @@ class FrictionProblem:
             found.append(number)
             return number
 
-        self.mapped(note)
-        return found
+        for contact in self.contacts:
+            contact.load.mapped(note)
+            found += [contact.slip, *contact.parameters.values()]
+        return [*found, *(n for wrenches in (self.start, *self.influence) for wrench in wrenches for n in wrench)]
 
     def picked(self, lanes: Number) -> tuple[FrictionProblem, NDArray[np.bool_]]:
         """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""

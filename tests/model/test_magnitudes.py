@@ -84,7 +84,13 @@ assembly: {B: [0.02, 0.02]}
         ("", "", None, "", ""),  # a plain factor and a plain hint
         ("range: [70 mm, 90 mm]", "range: [70 mm, 90]", Severity.WARNING, "drivers.S.range.to", "is 90 m, "),
         ("speed: 20 mm/s", "speed: 20", Severity.NOTE, "drivers.S.speed", "is 20 m/s, "),
-        ("stiffness: 8 N/mm", "stiffness: 8", Severity.NOTE, "springs.work.stiffness", "is 8 N/m, "),
+        (
+            "stiffness: 8 N/mm",
+            "stiffness: 8",
+            Severity.NOTE,
+            "springs.work.stiffness",
+            "is 8 N/m, a plain number where lengths",
+        ),
         ("force: [-5 N, 0]", "force: [-5, 0]", Severity.NOTE, "loads.F.force.x", "is -5 N, "),
         ("pinch: 1 mm", "pinch: 1", Severity.WARNING, "dimensions.pinch", "11.1 times the largest length"),
         ("pinch: 1 mm", "pinch: 0.001", Severity.NOTE, "dimensions.pinch", "is 0.001 m, "),

@@ -128,6 +128,24 @@ def test_unknown_names(name: str, what: str, remedy: str) -> None:
         assert remedy in error.value.findings[0].remedy
 
 
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("A.initial.coordinate", "the model states no drivers.A.initial.coordinate"),
+        ("drivers.A.initial.coordinate", "the model states no drivers.A.initial.coordinate"),
+        ("crank.inertia.xx", "the model states no links.crank.inertia.xx"),
+        ("A.initial.place", "there is no number named 'A.initial.place'"),
+        ("crank.inital", "there is no number named 'crank.inital'"),
+    ],
+)
+def test_what_a_file_may_state_and_does_not_is_no_unknown_name(name: str, what: str) -> None:
+    with pytest.raises(MechanismError) as error:
+        DURANGO.with_values({name: 1.0})
+    (finding,) = error.value.findings
+    assert finding.what == what
+    assert ("write it into the model file" in finding.remedy) == ("states no" in what)
+
+
 def test_every_parameter_can_be_set_and_is_set() -> None:
     for mechanism in (DURANGO, CARDAN, SLIDER):
         kinds = mechanism.parameter_kinds()

@@ -230,6 +230,9 @@ def test_screw_jack(friction: float, way: float) -> None:
         assert float(result.efficiency) == pytest.approx(np.tan(LEAD) / np.tan(LEAD + phi), rel=1e-12)
     else:
         assert np.all(result.drive_effort.values > 0) == (phi < LEAD)
+    held = np.tan(LEAD) / friction if phi > LEAD else np.nan  # by the load it raises or is lowered by
+    found = trunnion.locking(trunnion.Mechanism(trunnion=1, **data), 5)
+    np.testing.assert_allclose(found["holding_multiple"].values, held, rtol=1e-9)
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.1, 0.2])

@@ -53,6 +53,7 @@ from trunnion.model.tolerances import (
     written_limits,
 )
 from trunnion.model.units import Kind
+from trunnion.model.unstated import not_stated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -233,6 +234,9 @@ class Mechanism(Numbers):
             return self.parameter_set.resolve(name)
         except MechanismError:
             found = self._unstated(name)
+            if not found and (path := not_stated(self, name)):
+                remedy = "write it into the model file: then this name changes it"
+                raise MechanismError(Finding(f"the model states no {path}", name, remedy)) from None
             if not found:
                 raise
             return found[0]

@@ -67,7 +67,8 @@ def _forgotten(path: str, value: float, known: float, others: int = 0) -> Findin
 def _meant(path: str, value: float, kind: Kind) -> Finding:
     """A note of a number that is small enough, or no length."""
     other = f", or {value:g} {MEANT[kind]} if that is meant" if MEANT[kind] != kind.unit else ""
-    what = f"is {value:g} {kind.unit}, a plain number where other lengths have a unit"
+    others = "other lengths" if kind is KINDS["length"] else "lengths"
+    what = f"is {value:g} {kind.unit}, a plain number where {others} have a unit"
     return Finding(what, path, f"write {value:g} {kind.unit}{other}", Severity.NOTE)
 
 

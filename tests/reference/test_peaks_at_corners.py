@@ -71,6 +71,8 @@ def test_the_peak_and_its_derivatives_are_those_where_the_load_begins(load: str,
     assert float(trunnion.analyse(model(load), steps)["measure_figure"].sel(measure="peak")) == pytest.approx(
         peak(), rel=1e-5
     )
+    crank = 2 * np.pi - np.arccos((START**2 + R**2 - L**2) / (2 * R * START))
+    assert float(result["place"][0]) == pytest.approx(np.degrees(crank), abs=1e-5)
     for name in LIMIT:
         found = float(result["sensitivity"].sel(parameter=f"dimensions.{name}")[0])
         assert found == pytest.approx(slope(name), rel=1e-3), name

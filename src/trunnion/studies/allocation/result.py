@@ -49,7 +49,9 @@ VARIABLES: dict[str, Variable] = {
     "yield_checked": Variable((), "1", "share within all limits of fresh samples, which had no part in the choice"),
     "yield_checked_low": Variable((), "1", "yield of the fresh samples, lower end of the 95 % interval"),
     "yield_checked_high": Variable((), "1", "yield of the fresh samples, upper end of the 95 % interval"),
-    "trial_margin": Variable(T, "1", "margin of the limits in a trial, in standard deviations; the mean over the measures"),
+    "trial_margin": Variable(
+        T, "1", "margin of the limits in a trial, in standard deviations; the mean over the measures"
+    ),
     "trial_cost": Variable(T, "1", "cost of a trial"),
     "trial_yield": Variable(T, "1", "share of the samples within all limits in a trial"),
     "trial_yield_low": Variable(T, "1", "yield of a trial, lower end of the 95 % interval"),

@@ -197,3 +197,13 @@ def test_the_dead_centre_under_load_is_that_of_a_window_before_it() -> None:
     assert float(result["measure_figure"].sel(measure="shut")) == pytest.approx(ideal - 3 * clearance, abs=1e-8)
     notes = {one.where: one.what for one in result.trunnion.findings if one.code == "measure.contact_lost"}
     assert "where a load begins or ends or a joint reverses" in notes["measures.cycle"]
+
+
+def test_a_sweep_says_why_there_is_no_efficiency_where_the_load_never_acts() -> None:
+    """The ram reaches r + l: 210 and 220 mm do not reach the load at 222 mm."""
+    result = trunnion.sweep(model(), {"r": ["10 mm", "20 mm", "30 mm"]}, steps=36)
+    assert np.isnan(result["efficiency"].values).tolist() == [True, True, False]
+    (note,) = [one for one in result.trunnion.findings if one.code == "sweep.no_efficiency"]
+    assert (
+        note.what == "the efficiency is undefined at 2 of 3 points, the first at r = 10 mm: the driver does no net work"
+    )

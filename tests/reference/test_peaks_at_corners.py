@@ -71,6 +71,8 @@ def test_the_peak_and_its_derivatives_are_those_where_the_load_begins(load: str,
     assert float(trunnion.analyse(model(load), steps)["measure_figure"].sel(measure="peak")) == pytest.approx(
         peak(), rel=1e-5
     )
+    crank = 2 * np.pi - np.arccos((START**2 + R**2 - L**2) / (2 * R * START))
+    assert float(result["place"][0]) == pytest.approx(np.degrees(crank), abs=1e-5)
     for name in LIMIT:
         found = float(result["sensitivity"].sel(parameter=f"dimensions.{name}")[0])
         assert found == pytest.approx(slope(name), rel=1e-3), name
@@ -178,3 +180,30 @@ def test_tolerances_as_stated_that_cost_less_and_keep_the_limits_are_told() -> N
     assert float(result["nominal"][0]) == pytest.approx(1547 / 1.02, rel=0.002)
     assert found["allocation.dearer"]["before"] == pytest.approx(0.1**-0.5)
     assert found["allocation.dearer"]["cost"] > 0.1**-0.5
+
+
+def test_the_dead_centre_under_load_is_that_of_a_window_before_it() -> None:
+    """The ram is held back by three clearances; the load ends as it turns round, where no figure of a seat is valid."""
+    clearance, ends = 20e-6, 359.5
+    data = model().data()
+    for name in ("O", "P", "Q"):
+        data["joints"][name]["pin"] = {"radius": "25 mm", "clearance": clearance}
+    shut = {"point": "ram.Q", "axis": "x", "as": "maximum"}
+    window = {"shut": {**shut, "over": ["330 deg", f"{ends} deg"]}, "cycle": shut}
+    seated = {**data, "joint_defaults": {"seat": "loaded"}, "measures": window}
+    result = trunnion.analyse(trunnion.Mechanism.model_validate(seated), 720)
+    angle = np.radians(ends)
+    ideal = R * np.cos(angle) + np.sqrt(L**2 - (R * np.sin(angle)) ** 2)
+    assert float(result["measure_figure"].sel(measure="shut")) == pytest.approx(ideal - 3 * clearance, abs=1e-8)
+    notes = {one.where: one.what for one in result.trunnion.findings if one.code == "measure.contact_lost"}
+    assert "where a load begins or ends or a joint reverses" in notes["measures.cycle"]
+
+
+def test_a_sweep_says_why_there_is_no_efficiency_where_the_load_never_acts() -> None:
+    """The ram reaches r + l: 210 and 220 mm do not reach the load at 222 mm."""
+    result = trunnion.sweep(model(), {"r": ["10 mm", "20 mm", "30 mm"]}, steps=36)
+    assert np.isnan(result["efficiency"].values).tolist() == [True, True, False]
+    (note,) = [one for one in result.trunnion.findings if one.code == "sweep.no_efficiency"]
+    assert (
+        note.what == "the efficiency is undefined at 2 of 3 points, the first at r = 10 mm: the driver does no net work"
+    )

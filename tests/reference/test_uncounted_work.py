@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
+import numpy as np
 import pytest
 
 from mechanisms_parts import Data, revolute
 from trunnion import Mechanism, analyse
-from trunnion.errors import Finding
+from trunnion.errors import Finding, Status
 
 LIFTED, HELPED, HINDERED = 10.0, 4.0, 5.0  # J: constant forces, N, over a rise of 1 m
 
@@ -52,10 +54,10 @@ def test_the_largest_source_is_named_where_each_is_small() -> None:
     assert "beside it load hand 70 mJ" in one.what
 
 
-def test_what_seats_leave_is_no_efficiency_above_one() -> None:
-    """Without friction the efficiency is 1; pins that float as the work sets in leave more than the integrals do."""
+def press(**more: Any) -> Mechanism:
+    """A crank press whose work begins 5 mm before its dead centre."""
     pin, work = {"radius": 0.01, "clearance": 35e-6}, "250 kN * between(ram.Q.y, 399 mm, 404 mm)"
-    press: Data = {
+    data: Data = {
         "links": {
             "frame": {"points": {"O": [0, 0.7], "S": {"at": [0, 0.7], "axis": [0, -1]}}},
             "crank": {"points": {"O": [0, 0], "P": [0.04, 0]}},
@@ -66,19 +68,33 @@ def test_what_seats_leave_is_no_efficiency_above_one() -> None:
             "O": revolute("frame", "crank") | {"pin": pin},
             "P": revolute("crank", "rod") | {"pin": pin},
             "Q": revolute("rod", "ram") | {"pin": pin},
-            "S": {"type": "prismatic", "links": ["frame", "ram"]},
+            "S": {"type": "prismatic", "links": ["frame", "ram"], "guide": {"length": 0.32}},
         },
-        "joint_defaults": {"seat": "loaded"},
         "drivers": {"O": {"speed": "60 rpm", "start": "90 deg"}},
         "gravity": [0.0, -9.81],
         "loads": {"blank": {"joint": "S", "resisting_force": work, "only": "positive", "useful": True}},
         "assembly": {"Q": [0, 0.48]},
     }
-    result = analyse(Mechanism(trunnion=1, **press), steps=36)
+    return Mechanism(trunnion=1, **data, **more)
+
+
+def test_what_seats_leave_is_no_efficiency_above_one() -> None:
+    """Without friction the efficiency is 1; pins that float as the work sets in leave more than the integrals do."""
+    result = analyse(press(joint_defaults={"seat": "loaded"}), steps=36)
     excess = float(result.efficiency) - 1
     assert abs(excess) > 1e-9
     assert abs(excess) < float(result.efficiency_error) < 0.05
     assert "efficiency.above_one" not in [one.code for one in result.trunnion.findings]
+
+
+@pytest.mark.parametrize("friction", [0.1, 8.0])
+def test_a_load_where_it_locks_is_not_told_to_take_no_power(friction: float) -> None:
+    """The work is met by 15 of 360 positions, all of which lock with the larger friction: that is told, and why."""
+    result = analyse(press(joint_defaults={"friction": friction}), steps=360)
+    locked = result["status"].values >= Status.NOT_CONVERGED
+    assert np.any(locked) == (friction > 1)
+    assert np.any(np.nan_to_num(result["useful_power"].values)) == (friction < 1)
+    assert "load.no_power" not in [one.code for one in result.trunnion.findings]
 
 
 def test_below_one_a_load_beside_the_drive_that_supplies_work_is_a_note() -> None:

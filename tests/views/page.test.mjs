@@ -168,6 +168,7 @@ function enlarged() {
     seats: seats.map((seat) => seat.find(classes("title"))[0].textContent),
     remarks: seats.map((seat) => seat.find(classes("remark"))[0].textContent),
     lost: places.charts.find(classes("lost")).length,
+    clear: places.stage.find(classes("clear")).length,
     titles: places.charts.find(classes("title")).map((element) => element.textContent),
   };
 }

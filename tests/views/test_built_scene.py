@@ -148,6 +148,7 @@ if shutil.which("node"):  # as in test_browser.py
         assert shown["seats"] == ["O", "P", "Q", "S"]
         assert all(re.search(r"play × \d+; longest load", text) for text in shown["remarks"])
         assert shown["lost"] > 0
+        assert shown["clear"] == 1  # the block of S, as long as its guide, hides nothing
         assert {"Position errors, largest", "Transmission error, slide of S", "ξ, direction of the seats"} <= set(
             shown["titles"]
         )

@@ -352,32 +352,49 @@ def _passages(
 
 
 def findings(found: Sequence[Loss], arrays: Arrays, joints: Sequence[str], dial: Dial) -> Iterator[Finding]:
-    """One finding for each joint that loses contact, and for each that nothing presses."""
+    """One finding for all joints that lose contact at the same places, and for those that nothing presses."""
     if "seat_change" not in arrays:
         return
     held = np.flatnonzero((arrays["seat_travel"] == 0) & (arrays["status"] < Status.CONTACT_LOST))
     if len(held):
         joint, jump = _jump(arrays["seat_offset"], held, joints)
         yield finding_for("seat.held", "joints", at=dial.intervals(held), joint=joint, jump=jump)
-    idle: dict[str, list[str]] = {}  # joints by the range in which they bear no load
+    yield from _unloaded(found, dial)
+    lost: dict[tuple[str, str], list[Loss]] = {}
+    lifted: dict[tuple[str, str], list[Loss]] = {}
     for loss in found:
-        for _, text, long in _told(loss.places, dial):
-            if long:
-                idle.setdefault(text, []).append(loss.joint)
-    for text, unloaded in idle.items():
-        yield finding_for("contact.unloaded", "joints", joints=unloaded, at=text)
-    for loss in found:
-        where = f"joints.{loss.joint}"
+        shown = sorted(_told(loss.places, dial))
         if not loss.loaded:
-            yield finding_for("seat.unloaded", where, part=loss.part)
-            continue
-        if not all(long for _, _, long in _told(loss.places, dial)):
-            yield _lost(loss, arrays["contact_loss_number"][joints.index(loss.joint)], dial)
+            yield finding_for("seat.unloaded", f"joints.{loss.joint}", part=loss.part)
+        elif not all(long for *_, long in shown):
+            at = _listed([text + end for _, text, end, long in shown if not long])
+            lost.setdefault((loss.part, at), []).append(loss)
         if len(loss.lifted):
-            yield finding_for("contact.lifted", where, part=loss.part, at=dial.intervals(loss.lifted))
-        if len(loss.unsettled):
-            worst = np.nanmax(arrays["seat_change"][loss.unsettled])
-            yield finding_for("seat.unsettled", where, rounds=ROUNDS, at=dial.intervals(loss.unsettled), change=worst)
+            lifted.setdefault((loss.part, dial.intervals(loss.lifted)), []).append(loss)
+    for (part, at), some in lost.items():
+        yield _lost(some, part, at, arrays["contact_loss_number"][[joints.index(one.joint) for one in some]], dial)
+    for (part, at), some in lifted.items():
+        yield finding_for("contact.lifted", _where(some), part=part, at=at, count=len(some))
+    for loss in found:
+        if loss.loaded and len(loss.unsettled):
+            at, worst = dial.intervals(loss.unsettled), np.nanmax(arrays["seat_change"][loss.unsettled])
+            yield finding_for("seat.unsettled", _where([loss]), rounds=ROUNDS, at=at, change=worst)
+
+
+def _unloaded(found: Sequence[Loss], dial: Dial) -> Iterator[Finding]:
+    """The joints that bear no load over a range, with the end that does not where the other does."""
+    idle: dict[str, dict[str, str]] = {}
+    for loss in found:
+        for _, text, end, long in _told(loss.places, dial):
+            if long:
+                ends = idle.setdefault(text, {})
+                ends[loss.joint] = "" if loss.joint in ends else end
+    for text, ends in idle.items():
+        yield finding_for("contact.unloaded", "joints", joints=[name + end for name, end in ends.items()], at=text)
+
+
+def _where(losses: Sequence[Loss]) -> str:
+    return f"joints.{', '.join(one.joint for one in losses)}"
 
 
 def _jump(offsets: NDArray[np.float64], held: NDArray[np.intp], joints: Sequence[str]) -> tuple[str, float]:
@@ -393,27 +410,38 @@ def _jump(offsets: NDArray[np.float64], held: NDArray[np.intp], joints: Sequence
     return joints[int(np.argmax(furthest))], float(np.max(furthest))
 
 
-def _lost(loss: Loss, numbers: NDArray[np.float64], dial: Dial) -> Finding:
-    shown = [text for _, text, long in sorted(_told(loss.places, dial)) if not long]
-    more = len(shown) - MOST_PLACES
-    at = ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+def _lost(losses: Sequence[Loss], part: str, at: str, numbers: NDArray[np.float64], dial: Dial) -> Finding:
+    """Of joints that lose contact at the same places: the load of that where it falls nearest to zero of its peak.
+
+    numbers: of Earles and Wu, (joint, position).
+    """
+    loss = min(losses, key=lambda one: one.least / one.peak)
     least = loss.least if loss.least > NO_LOAD * loss.peak else 0.0  # less than that is rounding
-    top = int(np.nanargmax(numbers)) if loss.turns and np.any(np.isfinite(numbers)) else None
+    number, turning = None, ""
+    if loss.turns and np.any(np.isfinite(numbers)):
+        number = np.nanmax(numbers)
+        turning = f"at {dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
     return finding_for(
-        "contact.lost", f"joints.{loss.joint}", part=loss.part, least=least, peak=loss.peak, at=at, likely=EARLES_WU,
-        number=None if top is None else numbers[top], turning="" if top is None else f"at {dial.at(top)}",
+        "contact.lost", _where(losses), part=part, least=least, peak=loss.peak, at=at, likely=EARLES_WU,
+        number=number, turning=turning, count=len(losses),
     )  # fmt: skip
 
 
-def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str, bool]]:
-    """Where, and in words, of every passage; those of an end without a load for a while are one, and long."""
+def _listed(shown: Sequence[str]) -> str:
+    more = len(shown) - MOST_PLACES
+    return ", ".join(shown[:MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _told(places: Sequence[tuple[float, int]], dial: Dial) -> Iterator[tuple[float, str, str, bool]]:
+    """Where, and in words, with the end, of every passage; those of an end without a load for a while are one, and
+    long."""
     for end, name in enumerate(ENDS):
         own = np.array(sorted(place for place, one in places if one == end))
         for run in np.split(own, np.flatnonzero(np.diff(own) > 1.5) + 1):
             if len(run) > MOST_PLACES:
-                yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}{name}", True
+                yield run[0], f"between {_at(dial, run[0])} and {_at(dial, run[-1])}", name, True
             else:
-                yield from ((place, f"at {_at(dial, place)}{name}", False) for place in run)
+                yield from ((place, f"at {_at(dial, place)}", name, False) for place in run)
 
 
 def _at(dial: Dial, place: float) -> str:

@@ -33,6 +33,7 @@ VARIABLES = {
     "measure_value": Variable(("measure", "position"), "", "the model's measure; NaN of one that has several numbers"),
     "measure_figure": Variable(("measure",), "", "figure of the measure over the cycle; NaN of one that states none"),
 }
+SWITCHES = ", where a load begins or ends or a joint reverses, and the pins cross their play"
 # figures of single positions, and the course whose extremes these are
 OF_PLACES: dict[str, Callable[[Array], Array]] = {
     **dict.fromkeys(
@@ -131,10 +132,19 @@ def watched(
         if measure.rule in OF_PLACES and np.any(lost):
             at = " and ".join(dial.at(int(k)) for k in there[lost])
             figures[i], notes[measure.name] = np.nan, f"not valid: a pin loses contact at its place, {at}"
-            findings.append(finding_for("measure.contact_lost", f"measures.{measure.name}", at=at))
+            why = SWITCHES if _beside_switch(run, time, there[lost]) else ""
+            where = f"measures.{measure.name}"
+            findings.append(finding_for("measure.contact_lost", where, at=at, phrases={"why": why}))
         elif np.any(lost):
             notes[measure.name] = f"a pin loses contact at {np.count_nonzero(lost)} of its {len(lost)} positions"
     return Watched(run, measures, values, figures, findings, valid, notes)
+
+
+def _beside_switch(run: Run, time: Array, places: NDArray[np.intp]) -> bool:
+    """Whether the model switches within a step of every one of some positions."""
+    step, around = run.cycle.duration / len(time), run.cycle.duration if run.cycle.periodic else np.inf
+    away = np.abs(time[places, None] - run.edges[1:-1])
+    return bool(np.all(np.min(np.minimum(away, around - away), axis=1, initial=np.inf) <= step))
 
 
 def _resting_on(run: Run, measure: Measure, values: Array, time: Array) -> NDArray[np.intp]:

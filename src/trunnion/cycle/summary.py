@@ -279,7 +279,7 @@ def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
             yield from _never_acts(run, name, at.arrays["spring_elongation"][i])
     marked = [name for name, load in run.system.mechanism.loads.items() if load.useful]
     useful = at.arrays["useful_power"]
-    if marked and np.any(np.isfinite(useful)) and not np.any(np.nan_to_num(useful)):
+    if marked and np.all(np.isfinite(useful)) and not np.any(useful):  # where positions have no answer, that is why
         yield finding_for("load.no_power", "loads", loads=marked, count=len(marked))
 
 

@@ -62,18 +62,21 @@ def _bounds(driver: str, **one: Any) -> str:
     return f"{effort} of {driver} {between(one['from'], one['to'], one['unit'])} {one['at']}"
 
 
-def _impact(part: str, least: float, peak: float, at: str, number: float | None, turning: str, likely: float) -> str:
+def _impact(
+    part: str, least: float, peak: float, at: str, number: float | None, turning: str, likely: float, count: int
+) -> str:
     if number is None:
         return "expect impact there"
-    rest = f"elsewhere its contact-loss number is at most {number:.3g} rad/(N s), {turning}"
+    its = agreeing(count, "its", "their largest")
+    rest = f"elsewhere {its} contact-loss number is at most {number:.3g} rad/(N s), {turning}"
     return f"expect impact there; {rest} (impact is likely from {likely:g}: Earles and Wu)"
 
 
 CYCLE: dict[str, Sentence] = {
     "measure.contact_lost": Sentence(
         NOTE,
-        "the measure has no figure: a pin loses contact at its place, {at}",
-        "state another place or window of the measure, by at: or over:",
+        "the measure has no figure: a pin loses contact at its place, {at}{why}",
+        "state another place or window of the measure, by at: or over:, or analyse with --seat free",
     ),
     "model.gravity": Sentence(
         NOTE,
@@ -215,8 +218,8 @@ CYCLE: dict[str, Sentence] = {
     ),
     "contact.lost": Sentence(
         WARNING,
-        "the {part} loses contact {at}: its load falls to {least:~N} (peak {peak:~N}) and reverses, and the pin would "
-        "cross its play",
+        "the {part}{count:#/s} {count:#loses/lose} contact {at}: {count:#its load falls/the loads fall} to {least:~N} "
+        "(peak {peak:~N}) and {count:#reverses, and the pin/reverse, and the pins} would cross {count:#its/their} play",
         _impact,
     ),
     "contact.unloaded": Sentence(
@@ -226,7 +229,8 @@ CYCLE: dict[str, Sentence] = {
     ),
     "contact.lifted": Sentence(
         WARNING,
-        "the {part} lifts off the wall {at}: the inertia force of its motion within the play exceeds the load",
+        "the {part}{count:#/s} {count:#lifts/lift} off the wall {at}: the inertia force of {count:#its/their} motion "
+        "within the play exceeds the load",
         "forces there are those of a pin that stays in contact",
     ),
     "seat.unloaded": Sentence(
@@ -236,8 +240,9 @@ CYCLE: dict[str, Sentence] = {
     ),
     "seat.unsettled": Sentence(
         WARNING,
-        "the seat did not converge in {rounds} iterations {at}: it still changes by {change:.2g} times the clearance, "
-        "for the load turns as the pin moves: as of work that is touched with the pin on one side of its hole alone",
+        "the seat did not converge in {rounds} iterations {at}: it still changes by {change:.2g} times the "
+        "clearance, for the load turns as the pin moves, as where a tool touches the work for only one of two "
+        "positions of a pin",
         "the pin floats there: treat it as loss of contact",
     ),
     "seat.held": Sentence(

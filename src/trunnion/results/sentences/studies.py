@@ -136,6 +136,11 @@ SWEEP = {
         "{status}",
         "run `trunnion analyse` with these values to see where in the cycle, and why",
     ),
+    "sweep.no_efficiency": Sentence(
+        NOTE,
+        "the efficiency is undefined at {points:,} of {of:#point}, the first at {at}: {why}",
+        "see the mean powers there; `trunnion analyse` with these values tells where loads act",
+    ),
     "sweep.not_steady": Sentence(
         WARNING, f"{{measure}} has no value at {{points:,}} of {{of:#point}}, the first at {{at}}: {NOT_STEADY}", LONGER
     ),

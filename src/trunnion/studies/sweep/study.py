@@ -89,6 +89,7 @@ def sweep(
     first = say(points.swept, (0,) * len(points.shape))
     found += (replace(one, what=f"at {first} {one.what}") for one in points.jumps)
     found = _with_bare(mechanism, points.swept, found)
+    found += _no_efficiency(points.swept, arrays) if mechanism.loads else ()
     found += _not_steady(points, watched.values(), arrays)
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     if not points.erring:
@@ -136,6 +137,24 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
             "sweep.no_answer", " and ".join(one.name for one in swept), points=len(where), of=status.size,
             at=say(swept, first), positions=count, status=code.text,
         )  # fmt: skip
+
+
+def _no_efficiency(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
+    """A note for every reason for which points with an answer have no efficiency."""
+    work, undefined = arrays["drive_power_mean"], (arrays["without_answer"] == 0) & np.isnan(arrays["efficiency"])
+    reasons = {
+        "the driver does no net work": work == 0,
+        "the loads drive, the driver absorbs work": work < 0,
+        "the mean powers are not known": np.isnan(work),
+    }
+    for why, so in reasons.items():
+        where = np.argwhere(undefined & so)
+        if len(where):
+            at = say(swept, tuple(int(i) for i in where[0]))
+            phrases = {"why": why}
+            yield finding_for(
+                "sweep.no_efficiency", "efficiency", points=len(where), of=work.size, at=at, phrases=phrases
+            )
 
 
 def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:

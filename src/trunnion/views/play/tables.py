@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import quantity
+from trunnion.results.quantities import joined, prefixed, quantity
 from trunnion.studies.play.result import relied_on
 from trunnion.studies.play.study import IDLE
 from trunnion.views.common.cycle import Abscissa, Array
@@ -73,7 +73,7 @@ def _table_there(result: xr.Dataset, name: str, unit: str, word: str, where: str
 
 def _size(effect: float, total: float, unit: str) -> str:
     """One effect; what is no more than rounding of them all is 0."""
-    return quantity(float(effect) if effect > IDLE * total else 0.0, unit)
+    return quantity(float(effect), unit) if effect > IDLE * total else joined("0", prefixed(float(total), unit)[1])
 
 
 def _relied_on(result: xr.Dataset, name: str) -> Array:

@@ -295,11 +295,11 @@ function joint(one, scene, frame) {
   return { joint: one, node, beside, label: svg("text", { class: "name" }, short(one.name)) };
 }
 
-/** Where a block begins and how long it is: as long as the guide holds it, if that is known. */
+/** Where a block begins and how long it is: as long as the guide holds it, if that is known, and then seen through. */
 function block(one, scene, frame) {
   const length = seatOf(scene.built, one.name)?.length;
   const width = length ? Math.max(length * frame.scale, 8) : 34;
-  return { x: (-width / 2).toFixed(1), width: width.toFixed(1) };
+  return { x: (-width / 2).toFixed(1), width: width.toFixed(1), ...(length && { class: "clear" }) };
 }
 
 /** The walls of a guide with play. */

@@ -89,8 +89,7 @@ def sweep(
     first = say(points.swept, (0,) * len(points.shape))
     found += (replace(one, what=f"at {first} {one.what}") for one in points.jumps)
     found = _with_bare(mechanism, points.swept, found)
-    found += _no_efficiency(points.swept, arrays) if mechanism.loads else ()
-    found += _not_steady(points, watched.values(), arrays)
+    found += [*_no_efficiency(points, arrays), *_not_steady(points, watched.values(), arrays)]
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     if not points.erring:
         of_errors = {name for name, one in FIGURES.items() if one.part == "errors"}
@@ -139,8 +138,8 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
         )  # fmt: skip
 
 
-def _no_efficiency(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """A note for every reason for which points with an answer have no efficiency."""
+def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
+    """A note for every reason for which points with an answer have no efficiency, if there are loads at all."""
     work, undefined = arrays["drive_power_mean"], (arrays["without_answer"] == 0) & np.isnan(arrays["efficiency"])
     reasons = {
         "the driver does no net work": work == 0,
@@ -149,9 +148,8 @@ def _no_efficiency(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -
     }
     for why, so in reasons.items():
         where = np.argwhere(undefined & so)
-        if len(where):
-            at = say(swept, tuple(int(i) for i in where[0]))
-            phrases = {"why": why}
+        if len(where) and points.mechanism.loads:
+            at, phrases = say(points.swept, tuple(int(i) for i in where[0])), {"why": why}
             yield finding_for(
                 "sweep.no_efficiency", "efficiency", points=len(where), of=work.size, at=at, phrases=phrases
             )

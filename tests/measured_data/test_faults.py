@@ -148,7 +148,9 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
         (one,) = faults(found, "3 readings") or faults(found, "3 overload codes such as 9.99e+37")
         assert "left out" in one.what
         assert not faults(found, "clipped")
-        assert found.conditions[0].courses["brake"].accuracy == sound
+        accuracy = found.conditions[0].courses["brake"].accuracy
+        assert (accuracy.resolution, accuracy.cut) == (sound.resolution, sound.cut)
+        assert accuracy.repeats == pytest.approx(sound.repeats, rel=0.01)
         assert float(np.nanmax(found.conditions[0].courses["brake"].turns)) < 25
     assert sound.resolution == pytest.approx(0.2)
 
@@ -197,8 +199,9 @@ def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
     for name in ("T1", "T2"):
         run[name] = np.rint(run[name] / 0.02) * 0.02
     run["n1"] = np.rint(run["n1"])
-    (one,) = read(run, tmp_path).findings
-    assert one.severity is Severity.NOTE
+    step, one = read(run, tmp_path).findings  # 500 samples a turn: the steps count too
+    assert step.code == "data.turns.same"
+    assert one.severity is step.severity is Severity.NOTE
     assert "reads 600 in every one" in one.what
 
 

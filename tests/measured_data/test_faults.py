@@ -150,7 +150,7 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
         assert not faults(found, "clipped")
         accuracy = found.conditions[0].courses["brake"].accuracy
         assert (accuracy.resolution, accuracy.cut) == (sound.resolution, sound.cut)
-        assert accuracy.repeats == pytest.approx(sound.repeats, rel=0.01)
+        assert accuracy.left.share == pytest.approx(sound.left.share, rel=0.01)
         assert float(np.nanmax(found.conditions[0].courses["brake"].turns)) < 25
     assert sound.resolution == pytest.approx(0.2)
 

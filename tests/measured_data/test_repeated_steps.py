@@ -12,7 +12,7 @@ from scipy.special import ndtr
 from measured_data.four_bar import rocker
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.rig.reading.read import read_measured
-from trunnion.rig.reading.repeated_steps import covariance_of_steps, left_of_steps, noise_before
+from trunnion.rig.reading.repeated_steps import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
 
 Array = NDArray[np.float64]
 
@@ -34,9 +34,9 @@ def rounded_mean(true: Array, noise: float) -> Array:
     return np.asarray(steps[0] + np.sum(ndtr((true[:, None] - steps - 0.5) / noise), axis=1))
 
 
-@pytest.mark.parametrize("samples", [250.0, 2000.0])  # a position: interpolated, and a mean of some
+@pytest.mark.parametrize(("samples", "every"), [(250.0, 1), (250.5, 2), (2000.0, 1)])  # interpolated, and means of some
 @pytest.mark.parametrize("noise", [0.05, 0.25])
-def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, noise: float) -> None:
+def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, every: int, noise: float) -> None:
     """About its steepest place the course gains one step from sample to sample, or an eighth, and the errors add up."""
     positions, random = 180, np.random.default_rng(2)
     turn = np.arange(positions) / positions
@@ -44,20 +44,19 @@ def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, noise
     columns = np.exp(-((turn - [[0.5], [0.25]]) ** 2) / 0.002)  # at the steepest place, and at the top
     found = []
     for _ in range(400):
-        place = (np.arange(-2, samples + 2) + random.uniform()) / samples
+        place = (np.arange(-2, samples * every + 2) + random.uniform()) / samples
         true = height * np.sin(2 * np.pi * place) + random.uniform()
         error = rounded_mean(true, noise) - true
         if samples < 4 * positions:
-            error = np.interp(turn, place, error)
+            error = np.mean([np.interp(turn + k, place, error) for k in range(every)], axis=0)
         else:
             at = np.rint(place * positions).astype(int) % positions
             error = np.bincount(at, error) / np.bincount(at)
         found.append(columns @ error)
-    share = float(np.sqrt(left_of_steps(noise)))
-    told = covariance_of_steps(columns, height * np.sin(2 * np.pi * turn), samples, share)
+    told = covariance_of_steps(columns, height * np.sin(2 * np.pi * turn), LeftOfSteps(1.0, noise, 12, samples, every))
     assert np.sqrt(np.diag(told)) == pytest.approx(np.std(found, axis=0), rel=0.12)
     if samples == 250:  # far more than independent errors would
-        assert told[0, 0] > 4 * np.sum(columns[0] ** 2) * share**2 / 12
+        assert told[0, 0] > 4 * np.sum(columns[0] ** 2) * left_of_steps(noise) / 12
 
 
 def recorded(folder: Path, rpm: float, noise: float, step: float = 0.1) -> Measurement:
@@ -87,7 +86,8 @@ def test_turns_that_are_sampled_at_the_same_places(tmp_path: Path, rpm: float, n
     (condition,) = found.conditions
     course = condition.courses["psi"]
     assert course.accuracy.resolution == pytest.approx(np.radians(0.1))
-    assert (course.accuracy.samples == pytest.approx(200)) if same else course.accuracy.samples == 0
+    assert course.accuracy.left is not None
+    assert course.accuracy.left.every == same
     off = course.mean - rocker(2 * np.pi * condition.phase)
     off -= np.mean(off)
     own = np.hypot(course.scatter / np.sqrt(course.count), course.unresolved)

@@ -209,11 +209,9 @@ def _steps(problem: FitProblem, x: Array, inverse: Array, blocks: Sequence[int])
         if block.fitted and block.unresolved:
             said, slopes = problem.said(x, k)
             columns = inverse @ (np.nan_to_num(slopes) * problem.weight(k))
-            accuracy = block.course.accuracy
-            if accuracy.samples and accuracy.repeats and block.course.unresolved:
-                step = accuracy.resolution
-                own = covariance_of_steps(columns, np.nan_to_num(said) / step, accuracy.samples, accuracy.repeats)
-                total += own * step**2
+            step, left = block.course.accuracy.resolution, block.course.accuracy.left
+            if left is not None and left.every and block.course.unresolved:
+                total += covariance_of_steps(columns, np.nan_to_num(said) / step, left) * step**2
             else:
                 total += columns @ columns.T * block.unresolved**2
     return total

@@ -32,7 +32,7 @@ from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
 from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
-from trunnion.rig.reading.repeated_steps import left_in_turns
+from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
@@ -159,7 +159,7 @@ class _File:
         self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.beyond: dict[str, faults.BeyondRange] = {}
-        self.steps: dict[str, tuple[float, float, float]] = {}  # SI, how much turns repeat, samples if they do
+        self.steps: dict[str, tuple[float, LeftOfSteps | None]] = {}  # SI, and what of it turns repeat
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
@@ -353,11 +353,7 @@ class _File:
         if mapping.filter is None:
             rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
             noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
-        self.steps[name] = (
-            abs(own.scale.factor) * step * (noise < step / 2),
-            1.0,
-            0.0,
-        )  # more noise carries it over them
+        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2), None  # more noise carries it over them
         if step and noise < step / 2:
             self._check_repeated(name, step, noise, parts, readings, max(scatters))
         if speed:  # one that creeps is the drive's
@@ -389,7 +385,7 @@ class _File:
         own = self.own[name]
         size, (unit, in_si) = abs(own.scale.factor) * step, shown(own)
         found = left_in_turns([(one.turns, one.courses[name] / size) for one in parts], readings / step, noise / step)
-        self.steps[name] = size, found.share, found.samples
+        self.steps[name] = size, found
         if told := found.told(scatter / step, size / in_si, unit):
             remedy = "sample at a rate that is no multiple of the turns"
             self.account.note("data.turns.same", f"channels.{name}", told, remedy)
@@ -409,14 +405,14 @@ class _File:
             extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
-            step, repeats, samples = self.steps[name]
+            step, repeats = self.steps[name]
             accuracy = Accuracy(zero, own.accuracy_gain, step, of_file)
             nothing = None
             if isinstance(channel.zero, Amount):
                 nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
             course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
-            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, repeats=repeats, samples=samples))
+            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=repeats))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         for path, channel_name in part.setting.means.items():

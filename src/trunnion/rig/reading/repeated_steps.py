@@ -26,6 +26,7 @@ SAME = 1e-3  # of a step: turns that scatter less read the same
 WORTH = 0.5  # of the scatter of a mean, from which what is left in it is told
 HARMONICS = 10  # of the wave, that are looked at
 PLACES = 8  # of the first sample of a turn, between two
+MOST_TURNS = 4  # after which sampling is looked for at the same places
 _K = np.arange(1.0, 200.0)
 _NOISE = np.linspace(0.0, 1.0, 1001)  # σ/q
 
@@ -34,14 +35,15 @@ _NOISE = np.linspace(0.0, 1.0, 1001)  # σ/q
 class LeftOfSteps:
     """What all turns repeat of the error by steps.
 
-    share: its standard deviation, of step/√12; noise: σ, in steps; turns: how many; samples: of a turn, 0 where the
-    turns are not sampled at the same places.
+    share: its standard deviation, of step/√12; noise: σ, in steps; turns: how many; samples: of a turn; every: turns
+    after which they are at the same places again, 0 if not soon.
     """
 
     share: float
     noise: float
     turns: int
     samples: float
+    every: int
 
     def told(self, scatter: float, step: float, unit: str) -> str:
         """A sentence where it counts beside the scatter of turns, in steps; else empty. step: as shown, in its unit."""
@@ -63,21 +65,21 @@ def left_in_turns(parts: Sequence[tuple[Turns, Array]], readings: Array, noise: 
     scatter of the readings from row to row, with the error by steps in it unless the course stays within one.
     """
     share = float(np.mean([in_step(*one) for one in parts]))
-    if share > ALIKE:
-        squares = np.concatenate([_turn_later(turns, readings) ** 2 for turns, _ in parts])
+    ways = (k for k in range(1, MOST_TURNS + 1) if np.mean([in_step(*one, k) for one in parts]) > ALIKE)
+    if every := next(ways, 0):
+        squares = np.concatenate([_turns_later(turns, readings, every) ** 2 for turns, _ in parts])
         noise = noise_before(float(np.sqrt(np.mean(squares) / 2))) if squares.size else 0.0
     else:
         noise = float(np.sqrt(max(noise**2 - 1 / 12, 0.0)))
     turn = [float(np.median(turns.end - turns.begin)) / turns.line.step for turns, _ in parts]
     found = float(np.sqrt(share * left_of_steps(noise)))
-    samples = float(np.mean(turn)) if share > ALIKE else 0.0
-    return LeftOfSteps(found, noise, max(one[0].numbers.size for one in parts), samples)
+    return LeftOfSteps(found, noise, max(one[0].numbers.size for one in parts), float(np.mean(turn)), every)
 
 
-def _turn_later(turns: Turns, readings: Array) -> Array:
-    """Differences between readings a turn apart."""
+def _turns_later(turns: Turns, readings: Array, every: int) -> Array:
+    """Differences between readings so many turns apart."""
     own = np.where(turns.rows, readings[turns.window], np.nan)
-    turn = round(float(np.median(turns.end - turns.begin)) / turns.line.step)
+    turn = round(every * float(np.median(turns.end - turns.begin)) / turns.line.step)
     apart = own[turn:] - own[:-turn]
     return np.asarray(apart[np.isfinite(apart)])
 
@@ -93,8 +95,10 @@ def noise_before(scatter: float) -> float:
     return float(np.interp(scatter, np.sqrt(_NOISE**2 + (1 - left_of_steps(_NOISE)) / 12), _NOISE))
 
 
-def in_step(turns: Turns, course: Array) -> float:
+def in_step(turns: Turns, course: Array, every: int = 1) -> float:
     """How far turns are sampled at the same places of a step, 0 to 1; course: (turn, position), in steps.
+
+    every: compared are only turns so many apart.
 
     At a position the samples next to it are off it by a part of a position, and along the slope of the course by a part
     of a step: |mean of exp(2πi part)|², less what chance makes of n turns.
@@ -108,41 +112,40 @@ def in_step(turns: Turns, course: Array) -> float:
     off = scaled - place
     order = np.lexsort((np.abs(off), place))
     nearest = order[np.diff(place[order], prepend=-np.inf) > 0]
-    at = place[nearest].astype(np.int64) % turns.positions
+    turn, at = np.divmod(place[nearest].astype(np.int64), turns.positions)
     angle = 2 * np.pi * slope[at] * off[nearest]
-    count = np.bincount(at, minlength=turns.positions)
+    at += turn % every * turns.positions
+    count = np.bincount(at, minlength=every * turns.positions)
     many = count > 1
     if not many.any():
-        return 1.0
-    parts = (np.bincount(at, one, turns.positions) for one in (np.cos(angle), np.sin(angle)))
+        return float(every == 1)
+    parts = (np.bincount(at, one, count.size) for one in (np.cos(angle), np.sin(angle)))
     alike = (sum(part[many] ** 2 for part in parts) / count[many] - 1) / (count[many] - 1)
     return float(np.clip(np.mean(alike), 0.0, 1.0))
 
 
-def covariance_of_steps(columns: Array, course: Array, samples: float, share: float) -> Array:
+def covariance_of_steps(columns: Array, course: Array, left: LeftOfSteps) -> Array:
     """Covariance of sums over positions of columns · error by steps, in units of the step.
 
-    columns: (sum, position); course: true, (position,), in steps; samples: of a turn, at the same places in all; share:
-    as of LeftOfSteps. Where the course gains about a whole number of steps from sample to sample, as it does
-    beside its steepest places, the errors of many samples are alike. The mean is taken over all places in a step, for
-    each harmonic of the wave by itself, and some of the first sample in a turn.
+    columns: (sum, position); course: true, (position,), in steps. Where the course gains about a whole number of steps
+    from sample to sample, as it may beside its steepest places, the errors of many samples are alike. The mean is taken
+    over all places in a step, for each harmonic of the wave by itself, and some of the first sample in a turn.
     """
-    size, count = course.size, max(round(samples), 1)
-    noise = float(np.interp(-(share**2), -left_of_steps(_NOISE), _NOISE))
-    powers = np.exp(-4 * (np.pi * noise * _K[:HARMONICS]) ** 2) / _K[:HARMONICS] ** 2
-    powers *= share**2 / 12 / np.sum(powers)
+    size, turns = course.size, left.every
+    count, grid = round(left.samples * turns), np.arange(course.size * turns)
+    powers = np.exp(-4 * (np.pi * left.noise * _K[:HARMONICS]) ** 2) / (_K[:HARMONICS] * np.pi) ** 2 / 2
     total = np.zeros((len(columns), len(columns)))
     for first in (np.arange(PLACES) + 0.5) / PLACES:
-        place = (np.arange(-1, count + 1) + first) / samples
-        at = np.interp(place * size, np.arange(size), course, period=size)
+        place = (np.arange(-2, count + 2) + first) / left.samples * size
+        at = np.interp(place, np.arange(size), course, period=size)
         for k, power in enumerate(powers, 1):
             wave = np.exp(2j * np.pi * k * at)
-            if count < DENSE * size:
-                error = np.interp(np.arange(size) / size, place, wave)
+            if left.samples < DENSE * size:
+                error = np.interp(grid, place, wave)
             else:
-                part = np.round(place * size).astype(np.int64) % size
-                error = np.bincount(part, wave.real, size) + 1j * np.bincount(part, wave.imag, size)
-                error = error / np.bincount(part, minlength=size)
-            moved = columns @ error
+                part = np.round(place).astype(np.int64) % grid.size
+                error = np.bincount(part, wave.real, grid.size) + 1j * np.bincount(part, wave.imag, grid.size)
+                error = error / np.bincount(part, minlength=grid.size)
+            moved = columns @ np.mean(error.reshape(turns, size), axis=0)
             total += power / PLACES * np.real(np.outer(moved, moved.conj()))
     return total

@@ -203,12 +203,19 @@ class _File:
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
             if not backwards(mapping.channels, [part.setting.values for part in parts], turning, account):
-                told = signs(mapping.channels, whole, turning, account)
+                told = signs(mapping.channels, whole, self._zeros_known(zeros), turning, account)
                 units = {name: shown(own) for name, own in self.own.items()}
                 speeds(mapping.channels, whole, units, turning, told, account)
         found = [self._condition(part, zeros, drifts, way) for part in parts]
         self._check_steps(found)
         return found
+
+    def _zeros_known(self, zeros: Mapping[str, Zeroed]) -> dict[str, float]:
+        """Standard uncertainty of the zero of each channel, SI."""
+        return {
+            name: float(np.hypot(own.accuracy_zero, own.scale.factor * zeros[name].uncertainty))
+            for name, own in self.own.items()
+        }
 
     def _check_steps(self, found: Sequence[Condition]) -> None:
         """Tell once of steps of the angle that are not stated and matter to a channel."""

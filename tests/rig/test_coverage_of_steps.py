@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 import trunnion
+from trunnion.errors import Severity
+from trunnion.rig.identification.identifiability import _named
 
 Array = NDArray[np.float64]
 TRUE = {"A": 0.08, "B": 0.14, "C": 0.11, "D": 0.06}
@@ -46,7 +49,7 @@ def torque(rpm: float) -> Array:
     return np.asarray(found["drive_effort"].values, float).ravel()
 
 
-def identified(folder: Path, seed: int, noise: float, rpm: float = 120.0) -> xr.Dataset:
+def identified(folder: Path, seed: int, noise: float, rpm: float = 120.0, positions: int = 360) -> xr.Dataset:
     """The frictions by 12 turns of a sensor with errors of its own, sampled at 1 kHz; noise: in steps."""
     random = np.random.default_rng(seed)
     time = np.arange(int(12.7 * 60 / rpm * 1000)) / 1000
@@ -62,6 +65,7 @@ def identified(folder: Path, seed: int, noise: float, rpm: float = 120.0) -> xr.
         "angle": {"from": "column", "column": "phi", "unit": "deg"},
         "channels": {"M": {"column": "M", "measures": "effort:A", "unit": "N m", "accuracy": accuracy}},
         "set": {"A.speed": f"{rpm} rpm"},
+        "positions": positions,
     }
     return trunnion.rig.identify(
         trunnion.Mechanism(**MODEL), trunnion.rig.read(mapping, [folder / "a.csv"]), COEFFICIENTS
@@ -85,6 +89,27 @@ def test_steps_that_repeat_are_a_source(tmp_path: Path) -> None:
     assert shares[118.3] < 0.2
     assert np.mean([held(one) for results in found.values() for one in results]) > 0.8
     assert 0.6 < np.mean([float(one["reduced_chi_squared"]) for one in found[120.0]]) < 1.2
+
+
+def test_fewer_positions_than_unknowns(tmp_path: Path) -> None:
+    found = identified(tmp_path, 1, 0.25, positions=8)
+    (one,) = (one for one in found.trunnion.findings if one.code == "fit.few_positions")
+    assert one.figures["positions"] < one.figures["unknowns"] == 4
+    assert f"for four unknowns ({8 - one.figures['positions']} more are left out)" in one.what
+    assert one.severity is Severity.ERROR
+    assert not [one for one in found.trunnion.findings if one.code == "parameter.not_told_apart"]
+
+
+def test_frictions_of_two_joints_add() -> None:
+    """Even where μ_A dB = μ_B dA, at which a product would not change either."""
+    unknowns = [SimpleNamespace(paths=[f"joints.{path}"]) for path in COEFFICIENTS[:2]]
+    problem: Any = SimpleNamespace(count=2, model=SimpleNamespace(unknowns=unknowns))
+    found = _named(problem, np.array([0.08, 0.14]), np.array([0, 1]), np.array([1.0, 0.08 / 0.14]), 0.01)
+    assert (found.form, found.value) == ("sum", pytest.approx(0.16))
+    unknowns[1].paths = ["joints.A.friction.pair_factor"]
+    assert (
+        _named(problem, np.array([0.08, 0.14]), np.array([0, 1]), np.array([1.0, 0.08 / 0.14]), 0.01).form == "product"
+    )
 
 
 @pytest.mark.slow

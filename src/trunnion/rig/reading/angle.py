@@ -187,8 +187,7 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
 def _check_zero(source: AngleSource, unit: str, factor: float, account: Account) -> None:
     """Tell of a zero that is a plain number, so rad, and may be meant in another unit, that of the readings."""
     size = float(source.zero.evaluate())
-    plain = source.zero.expression is None or source.zero.expression.bare
-    if factor != 1 and plain and abs(size) > PLAIN:
+    if factor != 1 and source.zero.expression is None and abs(size) > PLAIN:
         told = f"{size:g}"
         what = f"zero: {told} has no unit and is taken as rad, {np.degrees(size):.4g}°; the readings are in {unit}"
         account.warn("data.angle.zero_unit", "angle.zero", what, f"write {told} {unit} or {told} rad")

@@ -337,6 +337,39 @@ def test_a_zero_in_the_unit_of_the_quantity_has_the_sign_of_the_gain(clean: Colu
     assert first == pytest.approx(second, rel=1e-12)
 
 
+def by_column(clean: Columns, folder: Path, changes: dict[str, Any], heading: str = "angle") -> Any:
+    """Read with the angle of a column, deg."""
+    columns = {**{key: one for key, one in clean.items() if key != "angle"}, heading: np.degrees(clean["angle"])}
+    angle = {"from": "column", "column": "angle", **changes}
+    return read(columns, folder, {"angle": angle, "channels/torque-in/unit": "V"}).findings
+
+
+def test_an_angle_in_another_unit_than_the_file_says(clean: Columns, tmp_path: Path) -> None:
+    found = by_column(clean, tmp_path, {"unit": "rad"}, "angle [°]")
+    (one,) = (one for one in found if one.code == "data.unit.differs")
+    assert one.where == "angle"
+    assert "all values are 57.3 times those of the file" in one.what
+    assert not [one for one in by_column(clean, tmp_path, {"unit": "deg"}, "angle [°]") if "unit" in one.code]
+
+
+@pytest.mark.parametrize(("zero", "asked"), [(-3.7, True), ("-3.7 deg", False), (0.06, False), (0, False)])
+def test_a_plain_zero_of_an_angle_in_degrees(clean: Columns, tmp_path: Path, zero: Any, asked: bool) -> None:
+    found = [
+        one for one in by_column(clean, tmp_path, {"unit": "deg", "zero": zero}) if one.code == "data.angle.zero_unit"
+    ]
+    assert bool(found) is asked
+    for one in found:
+        assert "taken as rad, -212°; the readings are in deg" in one.what
+        assert one.remedy == "write -3.7 deg or -3.7 rad"
+
+
+@pytest.mark.parametrize(("zero", "told"), [("1 N m", True), ("15 N m", False)])
+def test_a_power_within_the_zero_tells_no_sign(clean: Columns, tmp_path: Path, zero: str, told: bool) -> None:
+    """The torque is −20 N m in the mean."""
+    changes = {"channels/torque-in/accuracy": {"zero": zero}, "channels/torque-in/sign": -1}
+    assert any(one.code == "data.power.sign" for one in read(clean, tmp_path, changes).findings) is told
+
+
 def test_levels_of_a_signal_are_no_steps_of_a_converter() -> None:
     time = np.arange(4000) / 4000
     assert resolution(np.where(np.sin(40 * time) > 0, 12.0, 6.0)) == 0

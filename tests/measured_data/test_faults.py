@@ -148,7 +148,9 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
         (one,) = faults(found, "3 readings") or faults(found, "3 overload codes such as 9.99e+37")
         assert "left out" in one.what
         assert not faults(found, "clipped")
-        assert found.conditions[0].courses["brake"].accuracy == sound
+        accuracy = found.conditions[0].courses["brake"].accuracy
+        assert (accuracy.resolution, accuracy.cut) == (sound.resolution, sound.cut)
+        assert accuracy.left.share == pytest.approx(sound.left.share, rel=0.01)
         assert float(np.nanmax(found.conditions[0].courses["brake"].turns)) < 25
     assert sound.resolution == pytest.approx(0.2)
 
@@ -171,6 +173,16 @@ def test_a_bad_reading_beside_the_turns_does_not_reach_into_them(
         found = read(spoilt, tmp_path, changes)
         assert off(found.conditions[0]) < best + (0.1 if rate > 1000 else 0.5), row - first
         assert faults(found, "left out"), row - first
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_drive_that_starts_beside_the_turns_has_no_spike(tmp_path: Path, rows: int) -> None:
+    """With a filter, the start reaches into the first turn; a reading or two lie on the way up."""
+    run = recorded()
+    start = int(np.argmax(run["t"] >= 0.2))
+    run["T1"][start : start + rows] = np.linspace(0, run["T1"][start + 5], rows + 2)[1:-1]
+    changes = {"filter": {"cut_off": "100 Hz", "order": 2}}
+    assert not faults(read(run, tmp_path, changes), "spikes")
 
 
 def test_a_spike_in_an_unloaded_stretch_does_not_move_the_zero(run: Columns, tmp_path: Path) -> None:
@@ -197,8 +209,9 @@ def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
     for name in ("T1", "T2"):
         run[name] = np.rint(run[name] / 0.02) * 0.02
     run["n1"] = np.rint(run["n1"])
-    (one,) = read(run, tmp_path).findings
-    assert one.severity is Severity.NOTE
+    step, one = read(run, tmp_path).findings  # 500 samples a turn: the steps count too
+    assert step.code == "data.turns.same"
+    assert one.severity is step.severity is Severity.NOTE
     assert "reads 600 in every one" in one.what
 
 

@@ -140,6 +140,16 @@ def test_an_offset_is_named_with_its_size():
     assert told.figures["corrected_percent"] > 90
 
 
+def test_what_an_offset_leaves_is_told():
+    """A wave of 0.3 beside it: RMS 0.3/√2 of scatter 0.01/√8."""
+    wave = 0.3 * np.sin(2 * np.pi * np.arange(36) / 36)
+    result = compare(measured(wrong=wrong_in("torque", lambda true: true + 3.0 + wave[: len(true)])))
+    (told,) = (one for one in result.trunnion.findings if one.code == "compare.not_within")
+    assert "a constant offset of +3" in told.what
+    assert "RMS 0.21" in told.what.partition(";")[2]
+    assert "times its standard uncertainty" in told.what
+
+
 @pytest.mark.parametrize(("size", "severity"), [(0.0, None), (0.01, "note"), (0.015, "warning")])
 def test_a_bias_beyond_its_uncertainty_is_said_of_a_course_that_is_within(size, severity):
     """The mean of 8 turns and 36 positions of noise 0.05 has U ≈ 0.006, each position six times it."""

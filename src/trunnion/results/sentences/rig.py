@@ -259,6 +259,11 @@ IDENTIFY = {
         "with the estimates, {count:#measured position} {count:#is/are} {why} in the model",
         "run `trunnion analyse` with the estimates, and check the settings of the conditions",
     ),
+    "fit.few_positions": Sentence(
+        ERROR,
+        "{positions:#position} with data for {unknowns}{out_told}: they cannot be told apart",
+        "state more positions: in the mapping, add channels, or identify fewer parameters",
+    ),
     "parameter.no_effect": Sentence(
         WARNING,
         "{name} is not identifiable: it has no effect on {channels}",

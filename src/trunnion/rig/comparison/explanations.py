@@ -12,6 +12,7 @@ from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, difference
 from trunnion.rig.comparison.error_sources import KINDS, NEAR, STATED, Cause, beyond_stated
+from trunnion.rig.comparison.uncertainty import at_positions, uncertainty_of
 from trunnion.rig.comparison.wording import extent, in_which, percent, said, turned
 from trunnion.rig.reading.arcs import concentration
 from trunnion.rig.reading.log import few_digits
@@ -27,6 +28,7 @@ Members = Sequence[tuple["Compared", "ChannelComparison"]]
 STANDS_OUT = 2.0  # times the median of the conditions
 MUCH = 0.5  # of a mean square, that an offset would explain, to be spoken of
 AGREE = np.radians(1.0)  # shifts that differ by less are one
+LENGTHS = "an offset alone does not do: check the dimensions of the model"
 FAR = 0.5  # of a gain: told as a factor from here on
 
 
@@ -66,9 +68,22 @@ def explained(name: str, measures: str, kind: str, members: Members, conditions:
         alike = {other.kind for _, pair in members for other in pair.others} - {kind}
         also = f"; {_others(alike, members)} would explain as much" if alike else ""
         beside = _offset_beside(members) if kind == "friction" and "zero" not in alike else ""
+        if kind == "zero":
+            beside = _left_over(name, members)
+            if _of_motion(name, members):
+                phrases["remedy"] = f"{LENGTHS}, then {phrases['remedy']}"
         phrases["explained"] = f"; {story} explains {percent(least)} of its mean square{also}{beside}"
         figures["explains"] = least
     return finding_for("compare.not_within", f"channels.{name}", severity=None, phrases=phrases, **figures)
+
+
+def _left_over(name: str, members: Members) -> str:
+    """What stays once an offset is taken off, which the scatter and the gain do not explain."""
+    pair = max((one for _, one in members), key=lambda one: one.judged.rms_unbiased)
+    (unit, size), of = _told_in(name, members), at_positions(uncertainty_of(pair.course), pair.comparable)
+    own = float(np.sqrt(np.nanmean(of.random**2 + of.local**2)))
+    times = f", {few_digits(pair.judged.rms_unbiased / own)} times its standard uncertainty" if own > 0 else ""
+    return f"; RMS {said(pair.judged.rms_unbiased / size, unit)} remains without it{times}"
 
 
 def _most(members: Members) -> str:

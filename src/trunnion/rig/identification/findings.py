@@ -282,6 +282,17 @@ def _speeds(judged: Assessment) -> Iterator[Finding]:
 
 
 def _groups(judged: Assessment) -> Iterator[Finding]:
+    problem = judged.problem
+    used = sum(
+        int(np.count_nonzero(mask)) for mask, one in zip(problem.masks, problem.blocks, strict=True) if one.fitted
+    )
+    many = problem.count + sum(not one.stated for one in problem.sensors)
+    courses = any(one.fitted and one.turns.shape[1] > 1 for one in problem.blocks)  # not one figure of each turn
+    if courses and used < many:
+        out = sum(one.out for one in judged.misses)
+        phrases = {"unknowns": _count(many, "unknown"), "out_told": f" ({out} more are left out)" if out else ""}
+        yield finding_for("fit.few_positions", "data", phrases=phrases, positions=used, unknowns=many)
+        return
     for group in judged.found.groups:
         names = [_name(judged, i) for i in group.members]
         channels = _joined(list(dict.fromkeys(block.channel for block in judged.problem.blocks if block.fitted)))
@@ -421,6 +432,8 @@ def _sensors(judged: Assessment) -> Iterator[Finding]:
                 remedy = "calibrate that sensor better"
                 if source.startswith(OWN):
                     remedy = "record a longer unloaded stretch in each file, or more files"
+                elif source.startswith("angle "):
+                    remedy = "use an encoder with finer steps"
                 phrases = {"share_told": share(part), "remedy": remedy}
                 yield finding_for(
                     "parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source

@@ -157,13 +157,15 @@ def _marginal(information: Array, index: Array) -> Array:
 
 
 def _named(problem: FitProblem, x: Array, index: Array, factors: Array, half: float) -> Combination:
-    """A combination of two as a product or a ratio where it is one: p q moves by q dp + p dq."""
+    """A combination of two as a product or a ratio where it is one: p q moves by q dp + p dq.
+
+    Two of one kind, such as the frictions of two joints, add.
+    """
     values = x[index]
     if len(index) == 2 and max(index) < problem.count and np.all(values != 0):
         units = {problem.model.unknowns[i].paths[0].rpartition(".")[2] for i in index}
         relative = float(factors[1] * values[1] / values[0])
-        alike = len(units) == 1 and abs(abs(factors[1]) - 1) < SAME
-        if not alike and abs(abs(relative) - 1) < SAME:
+        if len(units) > 1 and abs(abs(relative) - 1) < SAME:
             form = "product" if relative > 0 else "ratio"
             value = float(values[0] * values[1]) if relative > 0 else float(values[0] / values[1])
             return Combination(form, (1.0, 1.0 if relative > 0 else -1.0), value, half * abs(value / values[0]))

@@ -16,6 +16,7 @@ from scipy import special
 
 from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.reading.repeated_steps import covariance_of_steps
 
 __all__ = [
     "CONFIDENCE",
@@ -206,8 +207,13 @@ def _steps(problem: FitProblem, x: Array, inverse: Array, blocks: Sequence[int])
     for k in blocks:
         block = problem.blocks[k]
         if block.fitted and block.unresolved:
-            columns = inverse @ (np.nan_to_num(problem.said(x, k)[1]) * problem.weight(k)) * block.unresolved
-            total += columns @ columns.T
+            said, slopes = problem.said(x, k)
+            columns = inverse @ (np.nan_to_num(slopes) * problem.weight(k))
+            step, left = block.course.accuracy.resolution, block.course.accuracy.left
+            if left is not None and left.every and block.course.unresolved:
+                total += covariance_of_steps(columns, np.nan_to_num(said) / step, left) * step**2
+            else:
+                total += columns @ columns.T * block.unresolved**2
     return total
 
 

@@ -17,6 +17,7 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.angle_steps import stated_as, unstated_step
+from trunnion.rig.reading.channels import compare_units
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.local_polynomials import by_local_polynomials
 from trunnion.rig.reading.log import Account, counted, times
@@ -34,6 +35,7 @@ SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which it is tried, th
 ORDER = 3
 LOOKED_AT = 50_000  # readings of which steps are told
 COARSE = 0.3  # of what an angle gains in a sample: steps from which they are told
+PLAIN = 0.5  # rad, from which a zero without a unit is asked about
 FEWEST = 5  # pulses in a span
 BOUND = 1.1  # of what a pulse may be off: more tells that the shaft itself runs unevenly
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
@@ -158,6 +160,9 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
     if not alike(found, dimensions("rad")[1]):
         what = f"the column '{source.column}' has the unit '{unit}', which is no angle"
         raise MechanismError(Finding(what, "angle", "name another column", file=account.file))
+    if source.unit:
+        compare_units("angle", str(source.column), source.unit, column, account)
+    _check_zero(source, unit, factor, account)
     values = _without_jumps(source, line.rows(column.values) * factor, line, account)
     finite = np.flatnonzero(np.isfinite(values))
     if finite.size < values.size:
@@ -177,6 +182,15 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
         account.warn("data.angle.few_samples", "angle", what, "sample at least 8 times a turn")
     values[finite] = told
     return values
+
+
+def _check_zero(source: AngleSource, unit: str, factor: float, account: Account) -> None:
+    """Tell of a zero that is a plain number, so rad, and may be meant in another unit, that of the readings."""
+    size = float(source.zero.evaluate())
+    if factor != 1 and source.zero.expression is None and abs(size) > PLAIN:
+        told = f"{size:g}"
+        what = f"zero: {told} has no unit and is taken as rad, {np.degrees(size):.4g}°; the readings are in {unit}"
+        account.warn("data.angle.zero_unit", "angle.zero", what, f"write {told} {unit} or {told} rad")
 
 
 def _without_jumps(source: AngleSource, values: Array, line: Timeline, account: Account) -> Array:

@@ -13,7 +13,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.units import UnitError
 from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.faults import outliers
-from trunnion.rig.reading.log import Account, counted, runs, times
+from trunnion.rig.reading.log import Account, counted, few_digits, runs, times
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
 from trunnion.rig.reading.scale import SensorScale, default_unit, scale
 from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
@@ -22,6 +22,7 @@ from trunnion.rig.reading.timebase import Timeline
 __all__ = [
     "ChannelReading",
     "Zeroed",
+    "compare_units",
     "filtered",
     "mean_uncertainty",
     "noise_of",
@@ -77,8 +78,8 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Ch
     """The unit of a channel's readings: the mapping's, else the file's, else that of what it measures in SI."""
     where = f"channels.{name}"
     unit = channel.unit or ""
-    if channel.unit and column.unit:
-        _compare(where, channel, column, account)
+    if channel.unit:
+        compare_units(where, channel.column, channel.unit, column, account)
     if not channel.unit and column.unit:
         unit = column.unit
         account.say(f"unit of {name} from the file: {unit}")
@@ -106,19 +107,20 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Ch
         raise MechanismError(Finding(error.what, where, remedy, file=account.file)) from None
 
 
-def _compare(where: str, channel: Channel, column: Column, account: Account) -> None:
-    """Tell where the file states another unit than the mapping."""
-    assert channel.unit is not None
-    stated = dimensions(channel.unit)
+def compare_units(where: str, name: str, unit: str, column: Column, account: Account) -> None:
+    """Tell where the file states another unit of a column than the mapping."""
+    stated = dimensions(unit)
     try:
-        own = dimensions(column.unit)
+        own = dimensions(column.unit) if column.unit else stated
     except UnitError:
         return
     if own[1] == HERTZ and stated[1] == dimensions("rad/s")[1] and np.isclose(stated[0] / own[0], (1, 2 * np.pi)).any():
         return  # 1/min where the mapping says rpm, as it has to
     if not alike(own[1], stated[1]) or own[0] != stated[0]:
-        what = f"the file has the unit '{column.unit}' for '{channel.column}', the mapping '{channel.unit}'"
-        account.warn("data.unit.differs", where, f"{what}, which is taken", f"correct {where}.unit, or remove it")
+        what = f"the file has the unit '{column.unit}' for '{name}', the mapping '{unit}', which is taken"
+        if alike(own[1], stated[1]):
+            what = f"{what}: all values are {few_digits(stated[0] / own[0], 3)} times those of the file"
+        account.warn("data.unit.differs", where, what, f"correct {where}.unit, or remove it")
 
 
 def shown(own: ChannelReading) -> tuple[str, float]:

@@ -22,6 +22,7 @@ from trunnion.errors import Finding
 from trunnion.model.units import Dimension
 from trunnion.results.attributes import encoded, finding_rows
 from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.rig.reading.repeated_steps import LeftOfSteps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +50,8 @@ class Accuracy:
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
     of `zero` is the same in all files. stated: of a value of one start, by itself. cut: of what all readings are off by
-    alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`.
+    alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`. left:
+    what of the error by the resolution all turns repeat, so that averaging leaves it; None for all of step/√12.
     """
 
     zero: float = 0.0
@@ -58,6 +60,7 @@ class Accuracy:
     own: float = 0.0
     stated: float = 0.0
     cut: float = 0.0
+    left: LeftOfSteps | None = None
 
 
 @dataclass(frozen=True)
@@ -103,15 +106,16 @@ class Signal:
 
     @cached_property
     def unresolved(self) -> float:
-        """Standard uncertainty by the resolution, step/√12 (GUM F.2.2.1), where readings scatter by less than half a
-        step; more than that carries them over the steps, and their mean is finer. Of a value what is stated of it."""
+        """Standard uncertainty by the resolution, what turns repeat of step/√12 (GUM F.2.2.1), where they scatter by
+        less than half a step; more carries them over the steps, and their mean is finer. Of a value what is stated."""
         step = self.accuracy.resolution
         if not step:
             return self.accuracy.stated
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             scatter = float(np.nanmedian(self.scatter))
-        return 0.0 if scatter > step / 2 else step / 12**0.5
+        share = self.accuracy.left.share if self.accuracy.left is not None else 1.0
+        return 0.0 if scatter > step / 2 else share * step / 12**0.5
 
     @cached_property
     def uncertainty(self) -> Array:

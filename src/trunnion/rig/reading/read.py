@@ -28,10 +28,11 @@ from trunnion.rig.reading.channels import (
 )
 from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
-from trunnion.rig.reading.log import Account, counted, few_digits, told
+from trunnion.rig.reading.log import Account, counted, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
 from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
+from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
@@ -46,7 +47,6 @@ __all__ = ["read_measured"]
 Array = NDArray[np.float64]
 FEW_HARMONICS = 5.0
 SPARSE = 0.25  # samples a position, below which nearly all values are interpolated
-SAME = 1e-3  # of a step: turns that scatter less read the same
 PASSED = 1.25  # times what a cubic between samples leaves of white noise, at the least
 PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
 UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
@@ -159,7 +159,7 @@ class _File:
         self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.beyond: dict[str, faults.BeyondRange] = {}
-        self.steps: dict[str, float] = {}
+        self.steps: dict[str, tuple[float, LeftOfSteps | None]] = {}  # SI, and what of it turns repeat
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
@@ -203,12 +203,19 @@ class _File:
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
             if not backwards(mapping.channels, [part.setting.values for part in parts], turning, account):
-                told = signs(mapping.channels, whole, turning, account)
+                told = signs(mapping.channels, whole, self._zeros_known(zeros), turning, account)
                 units = {name: shown(own) for name, own in self.own.items()}
                 speeds(mapping.channels, whole, units, turning, told, account)
         found = [self._condition(part, zeros, drifts, way) for part in parts]
         self._check_steps(found)
         return found
+
+    def _zeros_known(self, zeros: Mapping[str, Zeroed]) -> dict[str, float]:
+        """Standard uncertainty of the zero of each channel, SI."""
+        return {
+            name: float(np.hypot(own.accuracy_zero, own.scale.factor * zeros[name].uncertainty))
+            for name, own in self.own.items()
+        }
 
     def _check_steps(self, found: Sequence[Condition]) -> None:
         """Tell once of steps of the angle that are not stated and matter to a channel."""
@@ -353,14 +360,9 @@ class _File:
         if mapping.filter is None:
             rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
             noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
-        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over the steps
-        if step and max(scatters) < SAME * step:
-            unit, size = shown(own)
-            told = f"{few_digits(abs(own.scale.factor) * step / size)} {unit}".replace(" °", "°")
-            what = (
-                f"reads the same in every turn, in steps of {told}: its uncertainty is that of the step, not of scatter"
-            )
-            account.note("data.turns.same", where, what, "sample at a rate that is no multiple of the turns")
+        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2), None  # more noise carries it over them
+        if step and noise < step / 2:
+            self._check_repeated(name, step, noise, parts, readings, max(scatters))
         if speed:  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
@@ -383,6 +385,18 @@ class _File:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
         return found
 
+    def _check_repeated(
+        self, name: str, step: float, noise: float, parts: Sequence[_Part], readings: Array, scatter: float
+    ) -> None:
+        """How much of the error by steps, in readings, all turns repeat; it is told where it counts beside scatter."""
+        own = self.own[name]
+        size, (unit, in_si) = abs(own.scale.factor) * step, shown(own)
+        found = left_in_turns([(one.turns, one.courses[name] / size) for one in parts], readings / step, noise / step)
+        self.steps[name] = size, found
+        if told := found.told(scatter / step, size / in_si, unit):
+            remedy = "sample at a rate that is no multiple of the turns"
+            self.account.note("data.turns.same", f"channels.{name}", told, remedy)
+
     def _rate(self, turns: Sequence[Turns]) -> float:
         cycle = float(self.mapping.cycle.evaluate())
         return cycle / float(np.mean(np.concatenate([one.end - one.begin for one in turns])))
@@ -398,13 +412,14 @@ class _File:
             extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
-            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
+            step, repeats = self.steps[name]
+            accuracy = Accuracy(zero, own.accuracy_gain, step, of_file)
             nothing = None
             if isinstance(channel.zero, Amount):
                 nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
             course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
-            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut))
+            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=repeats))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         for path, channel_name in part.setting.means.items():

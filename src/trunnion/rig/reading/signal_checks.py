@@ -91,11 +91,16 @@ def steady(turns: Turns, step: float, where: str, account: Account) -> None:
 
 
 def signs(
-    channels: Mapping[str, Channel], courses: Mapping[str, Array], turning: float | None, account: Account
+    channels: Mapping[str, Channel],
+    courses: Mapping[str, Array],
+    zeros: Mapping[str, float],
+    turning: float | None,
+    account: Account,
 ) -> list[str]:
     """Channels that are likely to have the wrong sign: power in, or power out, below zero in all turns of a file.
 
-    courses: turns of all conditions; turning: mean speed of the driver by its angle, rad/s with its sign.
+    courses: turns of all conditions; zeros: standard uncertainty of the zero of each channel, SI, within which the mean
+    of a power tells no sign; turning: mean speed of the driver by its angle, rad/s with its sign.
     """
     rates = {one.measures.partition(":")[2]: key for key, one in channels.items() if one.measures.startswith("rate:")}
     drivers = {
@@ -109,7 +114,7 @@ def signs(
         against = courses[rate] if rate else np.full_like(courses[effort], turning or 0.0)
         power = turn_means(courses[effort] * against)
         power = power[np.isfinite(power)]
-        if _against(power):
+        if _against(power, zeros[effort] * against):
             opposed = (
                 rate and turning is not None and float(np.nanmean(courses[rate])) * turning < 0 and len(drivers) == 1
             )
@@ -135,7 +140,7 @@ def signs(
             continue
         power = turn_means(courses[key] * courses[rate])
         power = power[np.isfinite(power)]
-        if _against(power):
+        if _against(power, zeros[key] * courses[rate]):
             what = f"sign: the power delivered to {load} is negative in {_of(power)}"
             what = f"{what} ({power.mean():.4g} W) while the drive delivers power"
             remedy = f"write sign: {-channels[key].sign} (or turn that of {rate})"
@@ -210,8 +215,9 @@ def speeds(
     )
 
 
-def _against(power: Array) -> bool:
-    return bool(power.size and np.mean(power < 0) > MOST)
+def _against(power: Array, by_zero: Array) -> bool:
+    """Whether a power is below zero in most turns, by more than an error of the zero may make it."""
+    return bool(power.size and np.mean(power < 0) > MOST and abs(np.mean(power)) > 2 * abs(np.nanmean(by_zero)))
 
 
 def _of(power: Array) -> str:

@@ -1,0 +1,151 @@
+"""Which part of the error by steps between readings is the same in every turn, so that averaging over turns leaves it.
+
+Of readings rounded to steps q, with normal noise σ before, the mean is off by a wave over the steps: its harmonic k has
+the amplitude q/(πk) exp(−2π²k²σ²/q²) (B. Widrow, I. Kollár, Quantization Noise, 2008, doi:10.1017/CBO9780511754661).
+Over all places in a step its mean square is q²/(2π²) Σ exp(−4π²k²σ²/q²)/k², which is q²/12 without noise; the rest of
+σ² + q²/12 scatters. The wave repeats where each turn is sampled at the same places of a step.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.rig.reading.log import few_digits
+from trunnion.rig.reading.turns import DENSE, Turns
+
+__all__ = ["LeftOfSteps", "covariance_of_steps", "in_step", "left_in_turns", "left_of_steps", "noise_before"]
+
+Array = NDArray[np.float64]
+ALIKE = 0.9  # of 1, from which what a reading differs by from that a turn later is noise
+SAME = 1e-3  # of a step: turns that scatter less read the same
+WORTH = 0.5  # of the scatter of a mean, from which what is left in it is told
+HARMONICS = 10  # of the wave, that are looked at
+PLACES = 8  # of the first sample of a turn, between two
+MOST_TURNS = 4  # after which sampling is looked for at the same places
+_K = np.arange(1.0, 200.0)
+_NOISE = np.linspace(0.0, 1.0, 1001)  # σ/q
+
+
+@dataclass(frozen=True)
+class LeftOfSteps:
+    """What all turns repeat of the error by steps.
+
+    share: its standard deviation, of step/√12; noise: σ, in steps; turns: how many; samples: of a turn; every: turns
+    after which they are at the same places again, 0 if not soon.
+    """
+
+    share: float
+    noise: float
+    turns: int
+    samples: float
+    every: int
+
+    def told(self, scatter: float, step: float, unit: str) -> str:
+        """A sentence where it counts beside the scatter of turns, in steps; else empty. step: as shown, in its unit."""
+        if self.turns < 2 or self.share / 12**0.5 < WORTH * scatter / self.turns**0.5:
+            return ""
+        sizes = (1.0, self.noise, self.share / 12**0.5)
+        wide, noise, left = (f"{few_digits(size * step)} {unit}".replace(" °", "°") for size in sizes)
+        if scatter < SAME:
+            same = f"reads the same in every turn, in steps of {wide}"
+            return f"{same}: its uncertainty is that of the step, not of scatter"
+        what = f"every turn repeats errors by the steps of {wide}, which the noise of {noise} does not even out"
+        return f"{what}: averaging over turns leaves ± {left} of each reading"
+
+
+def left_in_turns(parts: Sequence[tuple[Turns, Array]], readings: Array, noise: float) -> LeftOfSteps:
+    """How much of the error by steps is the same in all turns.
+
+    parts: turns with the course of each, (turn, position), and readings, one a row of the file, all in steps; noise:
+    scatter of the readings from row to row, with the error by steps in it unless the course stays within one.
+    """
+    share = float(np.mean([in_step(*one) for one in parts]))
+    ways = (k for k in range(1, MOST_TURNS + 1) if np.mean([in_step(*one, k) for one in parts]) > ALIKE)
+    if every := next(ways, 0):
+        squares = np.concatenate([_turns_later(turns, readings, every) ** 2 for turns, _ in parts])
+        noise = noise_before(float(np.sqrt(np.mean(squares) / 2))) if squares.size else 0.0
+    else:
+        noise = float(np.sqrt(max(noise**2 - 1 / 12, 0.0)))
+    turn = [float(np.median(turns.end - turns.begin)) / turns.line.step for turns, _ in parts]
+    found = float(np.sqrt(share * left_of_steps(noise)))
+    return LeftOfSteps(found, noise, max(one[0].numbers.size for one in parts), float(np.mean(turn)), every)
+
+
+def _turns_later(turns: Turns, readings: Array, every: int) -> Array:
+    """Differences between readings so many turns apart."""
+    own = np.where(turns.rows, readings[turns.window], np.nan)
+    turn = round(every * float(np.median(turns.end - turns.begin)) / turns.line.step)
+    apart = own[turn:] - own[:-turn]
+    return np.asarray(apart[np.isfinite(apart)])
+
+
+def left_of_steps(noise: Array | float) -> Array:
+    """Mean square of the wave, of q²/12, for noise in steps: 1 without, 0 of half a step and more."""
+    waves = np.exp(-4 * (np.pi * np.asarray(noise)[..., None] * _K) ** 2) / _K**2
+    return np.asarray(np.sum(waves, axis=-1) / np.sum(1 / _K**2))
+
+
+def noise_before(scatter: float) -> float:
+    """σ/q of readings that scatter so much, in steps, where they repeat: scatter² = σ² + (1 − left)/12."""
+    return float(np.interp(scatter, np.sqrt(_NOISE**2 + (1 - left_of_steps(_NOISE)) / 12), _NOISE))
+
+
+def in_step(turns: Turns, course: Array, every: int = 1) -> float:
+    """How far turns are sampled at the same places of a step, 0 to 1; course: (turn, position), in steps.
+
+    every: compared are only turns so many apart.
+
+    At a position the samples next to it are off it by a part of a position, and along the slope of the course by a part
+    of a step: |mean of exp(2πi part)|², less what chance makes of n turns.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of positions without a value
+        mean = np.nan_to_num(np.nanmean(course, axis=0))
+    slope = 0.5 * (np.roll(mean, -1) - np.roll(mean, 1))
+    scaled = turns.share[turns.rows] * turns.positions
+    place = np.floor(scaled + 0.5)
+    off = scaled - place
+    order = np.lexsort((np.abs(off), place))
+    nearest = order[np.diff(place[order], prepend=-np.inf) > 0]
+    turn, at = np.divmod(place[nearest].astype(np.int64), turns.positions)
+    angle = 2 * np.pi * slope[at] * off[nearest]
+    at += turn % every * turns.positions
+    count = np.bincount(at, minlength=every * turns.positions)
+    many = count > 1
+    if not many.any():
+        return float(every == 1)
+    parts = (np.bincount(at, one, count.size) for one in (np.cos(angle), np.sin(angle)))
+    alike = (sum(part[many] ** 2 for part in parts) / count[many] - 1) / (count[many] - 1)
+    return float(np.clip(np.mean(alike), 0.0, 1.0))
+
+
+def covariance_of_steps(columns: Array, course: Array, left: LeftOfSteps) -> Array:
+    """Covariance of sums over positions of columns · error by steps, in units of the step.
+
+    columns: (sum, position); course: true, (position,), in steps. Where the course gains about a whole number of steps
+    from sample to sample, as it may beside its steepest places, the errors of many samples are alike. The mean is taken
+    over all places in a step, for each harmonic of the wave by itself, and some of the first sample in a turn.
+    """
+    size, turns = course.size, left.every
+    count, grid = round(left.samples * turns), np.arange(course.size * turns)
+    powers = np.exp(-4 * (np.pi * left.noise * _K[:HARMONICS]) ** 2) / (_K[:HARMONICS] * np.pi) ** 2 / 2
+    total = np.zeros((len(columns), len(columns)))
+    for first in (np.arange(PLACES) + 0.5) / PLACES:
+        place = (np.arange(-2, count + 2) + first) / left.samples * size
+        at = np.interp(place, np.arange(size), course, period=size)
+        for k, power in enumerate(powers, 1):
+            wave = np.exp(2j * np.pi * k * at)
+            if left.samples < DENSE * size:
+                error = np.interp(grid, place, wave)
+            else:
+                part = np.round(place).astype(np.int64) % grid.size
+                error = np.bincount(part, wave.real, grid.size) + 1j * np.bincount(part, wave.imag, grid.size)
+                error = error / np.bincount(part, minlength=grid.size)
+            moved = columns @ np.mean(error.reshape(turns, size), axis=0)
+            total += power / PLACES * np.real(np.outer(moved, moved.conj()))
+    return total

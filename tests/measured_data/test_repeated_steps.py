@@ -1,0 +1,98 @@
+"""The error by steps that all turns repeat, against readings that are rounded one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from measured_data.four_bar import rocker
+from trunnion.rig.reading.measurement import Measurement
+from trunnion.rig.reading.read import read_measured
+from trunnion.rig.reading.repeated_steps import LeftOfSteps, covariance_of_steps, left_of_steps, noise_before
+
+Array = NDArray[np.float64]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1, 0.25, 0.4])
+def test_what_rounding_leaves_of_a_mean(noise: float) -> None:
+    random = np.random.default_rng(1)
+    true = random.uniform(0, 1, 20_000)
+    off = np.rint(true + noise * random.normal(size=(100, true.size))) - true
+    within = float(np.mean(np.var(off, axis=0, ddof=1)))
+    left = float(np.mean(np.mean(off, axis=0) ** 2)) - within / len(off)
+    assert 12 * left == pytest.approx(float(left_of_steps(noise)), rel=0.03, abs=1e-3)
+    assert noise_before(within**0.5) == pytest.approx(noise, rel=0.03, abs=1e-3)
+
+
+def rounded_mean(true: Array, noise: float) -> Array:
+    """Mean of true + noise, rounded to whole numbers: by the chances of each."""
+    steps = np.arange(np.floor(true.min()) - 3, np.ceil(true.max()) + 3)
+    return np.asarray(steps[0] + np.sum(ndtr((true[:, None] - steps - 0.5) / noise), axis=1))
+
+
+@pytest.mark.parametrize(("samples", "every"), [(250.0, 1), (250.5, 2), (2000.0, 1)])  # interpolated, and means of some
+@pytest.mark.parametrize("noise", [0.05, 0.25])
+def test_errors_of_samples_that_gain_whole_steps_are_alike(samples: float, every: int, noise: float) -> None:
+    """About its steepest place the course gains one step from sample to sample, or an eighth, and the errors add up."""
+    positions, random = 180, np.random.default_rng(2)
+    turn = np.arange(positions) / positions
+    height = 250 / (2 * np.pi)
+    columns = np.exp(-((turn - [[0.5], [0.25]]) ** 2) / 0.002)  # at the steepest place, and at the top
+    found = []
+    for _ in range(400):
+        place = (np.arange(-2, samples * every + 2) + random.uniform()) / samples
+        true = height * np.sin(2 * np.pi * place) + random.uniform()
+        error = rounded_mean(true, noise) - true
+        if samples < 4 * positions:
+            error = np.mean([np.interp(turn + k, place, error) for k in range(every)], axis=0)
+        else:
+            at = np.rint(place * positions).astype(int) % positions
+            error = np.bincount(at, error) / np.bincount(at)
+        found.append(columns @ error)
+    told = covariance_of_steps(columns, height * np.sin(2 * np.pi * turn), LeftOfSteps(1.0, noise, 12, samples, every))
+    assert np.sqrt(np.diag(told)) == pytest.approx(np.std(found, axis=0), rel=0.12)
+    if samples == 250:  # far more than independent errors would
+        assert told[0, 0] > 4 * np.sum(columns[0] ** 2) * left_of_steps(noise) / 12
+
+
+def recorded(folder: Path, rpm: float, noise: float, step: float = 0.1) -> Measurement:
+    """A rocker that is read in steps, at 200 Hz; at 60 rpm all turns are sampled at the same places."""
+    random = np.random.default_rng(3)
+    time = np.arange(int(14 * 60 / rpm * 200)) / 200
+    angle = rpm * np.pi / 30 * time + 1
+    told = step * np.rint((np.degrees(rocker(angle)) + noise * step * random.normal(size=time.size)) / step)
+    rows = zip(time, np.degrees(angle) % 360, told, strict=True)
+    (folder / "a.csv").write_text("\n".join(["t;phi;psi", *(f"{t:.4f};{a:.4f};{x:.3f}" for t, a, x in rows)]))
+    return read_measured(
+        {
+            "trunnion-data": 1,
+            "time": {"column": "t", "unit": "s"},
+            "angle": {"from": "column", "column": "phi", "unit": "deg"},
+            "channels": {"psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"}},
+            "positions": 180,
+        },
+        [folder / "a.csv"],
+    )
+
+
+@pytest.mark.parametrize(("rpm", "noise", "same"), [(60, 0.2, True), (60, 0.0, True), (59.1, 0.2, False)])
+def test_turns_that_are_sampled_at_the_same_places(tmp_path: Path, rpm: float, noise: float, same: bool) -> None:
+    """What is said to be uncertain in the mean of a position is what it is off by, whatever repeats of it."""
+    found = recorded(tmp_path, rpm, noise)
+    (condition,) = found.conditions
+    course = condition.courses["psi"]
+    assert course.accuracy.resolution == pytest.approx(np.radians(0.1))
+    assert course.accuracy.left is not None
+    assert course.accuracy.left.every == same
+    off = course.mean - rocker(2 * np.pi * condition.phase)
+    off -= np.mean(off)
+    own = np.hypot(course.scatter / np.sqrt(course.count), course.unresolved)
+    assert np.std(off) == pytest.approx(float(np.sqrt(np.mean(own**2))), rel=0.25)
+    told = [one.what for one in found.findings if one.code == "data.turns.same"]
+    assert bool(told) is same
+    if same:
+        assert told[0].startswith("every turn repeats errors by the steps of 0.1 deg" if noise else "reads the same")

@@ -370,3 +370,18 @@ def test_files(what):
     if what == "csv":
         assert found["bytes"].count(b"\n") == 37
         assert b",A.effort [N m]," in found["bytes"].split(b"\n")[0]
+
+
+def test_friction_that_is_not_whole_leaves_the_motion():
+    text = EXAMPLES[FOURBAR].replace("coefficient: 0.4", "coefficient: banana 0.4")
+    assert text != EXAMPLES[FOURBAR]
+    found = ask(ask="model", text=text)
+    assert found["solved"]
+    assert found["bare"]
+    assert "banana" in found["findings"][0]["what"]
+    plain = trunnion.analyse(Mechanism(**entries_of(EXAMPLES[FOURBAR])[0]).with_friction("off"), 360)
+    np.testing.assert_allclose(found["scene"]["drivers"][0]["effort"], plain["drive_effort"].values[0], rtol=6e-7)
+    assert "banana" in ask(ask="export", text=text, what="csv")["error"]
+    worse = ask(ask="model", text=text.replace("BC: 6.00 m", "BC: 6.00 kg"))
+    assert not worse["solved"]
+    assert not worse["bare"]

@@ -210,7 +210,7 @@ def test_a_half_drawn_linkage_is_no_error():
     still, _ = edited("", {}, *arms)
     found = ask(ask="model", text=still)
     assert found["missing"] == ["It stands still: its joints let no link move. Take one away, or let an end slide."]
-    assert [(one["what"], one["ok"]) for one in found["ready"]][0] == ("motion", False)
+    assert (found["ready"][0]["what"], found["ready"][0]["ok"]) == ("motion", False)
     assert "stands still" in found["ready"][0]["why"]
     wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
     assert ask(ask="model", text=wrong)["missing"] == []

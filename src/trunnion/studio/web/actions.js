@@ -79,8 +79,7 @@ async function answered() {
   if (found.error) return state.say(found.error, true);
   state.answer.value = { ...found, text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
-  const count = found.scene?.count ?? 1;
-  if (state.index.value >= count) state.index.value = 0;
+  if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
 }
 

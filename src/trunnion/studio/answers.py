@@ -242,10 +242,16 @@ def _columns(back: Backward, steps: int) -> dict[str, Any]:
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
     """What a drag changes: name, before, after."""
     return [
-        [change.path.removeprefix("dimensions.").removeprefix("links."),
+        [_named(change.path),
          sketch.length(float(sketch.numbers[change.path])), sketch.length(change.value)]
         for change in changes
     ]  # fmt: skip
+
+
+def _named(path: str) -> str:
+    """A dimension by its name, a coordinate as "D of link2, y"."""
+    section, name, *inner = path.split(".")
+    return f"{inner[1]} of {name}, {inner[2]}" if section == "links" else name
 
 
 # ---- editing ------------------------------------------------------------------------------------------------------

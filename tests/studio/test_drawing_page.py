@@ -219,7 +219,7 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.page.keyboard.up("Alt")
         assert user.state("s.text.value") != drawn
         words = user.state("s.notice.value.words")
-        assert words.startswith("Move B: link1.points.B.x")
+        assert words.startswith("Move B: x of B on link1 50 mm → ")
         for name, length in re.findall(r"(\S+) \S+ \S+ → (\S+ mm)", words):  # as told while the crank followed
             link, _, point, axis = name.split(".")
             assert lengths(user)[link][point]["xy".index(axis)] == length

@@ -208,9 +208,10 @@ def test_a_half_drawn_linkage_is_no_error():
     assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
     arms = [{"do": "link", "from": {"ground": [x, 0]}, "to": to} for x, to in ((0, [1, 1]), (2, "link1.B"))]
     still, _ = edited("", {}, *arms)
-    assert ask(ask="model", text=still)["missing"] == [
-        "It stands still: its joints let no link move. Take one away, or let an end slide."
-    ]
+    found = ask(ask="model", text=still)
+    assert found["missing"] == ["It stands still: its joints let no link move. Take one away, or let an end slide."]
+    assert (found["ready"][0]["what"], found["ready"][0]["ok"]) == ("motion", False)
+    assert "stands still" in found["ready"][0]["why"]
     wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
     assert ask(ask="model", text=wrong)["missing"] == []
 

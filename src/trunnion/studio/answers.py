@@ -125,7 +125,8 @@ def _model(asked: Asked) -> dict[str, Any]:
     if state.mechanism is not None:
         try:
             result = state.result(steps, friction)
-            found = state.placed(tuple(findings_of(result))) or found
+            told = state.placed(tuple(findings_of(result)))
+            found = [*found, *told] if state.bare else told or found
         except MechanismError as error:
             found += state.placed(error.findings)
     drawn = Sketch(copy.deepcopy(dict(state.entries or {})))
@@ -137,6 +138,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "numbers": _numbers(state, drawn),
         "solved": result is not None,
         "ready": readiness(state.mechanism, result, found, lacks),
+        "bare": state.bare,
         "scene": None,
     }
     if result is None:
@@ -151,6 +153,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
         **margin_of(result, friction and bool(rubbing(state.run.system))),
+        **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         "figures": [
             [label, told]
@@ -239,10 +242,16 @@ def _columns(back: Backward, steps: int) -> dict[str, Any]:
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
     """What a drag changes: name, before, after."""
     return [
-        [change.path.removeprefix("dimensions.").removeprefix("links."),
+        [_named(change.path),
          sketch.length(float(sketch.numbers[change.path])), sketch.length(change.value)]
         for change in changes
     ]  # fmt: skip
+
+
+def _named(path: str) -> str:
+    """A dimension by its name, a coordinate as "y of D on link2"."""
+    section, name, *inner = path.split(".")
+    return f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
 
 
 # ---- editing ------------------------------------------------------------------------------------------------------
@@ -340,6 +349,8 @@ def _compare(asked: Asked) -> dict[str, Any]:
 def _export(asked: Asked) -> dict[str, Any]:
     """A file of the solved cycle."""
     state = loaded(str(asked["text"]))
+    if state.bare:  # its file would be one without friction
+        raise MechanismError(state.findings)
     return exported(state, str(asked["what"]), _steps(asked))
 
 

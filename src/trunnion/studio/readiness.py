@@ -43,12 +43,13 @@ def _said(
         yield False, " ".join(lacks) or why
         yield from [(False, "The motion comes first.")] * 5
         return
+    if not mechanism.drivers:
+        yield False, " ".join(lacks) or "No joint is driven: it stands still."
     status = result["status"].values
     stands, count = int(np.sum(status >= Status.SINGULAR)), len(status)
-    yield (
-        not stands,
-        f"No position in {stands} of {count}." if stands else f"Moves through {counted(count, 'position')}.",
-    )
+    if mechanism.drivers:
+        why = f"No position in {stands} of {count}." if stands else f"Moves through {counted(count, 'position')}."
+        yield not stands, why
     values = mechanism.parameters()
     acts = bool(mechanism.loads) or any(
         path.endswith((".mass", ".stiffness")) and bool(np.any(np.asarray(value) != 0))
@@ -61,4 +62,6 @@ def _said(
     tolerated = bool(mechanism.tolerances())
     yield tolerated, "Numbers have tolerances." if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
     free = any(driver.found for driver in mechanism.drivers.values())
-    yield free, "A motor drives it." if free else "Give a driver a motor."
+    driver = next(iter(mechanism.drivers), "A")
+    how = f"In the text give a driver a motor, as drivers: {{{driver}: {{motor: {{kind: constant, effort: 5 N m}}}}}}"
+    yield free, "A motor drives it: see trunnion simulate." if free else f"{how}; trunnion simulate then lets it run."

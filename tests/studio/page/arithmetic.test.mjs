@@ -75,7 +75,8 @@ assert.deepEqual(fields.numberOf("60 mm ± 0.05"), { value: 60, rest: "mm ± 0.0
 assert.deepEqual(fields.numberOf("2.5e-3"), { value: 0.0025, rest: "" });
 assert.equal(fields.numberOf("r / 3"), null);
 assert.equal(fields.numberOf("2 * AB"), null);
-const rows = fields.rowsOf({ links: { bar: { points: { A: [0, "L"] }, mass: "2 kg" } } }, "links", "bar");
+const rows = fields.rowsOf({ links: { ground: {}, bar: { points: { A: [0, "L"] }, mass: "2 kg" } } }, "links", "bar");
+assert.deepEqual(fields.rowsOf({ links: { ground: { mass: "2 kg" } } }, "links", "ground").map(({ label }) => label), ["mass"]);
 assert.deepEqual(rows.map(({ label, value }) => [label, value]), [["A", ["0", "L"]], ["mass", "2 kg"], ["inertia", null], ["centre", null]]);
 const found = [{ where: "links.bar.mass" }, { where: "links.barrel" }, { where: null }];
 assert.equal(fields.findingsOf(found, ["links", "bar"]).length, 1);

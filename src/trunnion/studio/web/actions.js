@@ -2,7 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
-import { placesAt, posedAt } from "./geometry.js";
+import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
 import { pictureOf } from "./picture.js";
@@ -80,8 +80,7 @@ async function answered() {
   const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
   state.answer.value = { ...found, numbers: read ? found.numbers : (state.answer.value?.numbers ?? {}), text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
-  const count = found.scene?.count ?? 1;
-  if (state.index.value >= count) state.index.value = 0;
+  if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
 }
 
@@ -332,7 +331,8 @@ export async function exported(what) {
   if (!made) return;
   if (made.error) return state.say(made.error, true);
   const [first, count] = made.bytes.bytes;
-  handOver(made.name, new Blob([made.body.slice(first, first + count)], { type: made.mime }));
+  const ending = made.name.split(".").pop();
+  handOver(`${stemOf(state.answer.value.entries, state.fileName.value)}.${ending}`, new Blob([made.body.slice(first, first + count)], { type: made.mime }));
 }
 
 function handOver(name, blob) {

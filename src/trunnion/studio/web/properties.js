@@ -42,7 +42,7 @@ function Chosen({ kind, name }) {
         ${(kind === "joints" || kind === "points") && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
-        <${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />
+        ${!(kind === "links" && name === groundOf(entries)) && html`<${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />`}
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore

@@ -46,8 +46,12 @@ def _said(
     status = result["status"].values
     stands, count = int(np.sum(status >= Status.SINGULAR)), len(status)
     yield (
-        not stands,
-        f"No position in {stands} of {count}." if stands else f"Moves through {counted(count, 'position')}.",
+        stands < count,
+        f"Moves through {counted(count, 'position')}."
+        if not stands
+        else f"Moves through {count - stands} of {count} positions; the other {stands} cannot be reached."
+        if stands < count
+        else f"No position in {count} can be reached.",
     )
     values = mechanism.parameters()
     acts = bool(mechanism.loads) or any(
@@ -59,6 +63,11 @@ def _said(
     yield rubs, "Joints rub." if rubs else "State friction of a joint, and the radius of its pin."
     yield bool(mechanism.seated), "Pins have play." if mechanism.seated else "State a clearance or fit of a pin."
     tolerated = bool(mechanism.tolerances())
-    yield tolerated, "Numbers have tolerances." if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
+    yield (
+        tolerated,
+        "Numbers have tolerances: what they do stands under the plots; trunnion tolerance FILE tells more."
+        if tolerated
+        else "Write a tolerance, such as 60 mm ± 0.05 mm.",
+    )
     free = any(driver.found for driver in mechanism.drivers.values())
     yield free, "A motor drives it." if free else "Give a driver a motor."

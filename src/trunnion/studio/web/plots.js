@@ -12,6 +12,7 @@ import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
 import { tabled } from "./tables.js";
+import { Tolerances } from "./tolerances.js";
 import { Button, html } from "./ui.js";
 import { Variants, compared } from "./variants.js";
 
@@ -32,6 +33,7 @@ export function Plots() {
     <${Curves} class="charts" listOf=${curves} />
     <${Polars} />
     <${Figures} />
+    <${Tolerances} />
     ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism is solved.</p>`}
   </div>`;
 }

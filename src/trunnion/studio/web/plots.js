@@ -43,6 +43,7 @@ function Curves({ class: kind, listOf }) {
   const holder = useRef(null);
   useEffect(() => {
     let [list, last] = [[], 0];
+    const box = holder.current; // an answer may come as the panel goes
     const follow = (index) => list.forEach((chart) => chart.show(Math.min(index, last)));
     const stop = [
       effect(() => {
@@ -50,7 +51,7 @@ function Curves({ class: kind, listOf }) {
         const others = compared.value.filter((one) => one.scene && one.scene.count === found?.scene.count);
         list = found ? listOf(found, others) : [];
         last = (found?.scene.count ?? 1) - 1;
-        holder.current.replaceChildren(...list.map((chart) => chart.element));
+        box.replaceChildren(...list.map((chart) => chart.element));
         untracked(() => follow(state.index.value));
       }),
       effect(() => follow(state.index.value)),

@@ -212,6 +212,7 @@ RULES: dict[str, Any] = {
     "place": {"angle": "rocker", "as": "place-of-maximum"},
     "dead centre": {"dead_centre": "D", "as": "place-of-minimum"},
     "stroke": {"stroke": "D"},
+    "time ratio": {"time_ratio": "D"},
     "path": {"path_error": "coupler.E"},
     "straightness": {"straightness": "coupler.E"},
     "dwell": {"angle": "rocker", "as": "dwell", "within": ["80 deg", "100 deg"]},

@@ -33,6 +33,7 @@ R, L, E = 0.3, 1.0, 0.1  # crank, rod, offset of the guide
 STROKE = Measure("stroke", "stroke", "C")
 FAR = Measure("far", "dead_centre", "C")
 NEAR = Measure("near", "dead_centre", "C", statistic="place-of-minimum")
+RATIO = Measure("ratio", "time_ratio", "C")
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +65,11 @@ def near_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
     return np.pi + np.arcsin(offset / (length - r))
 
 
+def ratio_of(r: Any = R, length: Any = L, offset: Any = E) -> Any:
+    way = near_of(r, length, offset) - far_of(r, length, offset)
+    return way / (2 * np.pi - way)
+
+
 def wrapped(angle: Any) -> Any:
     return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
 
@@ -72,8 +78,9 @@ SIZES = {"links.crank.points.B.x": 0, "links.rod.points.P.x": 1, "links.ground.p
 
 
 def test_stroke_and_dead_centres_of_a_slider_crank(crank: Run) -> None:
-    found = figures(crank, [STROKE, FAR, NEAR], 180)
+    found = figures(crank, [STROKE, FAR, NEAR, RATIO], 180)
     assert found["stroke"] == pytest.approx(stroke_of(), abs=1e-13)
+    assert found["ratio"] == pytest.approx(ratio_of(), abs=1e-9)
     assert wrapped(found["far"] - far_of()) == pytest.approx(0, abs=1e-11)
     assert wrapped(found["near"] - near_of()) == pytest.approx(0, abs=1e-9)
 
@@ -84,8 +91,9 @@ def test_of_many_samples(crank: Run) -> None:
     r, length, offset = (n * (1 + 0.02 * rng.uniform(-1, 1, (50, 1))) for n in (R, L, E))
     changes = dict(zip(SIZES, (r, length, offset), strict=True))
     for speed in ({}, {"drivers.A.speed": -6.0 * (1 + 0.1 * rng.uniform(-1, 1, (50, 1)))}):
-        found = figures(crank, [STROKE, FAR, NEAR], 180, {**changes, **speed})
+        found = figures(crank, [STROKE, FAR, NEAR, RATIO], 180, {**changes, **speed})
         np.testing.assert_allclose(found["stroke"], stroke_of(r, length, offset)[:, 0], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(found["ratio"], ratio_of(r, length, offset)[:, 0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(wrapped(found["far"] - far_of(r, length, offset)[:, 0]), 0, atol=1e-10)
         np.testing.assert_allclose(wrapped(found["near"] - near_of(r, length, offset)[:, 0]), 0, atol=1e-9)
 
@@ -94,9 +102,9 @@ def test_of_many_samples(crank: Run) -> None:
 def test_derivatives_of_stroke_and_dead_centres(crank: Run, path: str) -> None:
     """By dual numbers through the engine, the positions and the search for the extremes; against the closed forms."""
     sizes: list[Any] = [R, L, E]
-    found = figures(crank, [STROKE, FAR, NEAR], 360, {path: Dual(sizes[SIZES[path]], 1.0)})
+    found = figures(crank, [STROKE, FAR, NEAR, RATIO], 360, {path: Dual(sizes[SIZES[path]], 1.0)})
     step = 1e-6
-    for name, formula in {"stroke": stroke_of, "far": far_of, "near": near_of}.items():
+    for name, formula in {"stroke": stroke_of, "far": far_of, "near": near_of, "ratio": ratio_of}.items():
         ends = []
         for sign in (1, -1):
             moved = list(sizes)
@@ -114,6 +122,35 @@ def test_dead_centres_of_the_four_bar(durango: Run) -> None:
         found = figures(durango, [most, least], steps)
         assert np.degrees(found["most"]) % 360 == pytest.approx(212.157208609, abs=close)
         assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=close)
+
+
+@pytest.mark.parametrize("pivots", [25, 60, 90, 300])
+def test_time_ratio_of_a_quick_return(pivots: float) -> None:
+    """Ram in line with the lever's pivot. Inside the crank's circle the lever turns right round (Whitworth) and stands
+    along the guide at both ends of the shorter way, φ = 2 acos(d/r) of the crank; outside it rocks, φ = 2 acos(r/d).
+    """
+    whitworth = trunnion.read(EXAMPLES / "whitworth-quick-return.yaml").with_values({"d": f"{pivots} mm"})
+    short = 2 * np.arccos(min(pivots / 120, 120 / pivots))
+    joint = "G" if pivots < 120 else "C"
+    for law in ({"speed": "40 rpm"}, {"speed": "-3 rad/s", "start": "1 rad"}):
+        run = prepare(Mechanism(**{**whitworth.data(), "drivers": {"O": law}}))
+        found = figures(run, [Measure("ratio", "time_ratio", joint)], 360)["ratio"]
+        assert found == pytest.approx((2 * np.pi - short) / short, rel=1e-7)
+
+
+def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
+    """None of a crank that turns on, nor of a part of a turn, which says so; 197.80° and 162.20° of the four-bar."""
+    ratio, round_ = Measure("ratio", "time_ratio", "D"), Measure("round", "time_ratio", "A")
+    found = figures(durango, [ratio, round_], 720)
+    assert found["ratio"] == pytest.approx(197.795697046 / (360 - 197.795697046), rel=1e-9)
+    assert np.isnan(found["round"])
+    data = {**durango.system.mechanism.data(), "measures": {"ratio": {"time_ratio": "D"}}}
+    part = Mechanism(**{**data, "drivers": {"A": {"speed": 1.0, "range": [0, 5]}}})
+    (told,) = [one for one in trunnion.analyse(part, 24).trunnion.summary if one.name == "ratio"]
+    assert told.value is None
+    assert "repeats" in told.note
+    with pytest.raises(MechanismError, match="is over all of it"):
+        Mechanism(**{**data, "measures": {"ratio": {"time_ratio": "D", "over": [0, 1]}}}).check()
 
 
 def test_dead_centre_outside_its_window(durango: Run) -> None:
@@ -480,7 +517,8 @@ def test_no_load_where_the_joint_rests(crank: Run) -> None:
 SUBJECTS = {
     "point": ("piston.P", "x"), "path_error": ("piston.P", ""), "straightness": ("rod.P", ""), "angle": ("rod", ""),
     "rotation": ("P", ""), "slide": ("C", ""), "transmission_error": ("C", ""), "stroke": ("C", ""),
-    "dead_centre": ("C", ""), "rate": ("P", ""), "joint_acceleration": ("C", ""), "load": ("press", ""),
+    "dead_centre": ("C", ""), "time_ratio": ("C", ""), "rate": ("P", ""), "joint_acceleration": ("C", ""),
+    "load": ("press", ""),
     "spring_force": ("coil", ""), "spring_elongation": ("coil", ""),
     "velocity": ("rod.P", "y"), "acceleration": ("rod.P", ""), "angular_velocity": ("rod", ""),
     "angular_acceleration": ("rod", ""), "transmission_angle": ("P", ""), "pressure_angle": ("C", ""),
@@ -655,6 +693,7 @@ def test_names(crank: Run) -> None:
         "stroke:C": ("stroke", "C", "", "peak-to-peak"),
         "dead_centre:C": ("dead_centre", "C", "", "dead centre"),
         "place-of-minimum:dead_centre:C": ("dead_centre", "C", "", "dead centre, least"),
+        "time_ratio:C": ("time_ratio", "C", "", "time ratio"),
         "transmission_error:C": ("transmission_error", "C", "", "deviation"),
     }
     read = named(crank.system.mechanism, forms, crank.values)

@@ -211,6 +211,7 @@ def test_what_is_deleted_leaves_the_other_lines_as_they_are():
         ("add pin: {radius: 10 mm}", "add pin radius 10 mm"),
         ("state options: {…} or a model", "state options or a model"),
         ("add range: [0 mm, 50 mm]", "add range: [0 mm, 50 mm]"),
+        ("the bounds are in drive_effort_lower and drive_effort_upper", ""),
     ],
 )
 def test_remedies_are_in_the_words_of_the_sheet(remedy, words):

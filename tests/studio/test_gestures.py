@@ -38,6 +38,23 @@ def test_a_slotted_lever_points_at_the_crank_pin():
     assert list(entries_of(text)[0]["joints"]) == ["A", "C", "E", "B", "D", "G", "F"]
 
 
+def test_the_forces_on_a_block_balance_with_the_friction_of_its_guide():
+    rubbing = {"pin": {"radius": "5 mm"}, "guide": {"length": "30 mm"}, "friction": 0.2}
+    text, _ = edited(
+        "", {}, *WHITWORTH, {"do": "load", "at": "F", "force": ["-100 N", "0 N"]},
+        {"do": "set", "path": ["joint_defaults"], "value": rubbing},
+    )  # fmt: skip
+    shown = solved(text)["scene"]
+    pin, guide = ({one["name"]: one for one in shown["joints"]}[name] for name in ("B", "E"))
+    angle = np.array(next(one["angle"] for one in shown["links"] if one["name"] == "link2"))
+    known = np.array(shown["status"]) == 0
+    along = {"x": np.cos(angle), "y": np.sin(angle)}
+    for axis, part in along.items():
+        total = np.array(pin["reaction"][axis]) + np.array(guide["reaction"][axis]) + part * np.array(guide["friction"])
+        np.testing.assert_allclose(total[known], 0.0, atol=1e-3)
+    assert np.abs(np.array(guide["friction"])[known]).max() > 20.0
+
+
 def test_a_slot_beside_the_line_of_its_link():
     """The slot is 20 mm left of the line C→D: with d from C to B, its direction is that of B less asin(20 mm/d)."""
     text, _ = edited(
@@ -191,9 +208,10 @@ def test_a_half_drawn_linkage_is_no_error():
     assert ask(ask="model", text=text)["missing"] == ["Nothing is held yet: pin an end of a link to the ground."]
     arms = [{"do": "link", "from": {"ground": [x, 0]}, "to": to} for x, to in ((0, [1, 1]), (2, "link1.B"))]
     still, _ = edited("", {}, *arms)
-    assert ask(ask="model", text=still)["missing"] == [
-        "It stands still: its joints let no link move. Take one away, or let an end slide."
-    ]
+    found = ask(ask="model", text=still)
+    assert found["missing"] == ["It stands still: its joints let no link move. Take one away, or let an end slide."]
+    assert (found["ready"][0]["what"], found["ready"][0]["ok"]) == ("motion", False)
+    assert "stands still" in found["ready"][0]["why"]
     wrong = text.replace("1 m,", "1 banana,").replace(" mm", " banana")
     assert ask(ask="model", text=wrong)["missing"] == []
 

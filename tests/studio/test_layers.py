@@ -238,6 +238,21 @@ def test_a_table_of_two_variants_is_that_of_two_analyses():
     assert not found["shifted"]
 
 
+def test_a_table_has_the_stroke_and_the_time_ratio_of_a_quick_return():
+    """Ram in line with the lever's pivot: φ = 2 acos(d/r) of the crank, the shorter way, stands about 270°."""
+    after = EXAMPLES["whitworth-quick-return"]
+    before = after.replace("d: 60 mm", "d: 40 mm")
+    _, rows = compared(before, after, steps=60)
+    assert rows["time ratio of G"]["b"] == pytest.approx(2.0, rel=1e-4)
+    short = 2 * np.arccos(40 / 120)
+    assert rows["time ratio of G"]["a"] == pytest.approx((2 * np.pi - short) / short, rel=1e-4)
+    assert rows["stroke of G"]["texts"] == ["200.0\u00a0mm", "200.0\u00a0mm", "0 %"]
+    figures = dict(ask("model", after)["figures"])
+    assert figures["time ratio of G"] == "2.000 (210.0° to 330.0°)"
+    assert figures["stroke of G"] == "200.0\u00a0mm"
+    assert "time ratio of G" not in compared(after, after, friction=("off", "stated"))[1]
+
+
 def test_the_same_without_friction():
     text = EXAMPLES[FOURBAR]
     found, rows = compared(text, text, friction=("off", "stated"))

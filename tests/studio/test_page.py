@@ -160,6 +160,35 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.keys("Control+z")
         assert user.state("s.text.value") == before
 
+    def test_a_plot_that_is_pointed_at_gives_the_position_back_and_undo_keeps_its_place(user):
+        undo = user.page.locator("button[title^='Undo'], button[title='Nothing to undo']")
+        before = undo.bounding_box()["x"]
+        user.of("actions", "m.typed(given)", user.state("s.text.value") + "# more\n")
+        user.idle()
+        assert user.state("s.unsaved.value")
+        assert undo.bounding_box()["x"] == before
+        user.of("motion", "m.crank.go(given)", 17)
+        user.page.click("role=tab[name=Plots]")
+        box = user.page.locator(".plot").first.bounding_box()
+
+        def index_at(share):
+            user.page.mouse.move(box["x"] + share * box["width"], box["y"] + 60)
+            user.page.wait_for_timeout(120)
+            return user.state("s.index.value")
+
+        assert 100 < index_at(0.5) < 260
+        assert index_at(-0.5) == 17
+        user.page.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 60)
+        clicked = user.state("s.index.value")
+        assert index_at(0.3) < clicked == index_at(-0.5)  # what was clicked stays
+
+    def test_the_ground_has_no_mass_and_is_not_deleted(user):
+        for name, offered in (("ground", 0), ("rocker", 1)):
+            user.state(f"(s.selection.value = {{ kind: 'links', name: '{name}' }}, s.tab.value = 'properties')")
+            user.idle()
+            assert user.page.locator("button:has-text('Delete link')").count() == offered
+            assert user.page.locator(".row .label", has_text="mass").count() == offered
+
     @pytest.mark.slow
     def test_a_plot_moves_the_mechanism(user):
         user.page.click("role=tab[name=Plots]")
@@ -278,6 +307,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
             user.page.click("summary:has-text('Export')")
             with user.page.expect_download() as told:
                 user.page.locator(".menu button", has_text="SVG").click()
+            assert told.value.suggested_filename == "four-bar.svg"  # of the file, not of the model's name
             drawn.append(Path(told.value.path()).read_text("utf-8"))
         first, turned, bare = drawn
         body = re.compile(r'class="plate k0"[^>]*? d="([^"]+)"')

@@ -36,7 +36,8 @@ VARIABLES = {
 # figures of single positions, and the course whose extremes these are
 OF_PLACES: dict[str, Callable[[Array], Array]] = {
     **dict.fromkeys(
-        ("value", "maximum", "minimum", "peak-to-peak", "place-of-maximum", "place-of-minimum"), lambda course: course
+        ("value", "maximum", "minimum", "peak-to-peak", "place-of-maximum", "place-of-minimum", "time ratio"),
+        lambda course: course,
     ),
     "largest": np.abs,
 }
@@ -113,6 +114,8 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
             ends = "minimum", "maximum: leave out as"
             what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
             notes[measure.name] = f"no {what} within the cycle; for a {other}"
+        elif measure.rule == "time ratio" and not np.isfinite(figure):
+            notes[measure.name] = "it does not go forth and back in a cycle that repeats"
     if np.all(valid):
         return Watched(run, measures, values, figures, findings, valid, notes)
     dial = run.system.dial(run.values, time)
@@ -141,7 +144,7 @@ def _resting_on(run: Run, measure: Measure, values: Array, time: Array) -> NDArr
     if measure.rule not in OF_PLACES or not np.any(np.isfinite(course)):
         return index
     picks = [pick(OF_PLACES[measure.rule](course)) for pick in (np.nanargmin, np.nanargmax)]
-    ends = {"minimum": picks[:1], "place-of-minimum": picks[:1], "peak-to-peak": picks}
+    ends = {"minimum": picks[:1], "place-of-minimum": picks[:1], "peak-to-peak": picks, "time ratio": picks}
     return index[ends.get(measure.rule, picks[1:])]
 
 

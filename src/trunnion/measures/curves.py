@@ -205,7 +205,7 @@ CURVES: dict[str, Course] = {
     "angle": attitude,
     "rotation": value,
     "slide": value,
-    **dict.fromkeys(("transmission_error", "stroke", "dead_centre"), of_joint_motion),
+    **dict.fromkeys(("transmission_error", "stroke", "dead_centre", "time_ratio"), of_joint_motion),
     "rate": rate,
     "joint_acceleration": joint_acceleration,
     "velocity": velocity,

@@ -97,6 +97,22 @@ def _dead_centre(course: Curve, sign: float = 1.0) -> Number:
     return found.of(course.coordinate, course.gain) + np.where(found.inside, 0.0, np.nan)
 
 
+def _time_ratio(course: Curve) -> Number:
+    """The longer of the two ways between the places of its largest and its least value over the shorter.
+
+    At an even drive it is that of their times: (1 − s)/s or s/(1 − s), s being their distance over that of a period.
+    NaN where the motion does not come again, or is none.
+    """
+    ways = _dead_centre(course) - _dead_centre(course, -1.0)
+    if course.grid.period is None or not course.gain:
+        return ways * np.nan
+    share = ways * (1.0 / course.gain)
+    share = share - np.floor(primal(share))
+    xp = namespace(share)
+    longer = xp.maximum(share, 1.0 - share)
+    return longer / xp.where(primal(longer) < 1, 1.0 - longer, np.nan)
+
+
 def _rms(course: Curve) -> Number:
     square = total(course.number * course.number, course.grid.weights)
     return namespace(square).sqrt(square)
@@ -114,6 +130,7 @@ RULES: dict[str, Callable[[Curve], Number]] = {
     "place-of-minimum": lambda course: course.place(-1.0),
     "dead centre": _dead_centre,
     "dead centre, least": lambda course: _dead_centre(course, -1.0),
+    "time ratio": _time_ratio,
     "deviation": _largest,  # of the course less that of the nominal mechanism
     "dwell": lambda course: share_within(course.number, course.grid, course.band),
 }

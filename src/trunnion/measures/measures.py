@@ -108,7 +108,7 @@ class Measure:
             own = "deviation"
         if own == "dead centre":
             return "dead centre, least" if self.statistic == "place-of-minimum" else own
-        if own in ("line", "ratio", "work"):
+        if own in ("line", "ratio", "work", "time ratio"):
             return own
         return self.statistic or ("value" if self.at is not None else own)
 
@@ -132,7 +132,7 @@ class Measure:
 
     def figure_unit(self, system: System, values: Values) -> str:
         """SI unit of the figure: of a place that of the first driver's coordinate, s where this names no position."""
-        if self.rule == "dwell":
+        if self.rule in ("dwell", "time ratio"):
             return "1"
         return coordinate_unit(system, values) if self.of_place else self.unit(system)
 

@@ -37,7 +37,7 @@ def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
     """
     if is_place(measure):
         return drive_kind(mechanism)
-    if measure.statistic == "dwell":
+    if measure.statistic == "dwell" or measure.kind == "time_ratio":
         return KINDS["number"]
     return course_kind(mechanism, measure)
 

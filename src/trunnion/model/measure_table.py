@@ -112,6 +112,11 @@ MEASURES: dict[str, MeasureKind] = {
         "joint whose dead centre is watched, as the coordinate of the first driver at which its own is largest; with "
         "`as` place-of-minimum, smallest", "dead centre of a joint", MOTION, "joint", rule="dead centre", reduced=True,
     ),
+    "time_ratio": MeasureKind(
+        "joint whose time ratio is watched: of its ways forth and back the longer over the shorter, by the coordinate "
+        "of the first driver", "time ratio of a joint", MOTION, "joint", rule="time ratio",
+        reduced=True,
+    ),
     "rate": MeasureKind(
         "joint whose speed is watched: of its rotation, of a prismatic one of its slide", "speed of a joint", RATE,
         "joint", "motion",

@@ -143,15 +143,19 @@ def _model(asked: Asked) -> dict[str, Any]:
     if result is None:
         return head
     shown = scene(result, max_positions=MOST_STEPS)
+    figures = {
+        one.label: one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
+        for one in summary_of(result)
+        if not one.numerical
+    }
     return head | {
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
         **margin_of(result, friction and bool(rubbing(state.run.system))),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         "figures": [
-            [one.label, one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"]
-            for one in summary_of(result)
-            if not one.numerical
+            [label, told]
+            for label, told in (figures | dict(row for way in state.ways(steps) for row in way.rows)).items()
         ],
     }
 
@@ -320,7 +324,15 @@ def _compare(asked: Asked) -> dict[str, Any]:
     moves = partial(_moving, asked)
     return {
         "others": [
-            overlaid(loaded(str(other["text"])), other.get("friction") != "off", steps, present, rubs, moves)
+            overlaid(
+                loaded(str(other["text"])),
+                other.get("friction") != "off",
+                steps,
+                present,
+                rubs,
+                moves,
+                state.ways(steps),
+            )
             for other in asked["others"]
         ]
     }

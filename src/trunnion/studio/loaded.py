@@ -16,6 +16,8 @@ from trunnion.solve.run import Run, prepare
 if TYPE_CHECKING:
     import xarray as xr
 
+    from trunnion.studio.ways import Way
+
 __all__ = ["MOST_LINKS", "Loaded", "loaded"]
 
 MOST_SIGNS = 300_000  # of a text: what is longer takes seconds to read at every stroke of a key
@@ -55,6 +57,16 @@ class Loaded:
 
         mechanism = self.mechanism if friction else self.mechanism.with_friction("off")
         return analyse(mechanism, steps)
+
+    @lru_cache(maxsize=2)  # noqa: B019
+    def ways(self, steps: int) -> tuple[Way, ...]:
+        """How far what moves on the ground goes, and its time ratio; none where its cycle is not solved."""
+        from trunnion.studio.ways import ways  # not for the first picture
+
+        try:
+            return tuple(ways(self.run, steps))
+        except MechanismError:
+            return ()
 
 
 @lru_cache(maxsize=8)

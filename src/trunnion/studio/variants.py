@@ -5,7 +5,7 @@ A variant is another text, or the same without friction.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,8 @@ from trunnion.views.cycle.scene import scene
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from trunnion.studio.ways import Way
 
 __all__ = ["Figure", "compared", "figures", "overlaid"]
 
@@ -69,8 +71,8 @@ def _signed(value: float) -> str:
     return f"+{text}" if value >= 0.0005 else text
 
 
-def figures(result: xr.Dataset, rubs: bool) -> Iterator[Figure]:
-    """Peak effort of each driver, efficiency, least locking margin, largest reaction, mean friction power."""
+def figures(result: xr.Dataset, rubs: bool, ways: Sequence[Way] = ()) -> Iterator[Figure]:
+    """Peak effort of each driver, efficiency, least locking margin, largest reaction, mean friction power, strokes."""
     units = attribute(result, "driver_units")
     for driver, of in zip(names(result, "driver"), units, strict=False):
         effort = result["drive_effort"].sel(driver=driver).values
@@ -83,6 +85,10 @@ def figures(result: xr.Dataset, rubs: bool) -> Iterator[Figure]:
     force = np.asarray(result["reaction_force"].transpose("axis", ...))
     yield Figure("largest reaction", _most(np.linalg.norm(force, axis=0)), "N")
     yield Figure("mean friction power", float(result["friction_power_mean"].sum()), "W")
+    for one in ways:
+        yield Figure(f"stroke of {one.joint}", one.stroke, one.unit)
+        if np.isfinite(one.ratio):
+            yield Figure(f"time ratio of {one.joint}", one.ratio, "1")
     known = np.count_nonzero(result["status"].values < Status.NOT_CONVERGED)
     yield Figure("positions solved", float(known), "")
 
@@ -91,14 +97,16 @@ def _most(values: Any) -> float:
     return float(np.nanmax(values)) if np.any(np.isfinite(values)) else float("nan")
 
 
-def compared(before: xr.Dataset, rubbed: bool, after: xr.Dataset, rubs: bool) -> list[dict[str, Any]]:
+def compared(
+    before: xr.Dataset, rubbed: bool, after: xr.Dataset, rubs: bool, were: Sequence[Way] = (), ways: Sequence[Way] = ()
+) -> list[dict[str, Any]]:
     """Rows of the table: label, SI values a and b, their texts and that of the change; None of a figure one lacks.
 
     Positions solved are told only where they are not all.
     """
-    was = {one.label: one for one in figures(before, rubbed)}
+    was = {one.label: one for one in figures(before, rubbed, were)}
     rows = []
-    for one in figures(after, rubs):
+    for one in figures(after, rubs, ways):
         other = was.get(one.label, Figure(one.label, float("nan"), one.unit))
         if not one.unit and one.value == after.sizes["position"] and other.value == before.sizes["position"]:
             continue
@@ -109,10 +117,16 @@ def compared(before: xr.Dataset, rubbed: bool, after: xr.Dataset, rubs: bool) ->
 
 
 def overlaid(
-    state: Loaded, friction: bool, steps: int, present: xr.Dataset, rubs: bool, moves: Moves = lambda _: None
+    state: Loaded,
+    friction: bool,
+    steps: int,
+    present: xr.Dataset,
+    rubs: bool,
+    moves: Moves = lambda _: None,
+    ways: Sequence[Way] = (),
 ) -> dict[str, Any]:
     """A variant to lay over the present result: its scene at the positions of that, its margin, the table, and as
-    `point` what `moves` tells of its result: the motion of a point.
+    `point` what `moves` tells of its result: the motion of a point. ways: strokes of the present one.
 
     `shifted`: its drive runs over another range, and each position shows the nearest of its own; `why`: it has no
     cycle, or none that runs over the same drive.
@@ -123,7 +137,9 @@ def overlaid(
         found = error.findings[0]
         return {"scene": None, "why": f"cannot be solved: {found.where} {found.what}".strip(), "rows": []}
     rubbed = friction and bool(rubbing(state.run.system))
-    rows = compared(result, rubbed, present, rubs)
+    were = state.ways(steps)
+    were, ways = ((), ()) if were is ways else (were, ways)  # of the same mechanism
+    rows = compared(result, rubbed, present, rubs, were, ways)
     own, over = abscissa(result), abscissa(present)
     if (own.label, own.closed) != (over.label, over.closed):
         why = f"runs over {own.label}, the present one over {over.label}: its curves cannot be laid over"

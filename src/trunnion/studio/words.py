@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from trunnion.results.variables import VARIABLES
+
 __all__ = ["remedied", "spoken"]
 
 NOUNS = {
@@ -39,6 +41,8 @@ def spoken(where: str) -> str:
 
 def remedied(remedy: str) -> str:
     """A remedy without the signs of the file: "state pin radius" where it says `state pin: {radius: …}`."""
+    if any("_" in name and name in remedy for name in VARIABLES):
+        return ""  # it names columns of the result, which the page does not show
     plain = STATED.sub(r"\1 ", NESTED.sub(r"\1 \2 \3", remedy))
     return plain.replace(": {…}", "").replace(" …", "")
 

@@ -75,12 +75,20 @@ assert.deepEqual(fields.numberOf("60 mm ± 0.05"), { value: 60, rest: "mm ± 0.0
 assert.deepEqual(fields.numberOf("2.5e-3"), { value: 0.0025, rest: "" });
 assert.equal(fields.numberOf("r / 3"), null);
 assert.equal(fields.numberOf("2 * AB"), null);
-const rows = fields.rowsOf({ links: { bar: { points: { A: [0, "L"] }, mass: "2 kg" } } }, "links", "bar");
+const rows = fields.rowsOf({ links: { ground: {}, bar: { points: { A: [0, "L"] }, mass: "2 kg" } } }, "links", "bar");
+assert.deepEqual(fields.rowsOf({ links: { ground: { mass: "2 kg" } } }, "links", "ground").map(({ label }) => label), ["mass"]);
 assert.deepEqual(rows.map(({ label, value }) => [label, value]), [["A", ["0", "L"]], ["mass", "2 kg"], ["inertia", null], ["centre", null]]);
 const found = [{ where: "links.bar.mass" }, { where: "links.barrel" }, { where: null }];
 assert.equal(fields.findingsOf(found, ["links", "bar"]).length, 1);
 assert.deepEqual(fields.partOf({ where: "links.bar.mass" }, { links: { bar: {} } }), { kind: "links", name: "bar" });
 assert.equal(fields.partOf({ where: "drivers" }, {}), null);
+
+// ---- the force in a slide, with its friction along the guide
+const { forceAt } = await load("web/data.js");
+const sliding = { links: ["lever", "block"], axis: [0, 1], reaction: { x: [3], y: [1, null] }, friction: [2] };
+const lever = { links: [{ name: "lever", angle: [Math.PI / 2] }] };
+assert.deepEqual(forceAt(lever, sliding, 0).map((part) => Number(part.toFixed(12))), [1, 1]);
+assert.equal(forceAt(lever, sliding, 1), null);
 
 // ---- the locking margin in words
 const { told } = await load("studio/words.js");

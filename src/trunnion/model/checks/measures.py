@@ -128,15 +128,15 @@ def _taken(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding
         yield Finding(what, f"{where}.{key}", "remove it")
     if measure.reduced:
         whole = f"{subject}: {measure.subject}" if measure.subject == "cycle" else subject
+        all_of_it = measure.subject == "cycle" or subject == "time_ratio"
         if measure.at is not None:
-            yield Finding(
-                f"the {whole} is of a range, not of a position", f"{where}.at", "remove it, or state over: […]"
-            )
+            remedy = "remove it" if all_of_it else "remove it, or state over: […]"
+            yield Finding(f"the {whole} is of a range, not of a position", f"{where}.at", remedy)
         if figure is not None and not (subject == "dead_centre" and figure in PLACES):
             remedy = "remove it" if subject != "dead_centre" else f"write {' or '.join(PLACES)}"
             yield Finding(f"the {whole} is one number of a range already", f"{where}.as", remedy)
-        if measure.subject == "cycle" and measure.over is not None:
-            yield Finding("the efficiency of the cycle is over all of it", f"{where}.over", "remove it")
+        if all_of_it and measure.over is not None:
+            yield Finding(f"the {whole.replace(': ', ' of the ')} is over all of it", f"{where}.over", "remove it")
     elif measure.at is not None and figure not in (None, "value"):
         what = f"the {figure} is of a range, not of a position"
         yield Finding(what, f"{where}.as", "remove it, or state over: [0 deg, 90 deg] instead of at")

@@ -2,7 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
-import { placesAt, posedAt } from "./geometry.js";
+import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
 import { pictureOf } from "./picture.js";
@@ -332,7 +332,8 @@ export async function exported(what) {
   if (!made) return;
   if (made.error) return state.say(made.error, true);
   const [first, count] = made.bytes.bytes;
-  handOver(made.name, new Blob([made.body.slice(first, first + count)], { type: made.mime }));
+  const ending = made.name.split(".").pop();
+  handOver(`${stemOf(state.answer.value.entries, state.fileName.value)}.${ending}`, new Blob([made.body.slice(first, first + count)], { type: made.mime }));
 }
 
 function handOver(name, blob) {

@@ -26,7 +26,7 @@ export function TopBar() {
       <${Button} label="Copy a link" title="The model as a link, to be opened in another studio" disabled=${!state.text.value.trim()} onClick=${copyLink} />
       <${Button} label="Keys …" title="What the keys do (?)" onClick=${() => (dialog.value = "keys")} />
     <//>
-    <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}${unsaved.value ? html`<span class="changed" title="There are changes that are not saved"> · changed</span>` : ""}</span>
+    <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}<span class=${unsaved.value ? "changed" : "changed none"} aria-hidden=${!unsaved.value} title="There are changes that are not saved"> · changed</span></span>
     <${Button} kind="icon" label=${before ? `Undo: ${before}` : "Undo"} title=${before ? `Undo: ${before} (Ctrl+Z)` : "Nothing to undo"} disabled=${!before} onClick=${undo}><${Icon} name="undo" /><//>
     <${Button} kind="icon" label=${after ? `Redo: ${after}` : "Redo"} title=${after ? `Redo: ${after} (Ctrl+Shift+Z)` : "Nothing to redo"} disabled=${!after} onClick=${redo}><${Icon} name="redo" /><//>
     <span class="step-name">${before ? `after “${before}”` : ""}</span>

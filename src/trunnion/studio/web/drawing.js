@@ -1,7 +1,7 @@
 // The mechanism in the window as SVG: parts are built once for a structure and moved for every position.
 
 import { arrow } from "../web/arrow.js";
-import { at, guide, hull, magnitude, place, quantile, solved, usualPeak } from "../web/data.js";
+import { forceAt, guide, hull, magnitude, place, quantile, solved, usualPeak } from "../web/data.js";
 import { set, svg } from "../web/dom.js";
 import { roundBelow, short, stated } from "../web/format.js";
 import { loadsOf, poseLoad } from "../web/load.js";
@@ -241,7 +241,7 @@ export function drawKey(view) {
     const force = roundBelow(110 / scale);
     const x = frame.width - force * scale - KEY;
     parts.push(svg("path", { class: "reaction reference", d: arrow(x, y, force * scale, 0) }));
-    parts.push(svg("text", { x: x + force * scale + 8, y, dy: "0.32em" }, `reaction ${stated(force, "N")}`));
+    parts.push(svg("text", { x: x + force * scale + 8, y, dy: "0.32em" }, `force in a joint ${stated(force, "N")}`));
   }
   layers.key.replaceChildren(...parts);
 }
@@ -325,10 +325,10 @@ function poseDrive({ scene, posed: index }, { driver, joint: one, node }, spot) 
 function poseVectors(view, spot) {
   const scale = perNewton(view);
   for (const { joint: one, node } of view.parts.vectors) {
-    const [x, y] = [at(one.reaction.x, view.index), at(one.reaction.y, view.index)];
+    const force = forceAt(view.scene, one, view.index);
     const found = spot(one.at);
-    const show = found && x !== null && y !== null && view.shown.reactions !== false && !view.still;
-    node.setAttribute("d", show ? arrow(found[0], found[1], x * scale, -y * scale) : "");
+    const show = found && force && view.shown.reactions !== false && !view.still;
+    node.setAttribute("d", show ? arrow(found[0], found[1], force[0] * scale, -force[1] * scale) : "");
   }
 }
 

@@ -40,7 +40,7 @@ export function rowsOf(entries, kind, name) {
   const from = kind === "model" ? [] : [kind, name];
   const there = [...(kind === "links" ? lengths(entries, name) : []), ...leaves(part, from)].map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
-  const usual = usualOf(kind, part);
+  const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries));
   const missing = usual
     .map(([way, example]) => ({ path: [...from, ...way.split(".")], value: null, example, fixed: false, common: kind === "joints" ? commonTo(entries, way.split(".")) : null }))
     .filter(({ path }) => !known(path));
@@ -50,7 +50,8 @@ export function rowsOf(entries, kind, name) {
   return rows.map((row) => ({ ...row, label: row.label ?? labelOf(row.path.slice(from.length)), choices: choicesOf(kind, row.path[2], part, entries) }));
 }
 
-function usualOf(kind, part) {
+function usualOf(kind, part, fixed) {
+  if (fixed) return [];
   if (kind === "loads" && part?.joint) {
     const other = "resisting_force" in part ? "resisting_torque" : "resisting_force";
     return USUAL.resistances.filter(([way]) => way !== other);

@@ -49,8 +49,9 @@ export function onLine(spots, at, near) {
   return best;
 }
 
-/** The name of a file for a model: that of the model without what file names lack. */
-export function stemOf(entries) {
+/** The name of a file for a model: that of its own file, or of the model without what file names lack. */
+export function stemOf(entries, file = null) {
+  if (file) return file.replace(/\.[^.]+$/, "");
   const name = String(entries?.name ?? "").replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, ""); // prettier-ignore
   return name.slice(0, 60) || "mechanism";
 }

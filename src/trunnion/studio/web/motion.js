@@ -14,8 +14,21 @@ export const crank = {
   player: null,
   go: (index) => crank.player?.go(index),
   toggle: () => crank.player?.toggle(),
+  /** Where it was before a reader pointed at a curve, and where that led. */
+  before: null,
+  pointed: 0,
   /** Move to where a reader points; a played motion only if it is meant. */
-  pick: (index, firm) => (firm || !crank.player?.playing()) && crank.go(index),
+  pick(index, firm) {
+    if (!firm && crank.player?.playing()) return;
+    if (firm || crank.before === null || state.index.peek() !== crank.pointed) crank.before = firm ? null : state.index.peek();
+    crank.go(index);
+    crank.pointed = state.index.peek();
+  },
+  /** The reader points there no longer: back to where it was, unless it was moved otherwise since. */
+  leave() {
+    if (crank.before !== null && !crank.player?.playing() && state.index.peek() === crank.pointed) crank.go(crank.before);
+    crank.before = null;
+  },
 };
 
 export function Motion() {
@@ -31,14 +44,15 @@ export function Motion() {
 }
 
 function fill(holder) {
-  const scene = state.solved.value ? state.answer.value.scene : null;
+  const whole = state.solved.value ? state.answer.value.scene : null;
+  const scene = whole?.drivers.length ? whole : null;
   const first = state.findings.value.find(({ severity }) => severity === "error");
   const begun = Boolean(state.answer.value?.tracks); // the cycle is being solved
   untracked(() => {
     if (!scene) {
       crank.player?.pause();
       crank.player = null;
-      const words = begun ? "The cycle is being solved …" : first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : "The mechanism moves as soon as it is whole and has a driver.";
+      const words = begun ? "The cycle is being solved …" : first ? `It does not move yet: ${first.what}${first.place ? ` (${first.place})` : ""}.` : whole ? "It stands still: no joint is driven." : "The mechanism moves as soon as it is whole and has a driver.";
       holder.replaceChildren(element("p", { class: "calm" }, words));
       return;
     }

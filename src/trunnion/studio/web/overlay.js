@@ -2,9 +2,9 @@
 // angles, values at the arrows, and the outlines of variant A. Python works it out; here it is only drawn.
 
 import { arrow } from "../web/arrow.js";
-import { at, hull, magnitude, peak, place } from "../web/data.js";
+import { at, forceAt, hull, magnitude, peak, place } from "../web/data.js";
 import { svg } from "../web/dom.js";
-import { quantity, roundBelow, stated } from "../web/format.js";
+import { quantity, roundBelow, short, stated } from "../web/format.js";
 import { KEY, perNewton, trackPath } from "./drawing.js";
 import { roundAbove } from "./geometry.js";
 import { laid } from "./layers.js";
@@ -16,6 +16,7 @@ const CIRCLE = 12; // px: smaller friction circles are drawn enlarged
 const ROOM = 26; // px between the frame and what points out of it
 const LETTER = 7; // px, its width in what is written
 const LINE = 15; // px, its height
+const NOTHING = 1e-9; // of the largest force: less is rounding
 const VECTORS = [["velocity", "v", "m/s"], ["acceleration", "a", "m/s²"]];
 
 /** Where words stand already, [{left, right, y}] px. */
@@ -204,12 +205,14 @@ function angle({ frame, index }, { x, y, first, angle: turn }) {
 function values(view) {
   const { scene, frame, index } = view;
   const scale = perNewton(view);
-  return scene.joints.flatMap(({ name, at: key, reaction }) => {
-    const [fx, fy] = [at(reaction.x, index), at(reaction.y, index)];
-    const found = place(scene, key, index);
-    if (!found || fx === null || fy === null) return [];
-    const [x, y] = frame.to(found);
-    return [beyond([x, y], [fx * scale, -fy * scale], `${name} ${quantity(Math.hypot(fx, fy), "N")}`)];
+  const sizes = scene.joints.map((one) => magnitude(one.reaction, scene.count));
+  const least = NOTHING * peak(...sizes);
+  return scene.joints.flatMap((joint) => {
+    const force = forceAt(scene, joint, index);
+    const found = place(scene, joint.at, index);
+    if (!found || !force || !(Math.hypot(...force) > least)) return [];
+    const [dx, dy] = [force[0] * scale, -force[1] * scale];
+    return [beyond(frame.to(found), [dx, dy], `${joint.name} on ${short(joint.links[1])} ${quantity(Math.hypot(...force), "N")}`)];
   });
 }
 

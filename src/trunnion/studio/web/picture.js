@@ -41,7 +41,7 @@ async function sheetAlone() {
   copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
   copy.setAttribute("width", String(frame.width));
   copy.setAttribute("height", String(frame.height));
-  return { svg: copy, name: stemOf(state.answer.value.entries) };
+  return { svg: copy, name: stemOf(state.answer.value.entries, state.fileName.value) };
 }
 
 /** A picture as dots, twice as many as the sheet has. */

@@ -58,7 +58,7 @@ function Curves({ class: kind, listOf }) {
     ];
     return () => stop.forEach((end) => end());
   }, []);
-  return html`<div class=${kind} ref=${holder}></div>`;
+  return html`<div class=${kind} ref=${holder} onPointerLeave=${({ pointerType }) => pointerType === "mouse" && crank.leave()}></div>`;
 }
 
 /** Charts of the answer with those of the variants laid over, and of the chosen point. */

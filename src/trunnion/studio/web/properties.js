@@ -34,6 +34,7 @@ function Chosen({ kind, name }) {
         <${Name} kind=${kind} name=${name} />
       </h2>
       <${Rows} rows=${rows} findings=${findings} />
+      ${kind === "joints" && state.solved.value && html`<p class="calm">${arrowOf(entries?.joints?.[name])}</p>`}
       ${driver && html`<h3>Driver</h3><${Rows} rows=${rowsOf(entries, "drivers", name)} findings=${findings} />`}
       <p class="row-of-buttons">
         ${kind === "joints" && !driver && html`<${Button} label="Drive this joint" onClick=${() => edit([{ do: "driver", joint: name }])} />`}
@@ -42,10 +43,15 @@ function Chosen({ kind, name }) {
         ${(kind === "joints" || kind === "points") && html`<${Button} label=${state.locked.value.includes(name) ? "Unlock" : "Lock"}
           title="A locked joint stays where it is while others are dragged (K)" onClick=${() => edit([{ do: "lock", point: name }])} />`}
         ${kind === "points" && html`<${Button} label="Pin to the ground" onClick=${() => edit([{ do: "pin", point: name }])} />`}
-        <${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />
+        ${!(kind === "links" && name === groundOf(entries)) && html`<${Button} label=${`Delete ${NOUNS[kind].toLowerCase()}`} onClick=${() => removePart({ kind, name })} />`}
         <${Button} label="All parts" onClick=${() => (state.selection.value = null)} />
       </p>
     </section>`; // prettier-ignore
+}
+
+/** What the arrow at a joint is. */
+function arrowOf({ type, links: [first, second] }) {
+  return `Its arrow is the force on ${second} by ${first}${type === "prismatic" ? ", the friction along the guide included" : ""}.`;
 }
 
 /** The slides and pivots on the ground that a load with a direction could oppose. */

@@ -131,6 +131,7 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
         if name not in known:
             continue
         first, second = joint["links"]
+        slides = joint["type"] == "prismatic"
         rows.append(
             {
                 "name": name, "type": joint["type"], "links": [first, second], "axis": joint.get("axis"),
@@ -139,6 +140,8 @@ def _joints(stated: dict[str, Any], result: xr.Dataset, ideal: xr.Dataset | None
                 "ideal": None if ideal is None else _reaction(ideal, name),
                 "moment": _moment(result, name),
                 "friction_power": series(column(result, "friction_power", joint=name)),
+                "slide": series(column(result, "joint_slide", joint=name)) if slides else [],
+                "friction": series(column(result, "friction_force", joint=name)) if slides else [],
             }
         )  # fmt: skip
     return rows

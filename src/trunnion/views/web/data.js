@@ -187,6 +187,14 @@ function runsWhere(scene, holds) {
   return runs;
 }
 
+/** The force on the second link of a joint at a position, [x, y] N: of a slide with its friction, which acts along it; or null. */
+export function forceAt(scene, joint, index) {
+  const [x, y] = [at(joint.reaction.x, index), at(joint.reaction.y, index)];
+  const along = at(joint.friction, index) ?? 0;
+  const angle = along ? guide(scene, joint, index) : 0;
+  return x === null || y === null ? null : [x + along * Math.cos(angle), y + along * Math.sin(angle)];
+}
+
 /** Direction of a prismatic joint's guide in the global frame, rad. */
 export function guide(scene, joint, index) {
   const [x, y] = joint.axis ?? [1, 0];

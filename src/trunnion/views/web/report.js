@@ -34,6 +34,7 @@ export function charts(scene, kinds) {
     ? [...speedCharts(scene), ...efforts, ...energyChart(scene), ...contactCharts(scene), ...reactions, ...losses, ...power]
     : [...efforts, ...drivers.flatMap((driver) => rateChart(scene, driver)), ...losses, ...reactions, ...power];
   if (sums.efficiency_instant) list.push(efficiencyChart(scene));
+  list.push(...slideChart(scene, kinds));
   return [...list, ...errorCharts(scene, kinds)];
 }
 
@@ -111,7 +112,9 @@ function reactionChart(scene, kinds) {
     values: magnitude(joint.reaction, scene.count),
     kind: kinds.get(joint.name),
   }));
-  return { title: "Joint reactions, magnitude", unit: "N", series: joined(series) };
+  const slides = scene.joints.some(({ friction }) => peak(full(friction, scene.count)) > 0);
+  const note = slides ? "Of a slide the normal force; its friction is not in it." : "";
+  return { title: "Joint reactions, magnitude", unit: "N", series: joined(series), note };
 }
 
 /** Series that are the same, drawn once with the names of all: "A = B". */
@@ -130,6 +133,13 @@ function joined(series) {
     else found.push({ ...one });
   }
   return found;
+}
+
+/** How far blocks are along their guides, without a driver that the chart is over. */
+function slideChart({ joints, drivers, count }, kinds) {
+  const sliding = joints.filter(({ name, slide }) => slide?.length && name !== drivers[0]?.name);
+  const series = sliding.map(({ name, slide }) => ({ label: name, values: full(slide, count), kind: kinds.get(name) }));
+  return series.length ? [{ title: "Slide of joints", unit: "m", series }] : [];
 }
 
 function momentChart(scene, kinds) {

@@ -218,6 +218,12 @@ def test_remedies_are_in_the_words_of_the_sheet(remedy, words):
     assert remedied(remedy) == words
 
 
+def test_what_a_drag_changes_is_named_in_words():
+    text, _ = drawn_four_bar()
+    found = ask(ask="drag", text=text, point="C", index=0, to=[0.21, 0.13], keep=True)
+    assert {row[0] for row in found["changes"]} == {"C of link2, x", "D of link3, x"}
+
+
 # ---- dragging ------------------------------------------------------------------------------------------------------
 
 
@@ -370,3 +376,18 @@ def test_files(what):
     if what == "csv":
         assert found["bytes"].count(b"\n") == 37
         assert b",A.effort [N m]," in found["bytes"].split(b"\n")[0]
+
+
+def test_friction_that_is_not_whole_leaves_the_motion():
+    text = EXAMPLES[FOURBAR].replace("coefficient: 0.4", "coefficient: banana 0.4")
+    assert text != EXAMPLES[FOURBAR]
+    found = ask(ask="model", text=text)
+    assert found["solved"]
+    assert found["bare"]
+    assert "banana" in found["findings"][0]["what"]
+    plain = trunnion.analyse(Mechanism(**entries_of(EXAMPLES[FOURBAR])[0]).with_friction("off"), 360)
+    np.testing.assert_allclose(found["scene"]["drivers"][0]["effort"], plain["drive_effort"].values[0], rtol=6e-7)
+    assert "banana" in ask(ask="export", text=text, what="csv")["error"]
+    worse = ask(ask="model", text=text.replace("BC: 6.00 m", "BC: 6.00 kg"))
+    assert not worse["solved"]
+    assert not worse["bare"]

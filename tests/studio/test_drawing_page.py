@@ -86,6 +86,18 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.idle()
         assert np.abs(effort(user) - torque).max() <= PEAK * np.abs(torque).max()
 
+    def test_a_typed_length_is_shown_as_it_is_drawn(user):
+        user.new_sheet()
+        user.keys("Control+a")
+        assert user.page.evaluate("getSelection().toString()") == ""
+        user.keys("l")
+        user.click(200, 300)
+        user.page.mouse.move(user.box["x"] + 300, user.box["y"] + 300)
+        user.page.keyboard.type("30")
+        ends = [float(user.page.locator(".rubber").get_attribute(name)) for name in ("x1", "x2", "y1", "y2")]
+        scale = user.of("sheet", "m.sheet.view.frame.scale")
+        assert np.hypot(ends[1] - ends[0], ends[3] - ends[2]) == pytest.approx(0.03 * scale, abs=0.2)
+
     def test_a_load_against_the_motion_is_put_on_a_pivot_and_on_its_link(user):
         user.box = {"x": 0, "y": 0}
         for spot in (user.handle("D"), None):

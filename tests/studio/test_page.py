@@ -221,10 +221,13 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
     @pytest.mark.slow
     def test_what_is_wrong_is_told_where_it_stands(user):
         field = user.page.locator("#value-joint_defaults-friction-coefficient-0")
+        user.of("motion", "m.crank.go(given)", 40)
         field.fill("0.1 banana")
         field.press("Tab")
         user.idle()
         assert "banana" in user.page.locator(".wrong").first.inner_text()
+        assert user.state("s.solved.value && s.index.value") == 40  # it moves on
+        assert "shown without friction" in user.page.locator(".message-card.bad").inner_text()
         field.fill("0.2")
         field.press("Tab")
         user.idle()

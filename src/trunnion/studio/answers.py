@@ -126,7 +126,8 @@ def _model(asked: Asked) -> dict[str, Any]:
     if state.mechanism is not None:
         try:
             result = state.result(steps, friction)
-            found = state.placed(tuple(findings_of(result))) or found
+            told = state.placed(tuple(findings_of(result)))
+            found = [*found, *told] if state.bare else told or found
         except MechanismError as error:
             found += state.placed(error.findings)
     drawn = Sketch(copy.deepcopy(dict(state.entries or {})))
@@ -138,6 +139,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "numbers": _numbers(state, drawn),
         "solved": result is not None,
         "ready": readiness(state.mechanism, result, found, lacks),
+        "bare": state.bare,
         "scene": None,
     }
     if result is None:
@@ -152,6 +154,7 @@ def _model(asked: Asked) -> dict[str, Any]:
         "scene": shown,
         "places": {key: [track[axis][0] for axis in "xy"] for key, track in shown["points"].items()},
         **margin_of(result, friction and bool(rubbing(state.run.system))),
+        **({"margin_why": "friction lacks something"} if state.bare and friction else {}),
         "facts": [["structure", str(result.attrs.get("formula", ""))]],
         "figures": [
             [label, told]
@@ -240,10 +243,16 @@ def _columns(back: Backward, steps: int) -> dict[str, Any]:
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
     """What a drag changes: name, before, after."""
     return [
-        [change.path.removeprefix("dimensions.").removeprefix("links."),
+        [_named(change.path),
          sketch.length(float(sketch.numbers[change.path])), sketch.length(change.value)]
         for change in changes
     ]  # fmt: skip
+
+
+def _named(path: str) -> str:
+    """A dimension by its name, a coordinate as "D of link2, y"."""
+    section, name, *inner = path.split(".")
+    return f"{inner[1]} of {name}, {inner[2]}" if section == "links" else name
 
 
 # ---- editing ------------------------------------------------------------------------------------------------------
@@ -341,6 +350,8 @@ def _compare(asked: Asked) -> dict[str, Any]:
 def _export(asked: Asked) -> dict[str, Any]:
     """A file of the solved cycle."""
     state = loaded(str(asked["text"]))
+    if state.bare:  # its file would be one without friction
+        raise MechanismError(state.findings)
     return exported(state, str(asked["what"]), _steps(asked))
 
 

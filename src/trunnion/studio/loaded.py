@@ -28,7 +28,8 @@ MOST_LINKS = 400  # that are solved while one draws
 class Loaded:
     """entries: plain data, None of a text that cannot be read; mechanism: None where it is not sound.
 
-    findings: everything known before it is solved, with lines of the text.
+    findings: everything known before it is solved, with lines of the text; bare: whether the mechanism is that without
+    friction, for what is stated of that is not sound, as the findings tell.
     """
 
     text: str
@@ -36,6 +37,7 @@ class Loaded:
     lines: Lines
     mechanism: Mechanism | None
     findings: tuple[Finding, ...]
+    bare: bool = False
 
     def placed(self, findings: tuple[Finding, ...]) -> list[Finding]:
         """Findings with their lines."""
@@ -89,7 +91,28 @@ def loaded(text: str) -> Loaded:
             found = [one for one in mechanism.checked if one.severity is not Severity.ERROR]
     except MechanismError as error:
         found += error.findings
-    return Loaded(text, entries, lines, mechanism, tuple(place(found, "", lines, entries)))
+        mechanism = _without_friction(entries)
+    bare = mechanism is not None and any(one.severity is Severity.ERROR for one in found)
+    return Loaded(text, entries, lines, mechanism, tuple(place(found, "", lines, entries)), bare)
+
+
+def _without_friction(entries: Mapping[str, Any]) -> Mechanism | None:
+    """The mechanism without what is stated of friction; None where that is not what is wrong with it."""
+    joints, common = (entries.get(key) or {} for key in ("joints", "joint_defaults"))
+    if not isinstance(joints, dict) or not isinstance(common, dict):
+        return None
+    bare = {
+        "joints": {name: _plain(one) for name, one in joints.items()},
+        **({"joint_defaults": _plain(common)} if common else {}),
+    }
+    try:
+        return Mechanism(**{**entries, **bare})
+    except MechanismError:
+        return None
+
+
+def _plain(part: Any) -> Any:
+    return {key: one for key, one in part.items() if key != "friction"} if isinstance(part, dict) else part
 
 
 def _refusals(entries: Mapping[str, Any]) -> list[Finding]:

@@ -80,8 +80,7 @@ async function answered() {
   const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
   state.answer.value = { ...found, numbers: read ? found.numbers : (state.answer.value?.numbers ?? {}), text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
-  const count = found.scene?.count ?? 1;
-  if (state.index.value >= count) state.index.value = 0;
+  if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
 }
 

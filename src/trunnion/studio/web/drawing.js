@@ -115,7 +115,7 @@ function allParts(scene, view) {
     slots: slotsOf(scene, (name) => `k${moving.findIndex((link) => link.name === name) % 6}`).map((one) => marked(one, "links", one.joint.links[0])),
     gears: scene.gears.map((one) => gear(one)),
     points: scene.links.flatMap((link) => link.free.map((key) => ({ key, node: svg("g", { class: "point" }, svg("circle", { r: link.ground ? 3 : 4 })) }))),
-    joints: scene.joints.map((one) => joint(one)),
+    joints: [...scene.joints].sort((a, b) => Number(slides(b)) - Number(slides(a))).map((one) => joint(one)), // no block hides a pin
     springs: scene.springs.map((one) => spring(one)),
     loads: loadsOf(scene).map((one) => marked(one, "loads", one.name)),
     drives: scene.drivers.map((driver) => ({ driver, joint: scene.joints.find(({ name }) => name === driver.name), node: svg("path", { class: "drive" }) })).filter((one) => one.joint),

@@ -32,6 +32,7 @@ function withControl(event) {
   else if (key === "o") state.dialog.value = "open";
   else if (key === "z" && !writes) event.shiftKey ? actions.redo() : actions.undo();
   else if (key === "y" && !writes) actions.redo();
+  else if (key === "a" && !event.target.closest?.(WRITES)) return true; // or it would mark the whole page
   else return false;
   return true;
 }

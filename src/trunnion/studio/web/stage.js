@@ -13,7 +13,7 @@ import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
 import { watchPhoto } from "./photo.js";
 import * as state from "./state.js";
-import { pointer, toolOf, typed } from "./tools.js";
+import { pointer, toolOf, typed, typedEnd } from "./tools.js";
 import { html } from "./ui.js";
 
 export function Stage() {
@@ -126,7 +126,7 @@ function preview(view) {
 }
 
 function rubber(frame, from, to) {
-  const [[x1, y1], [x2, y2]] = [frame.to(from.at), frame.to(to.at)];
+  const [[x1, y1], [x2, y2]] = [frame.to(from.at), frame.to(typedEnd(to.at) ?? to.at)];
   const words = toolOf().tells?.(from, to, frame) ?? "";
   const label = svg("text", { class: typed.value ? "measure typed" : "measure", x: (x1 + x2) / 2 + 12, y: (y1 + y2) / 2 - 12 }, words);
   const line = svg("line", { class: "rubber" });

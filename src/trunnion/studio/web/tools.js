@@ -98,16 +98,21 @@ function drawLink(spot, { shift }) {
   edit([{ do: "link", from: from.written, to: endOf(spot, shift), length: spot.length }]);
 }
 
-function placeLength(shift, aim) {
-  const from = pending.value;
-  const unit = lengthUnit(pointer.value?.wide ?? 1);
-  const length = lengthOf(typed.value, unit);
-  if (!length) return false;
-  const [dx, dy] = [aim[0] - from.at[0], aim[1] - from.at[1]];
+/** Where a link of the typed length ends, towards a place; null where no length is typed. */
+export function typedEnd(aim) {
+  const { at } = pending.value;
+  const length = tool.value === "link" ? lengthOf(typed.value, lengthUnit(pointer.value?.wide ?? 1)) : null;
+  if (!length) return null;
+  const [dx, dy] = [aim[0] - at[0], aim[1] - at[1]];
   const far = Math.hypot(dx, dy);
   const [ux, uy] = far > 0 ? [dx / far, dy / far] : [1, 0];
-  const at = [from.at[0] + length * ux, from.at[1] + length * uy].map((value) => Number(value.toPrecision(12)));
-  drawLink({ kind: null, at, end: at, length: withUnit(typed.value, unit) }, { shift });
+  return [at[0] + length * ux, at[1] + length * uy].map((value) => Number(value.toPrecision(12)));
+}
+
+function placeLength(shift, aim) {
+  const at = typedEnd(aim);
+  if (!at) return false;
+  drawLink({ kind: null, at, end: at, length: withUnit(typed.value, lengthUnit(pointer.value?.wide ?? 1)) }, { shift });
   return true;
 }
 

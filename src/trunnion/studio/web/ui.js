@@ -78,7 +78,7 @@ const ICONS = {
   fit: "M3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4",
   light: "M10 10m-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0-7 0M10 2v2M10 16v2M2 10h2M16 10h2M4.3 4.3l1.4 1.4M14.3 14.3l1.4 1.4M4.3 15.7l1.4-1.4M14.3 5.7l1.4-1.4",
   dark: "M16 12A7 7 0 0 1 8 4a6.5 6.5 0 1 0 8 8z",
-  system: "M3 4h14v9H3zM7 17h6M10 13v4",
+  system: "M10 3a7 7 0 1 0 0 14a7 7 0 1 0 0-14zM10 3v14M12.4 3.6v12.8M14.8 5.2v9.6",
 };
 
 export function Icon({ name }) {

@@ -53,7 +53,7 @@ export function Variants() {
   const same = own && state.answer.value?.text === own.text && state.answer.value.friction === own.friction;
   return html`<section class="variants" aria-label="Variants">
     <p class="row-of-buttons">
-      <${Button} label=${own ? "Keep this instead" : "Keep as variant A"} title="Keep the present state as variant A, to compare with what follows" disabled=${!state.solved.value || same} onClick=${keep} />
+      <${Button} label=${own ? "Keep this instead" : "Keep as variant A"} title="Keep the present state as variant A, to compare with what follows" disabled=${!state.solved.value || same || state.answer.value.bare} onClick=${keep} />
       ${own && html`<${Button} label="Go back to A" disabled=${state.text.value === own.text} onClick=${() => takeText(own.text, "Go back to variant A")} />
         <${Button} label="Drop A" onClick=${() => (state.variant.value = null)} />
         <span class="calm">${same ? `Variant A, kept ${clock}, is what is shown.` : `A kept ${clock}.`}</span>`}

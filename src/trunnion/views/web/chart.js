@@ -188,7 +188,7 @@ function vertical(chart) {
   const shown = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
   let [low, high] = extent(shown) ?? [0, 0];
   if (limits) [low, high] = [Math.max(low, limits[0]), Math.min(high, limits[1])];
-  if (limits && low > 0.5 * high) {
+  if (limits && low > 0.5 * high && high - low > 1e-6 * high) {
     const middle = (low + high) / 2;
     const half = Math.max(0.6 * (high - low), 0.01 * high);
     return [middle - half, Math.min(middle + half, limits[1])];

@@ -12,6 +12,8 @@ import { polarChart } from "./polar.js";
 import { seatCharts } from "./seat.js";
 import { spaceView } from "./space.js";
 
+const NO_KILO = 999; // W: what is lost in some positions is small beside what is in others
+
 /** Class that colours the n-th joint's curves and vectors; after six the dash changes. */
 export function kindOf(order) {
   return `k${order % 6} d${Math.floor(order / 6) % 4}`;
@@ -186,7 +188,7 @@ export function readout(scene) {
       `${unit === "N" ? "force" : "torque"} ${name}`,
       (index) => quantity(at(effort, index), unit, usualPeak(scene, effort)),
     ]),
-    ["friction power", (index) => quantity(lost[index], "W", usualPeak(scene, lost))],
+    ["friction power", (index) => quantity(lost[index], "W", Math.min(usualPeak(scene, lost), NO_KILO))],
     ["status", (index) => state(scene, index)],
   ];
   const cells = rows.map(() => html("dd", {}, "—"));

@@ -221,7 +221,7 @@ def test_remedies_are_in_the_words_of_the_sheet(remedy, words):
 def test_what_a_drag_changes_is_named_in_words():
     text, _ = drawn_four_bar()
     found = ask(ask="drag", text=text, point="C", index=0, to=[0.21, 0.13], keep=True)
-    assert {row[0] for row in found["changes"]} == {"C of link2, x", "D of link3, x"}
+    assert {row[0] for row in found["changes"]} == {"x of C on link2", "x of D on link3"}
 
 
 # ---- dragging ------------------------------------------------------------------------------------------------------

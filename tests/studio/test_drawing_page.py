@@ -219,9 +219,10 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         user.page.keyboard.up("Alt")
         assert user.state("s.text.value") != drawn
         words = user.state("s.notice.value.words")
-        assert words.startswith("Move B: link1.points.B.x")
-        for name, length in re.findall(r"(\S+) \S+ \S+ → (\S+ mm)", words):  # as told while the crank followed
-            link, _, point, axis = name.split(".")
+        assert words.startswith("Move B: x of B on link1 50 mm → ")
+        told = re.findall(r"([xy]) of (\w+) on (\w+) \S+ \S+ → (\S+ mm)", words)  # as told while the crank followed
+        assert told
+        for axis, point, link, length in told:
             assert lengths(user)[link][point]["xy".index(axis)] == length
         user.keys("Control+z")
         assert user.state("s.text.value") == drawn

@@ -140,8 +140,8 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.keys("Escape")
         text = user.state("s.text.value")
         for old, new, told in (
-            ("pin: {radius: 20 mm}, ", "", "friction without the radius of the pin (joint O)"),
-            ("friction: 0.1", "friction: banana", "'banana' is not one of the dimensions"),
+            ("L: 200 mm", "L: 200 kg", "is a mass where a length is needed (point C of link ground)"),
+            ("L: 200 mm", "L: banana", "'banana' is not one of the dimensions"),
         ):
             assert old in text
             user.of("actions", "m.typed(given)", text.replace(old, new))

@@ -250,9 +250,9 @@ def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
 
 
 def _named(path: str) -> str:
-    """A dimension by its name, a coordinate as "D of link2, y"."""
+    """A dimension by its name, a coordinate as "y of D on link2"."""
     section, name, *inner = path.split(".")
-    return f"{inner[1]} of {name}, {inner[2]}" if section == "links" else name
+    return f"{inner[2]} of {inner[1]} on {name}" if section == "links" else name
 
 
 # ---- editing ------------------------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ BALANCE = (
     ("friction_iterations", "Friction iterations", "1", "iterations until reactions and friction agree"),
     ("friction_contraction", "Contraction", "1", "error ratio of successive iterations; below 1 it converges"),
     ("friction_residual", "Friction residual", "N", "largest difference between a friction force and its law"),
-    ("friction_change", "Last change", "N", "change of the reactions in the last iteration"),
+    ("friction_change", "Last change", "N", "move of the reactions in the last iteration; it left the residual above"),
     ("seat_rounds", "Seat iterations", "1", "iterations until the pins lie where their loads press them"),
 )
 

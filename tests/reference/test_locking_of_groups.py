@@ -9,7 +9,7 @@ import pytest
 
 from brief import brief
 from mechanisms import findings
-from trunnion import Mechanism, Status, analyse, locking
+from trunnion import Mechanism, Status, analyse, locking, sweep
 
 STEPS = 24
 
@@ -82,3 +82,13 @@ def test_joints_of_a_group_without_loads_have_no_critical_multiple() -> None:
     locked = found["status"].values == Status.LOCKED
     for joint, unknown in (("E", False), ("B", True)):
         assert np.all(np.isnan(found["critical_multiple"].sel(joint=joint).values[locked]) == unknown)
+
+
+def test_the_compiled_engine_has_the_same_margins() -> None:
+    pytest.importorskip("llvmlite")
+    over = {"joint_defaults.friction.coefficient": [0.3, 0.5, 1.2, 2.0]}
+    one, other = (sweep(ram(0.4, 400.0), over, steps=STEPS, margin=True, engine=name) for name in ("numpy", "compiled"))
+    assert np.isfinite(one["locking_margin"]).all()
+    np.testing.assert_allclose(other["locking_margin"], one["locking_margin"], rtol=1e-6)
+    scaled = one["locking_margin"].values * np.array([0.3, 0.5, 1.2, 2.0])
+    np.testing.assert_allclose(scaled, scaled[0], rtol=1e-6)

@@ -42,19 +42,32 @@ def locking_margin(back: Backward) -> Number:
 
 def _found(back: Backward) -> Number:
     most = back.margin_up_to
-    iterated = [k for k, one in enumerate(back.settled) if one.problem is not None and not one.problem.one_way]
+    known = [(k, one.problem) for k, one in enumerate(back.settled) if one.problem is not None]
+    iterated = [(k, problem) for k, problem in known if not problem.one_way]
     if most <= 0 or not iterated:
         return np.inf
-    first, last = iterated[0], iterated[-1]
-    alone = first == last and not any(contacts for contacts, _ in back.rubbed[:first])
-    problems = [one.problem for one in back.settled[: last + 1] if one.problem is not None]
-    problem = problems[-1] if alone else _together(back, last + 1)
-    # of a triangular row the certificates of its modules are enough
-    bound = largest([one.bound() for one in problems])
-    bound = np.where(np.isfinite(peak(problem.state([0.0] * len(problem.contacts)).normals)), bound, 0.0)
-    if problem.compiled:
-        return _compiled(problem, bound, most)
-    return _followed(problem, bound, most, back.settled[first].share if alone else 1.0)
+    if iterated[0][1].compiled:
+        last = iterated[-1][0]
+        problem = iterated[0][1] if _alone(back, last) else _together(back, last + 1)
+        # of a triangular row the certificates of its modules are enough
+        return _compiled(problem, largest([one.bound() for _, one in known]), most)
+    margin: Number = np.inf
+    left: Number = np.True_
+    for k, own in reversed(iterated):  # a module without a certificate is followed with those that load it
+        doubtful = left & (own.bound() * most >= 1.0)
+        left = left & ~doubtful
+        if np.any(doubtful):
+            alone = _alone(back, k)
+            problem = own if alone else _together(back, k + 1)
+            margin = np.where(
+                doubtful, _followed(problem, doubtful, most, back.settled[k].share if alone else 1.0), margin
+            )
+    return margin
+
+
+def _alone(back: Backward, k: int) -> bool:
+    """Whether nothing rubs in the modules that were settled before one."""
+    return not any(contacts for contacts, _ in back.rubbed[:k])
 
 
 def _together(back: Backward, count: int) -> FrictionProblem:
@@ -78,11 +91,11 @@ def _together(back: Backward, count: int) -> FrictionProblem:
     return primal_of(FrictionProblem(contacts, start, influence))
 
 
-def _followed(problem: FrictionProblem, bound: Number, most: float, shares: Number) -> Number:
+def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: Number) -> Number:
     """The multiple for each lane. shares: those at which lanes are known to lock, 1 of the others."""
     known = np.asarray(shares) < 1.0
     margin = np.where(known, shares, np.inf)
-    doubtful = (bound * most >= 1.0) & ~known
+    doubtful = doubtful & ~known & _loaded(problem)
     if not np.any(doubtful):
         return margin
     part, chosen = problem.picked(doubtful)
@@ -101,7 +114,13 @@ def _compiled(problem: FrictionProblem, bound: Number, most: float) -> Number:
         return balance(problem, forces, *laws, [share] * len(problem.contacts))
 
     none: list[Number] = [0.0] * len(problem.contacts)
+    bound = np.where(_loaded(problem), bound, 0.0)
     target = problem.target(problem.state(none).normals)
     start = [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
     reached = continuation.followed(system, start, (bound * most >= 1.0) & (bound < 1.0), most)
     return np.where(reached >= most, np.inf, reached)
+
+
+def _loaded(problem: FrictionProblem) -> Number:
+    """Where its loads are numbers."""
+    return np.isfinite(peak(problem.state([0.0] * len(problem.contacts)).normals))

@@ -37,6 +37,7 @@ from trunnion.studio.overlays import centres, circles, place_motion, point_motio
 from trunnion.studio.placed import column, plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
+from trunnion.studio.tolerances import tolerated
 from trunnion.studio.variants import overlaid
 from trunnion.studio.words import remedied, spoken
 from trunnion.version import __version__
@@ -354,6 +355,12 @@ def _export(asked: Asked) -> dict[str, Any]:
     return exported(state, str(asked["what"]), _steps(asked))
 
 
+def _tolerances(asked: Asked) -> dict[str, Any]:
+    """What the tolerances of a model do to its largest effort and strokes."""
+    mechanism = loaded(str(asked["text"])).run.system.mechanism
+    return tolerated(mechanism.with_friction("off") if asked.get("friction") == "off" else mechanism, _steps(asked))
+
+
 ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "start": _start,
     "example": _example,
@@ -364,4 +371,5 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "assemblies": _assemblies,
     "layers": _layers,
     "compare": _compare,
+    "tolerances": _tolerances,
 }

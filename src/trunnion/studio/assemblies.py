@@ -35,7 +35,11 @@ def other_assemblies(run: Run, entries: Mapping[str, Any], steps: int) -> Iterat
                 done(sketch, gesture)
             other = prepare(Mechanism(**sketch.entries))
             with np.errstate(all="ignore"):
-                yield f"{', '.join(group.links)}: {way.name}", gestures, other.walk(other.cycle.times(steps))
+                yield (
+                    f"{' and '.join(group.links)} put together the other way ({way.name})",
+                    gestures,
+                    other.walk(other.cycle.times(steps)),
+                )
         except MechanismError:
             continue  # what is stated elsewhere in the model forbids this one
 

@@ -14,10 +14,6 @@ if TYPE_CHECKING:
 
 __all__ = ["EXPORTS", "exported"]
 
-GIF_IMAGES = 60
-GIF_PACE = 50  # ms an image
-GIF_SIZE, GIF_DOTS = 600, 100  # dots along the longer side, dots an inch
-
 
 def exported(state: Loaded, what: str, steps: int) -> dict[str, Any]:
     """Name, type and bytes of a file; MechanismError where the model has no cycle."""
@@ -58,36 +54,9 @@ def _picture(kind: str) -> Callable[[Loaded, int], bytes]:
 
 
 def _animation(state: Loaded, steps: int) -> bytes:
-    """The mechanism going round once, of 60 pictures in 3 seconds."""
-    from matplotlib.figure import Figure
-    from PIL import Image
+    from trunnion.studio.animation import animation
 
-    from trunnion.views.common.drawing import picture, sketch
-    from trunnion.views.space.bodies import is_spatial
-
-    result = _result(state, steps)
-    if is_spatial(result):
-        raise MechanismError(Finding("is not drawn as GIF in space", remedy="write the report, whose drawing moves"))
-    shown = picture(result)
-    low_x, low_y, high_x, high_y = shown.box
-    margin = 0.09 * shown.size
-    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
-    scale, images = GIF_SIZE / max(width, height), list[Image.Image]()
-    dots = max(int(scale * width), 2), max(int(scale * height), 2)
-    figure = Figure((dots[0] / GIF_DOTS, dots[1] / GIF_DOTS), dpi=GIF_DOTS)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(low_x - margin, high_x + margin), ylim=(low_y - margin, high_y + margin), aspect="equal")
-    axes.axis("off")
-    for index in range(0, steps, -(-steps // GIF_IMAGES)):
-        for artist in (*axes.lines, *axes.patches, *axes.texts, *axes.collections):  # new axes would take longer
-            artist.remove()
-        sketch(axes, shown, index)
-        drawn = io.BytesIO()
-        figure.savefig(drawn, format="rgba", dpi=GIF_DOTS)
-        images.append(Image.frombytes("RGBA", dots, drawn.getvalue()).quantize(64, Image.Quantize.FASTOCTREE))
-    stream = io.BytesIO()
-    images[0].save(stream, "GIF", save_all=True, append_images=images[1:], duration=GIF_PACE, loop=0)
-    return stream.getvalue()
+    return animation(_result(state, steps))
 
 
 def _script(state: Loaded, steps: int) -> bytes:

@@ -48,8 +48,7 @@ def _said(
     status = result["status"].values
     stands, count = int(np.sum(status >= Status.SINGULAR)), len(status)
     if mechanism.drivers:
-        why = f"No position in {stands} of {count}." if stands else f"Moves through {counted(count, 'position')}."
-        yield not stands, why
+        yield stands < count, _moves(count - stands, count)
     values = mechanism.parameters()
     acts = bool(mechanism.loads) or any(
         path.endswith((".mass", ".stiffness")) and bool(np.any(np.asarray(value) != 0))
@@ -60,8 +59,15 @@ def _said(
     yield rubs, "Joints rub." if rubs else "State friction of a joint, and the radius of its pin."
     yield bool(mechanism.seated), "Pins have play." if mechanism.seated else "State a clearance or fit of a pin."
     tolerated = bool(mechanism.tolerances())
-    yield tolerated, "Numbers have tolerances." if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
+    done = "Numbers have tolerances: what they do stands under the plots; trunnion tolerance FILE tells more."
+    yield tolerated, done if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
     free = any(driver.found for driver in mechanism.drivers.values())
     driver = next(iter(mechanism.drivers), "A")
     how = f"In the text give a driver a motor, as drivers: {{{driver}: {{motor: {{kind: constant, effort: 5 N m}}}}}}"
     yield free, "A motor drives it: see trunnion simulate." if free else f"{how}; trunnion simulate then lets it run."
+
+
+def _moves(reached: int, count: int) -> str:
+    if reached in (0, count):
+        return f"Moves through {counted(count, 'position')}." if reached else f"No position in {count} can be reached."
+    return f"Moves through {reached} of {count} positions; the other {count - reached} cannot be reached."

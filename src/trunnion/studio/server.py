@@ -21,7 +21,7 @@ from urllib.parse import quote
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -31,6 +31,12 @@ from trunnion.studio.page import document, found, script
 __all__ = ["Studio"]
 
 COOKIE = "trunnion_studio"
+# what a link to a model is opened with by a browser that does not know the token
+STRANGER = """<!doctype html><meta charset="utf-8"><title>Trunnion</title>
+<body style="font: 16px/1.5 system-ui, sans-serif; max-width: 40em; margin: 4em auto; padding: 0 1em">
+<h1 style="font-size: 1.2em">This browser is not let in yet</h1><p>{}</p>
+<p>A link that holds a model goes on with <code>#m=</code>. Open that address first; then open the link again, or
+paste it under File, Open.</p>"""
 FILE_HEADERS = {"X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
 MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
@@ -104,6 +110,8 @@ class Studio:
                 page.set_cookie(f"{COOKIE}_{self.port}", self.token, httponly=True, samesite="strict")
                 return page
             if refusal is not None:
+                if hosts and request.url.path == "/":
+                    return HTMLResponse(STRANGER.format(refusal), status_code=403)
                 return PlainTextResponse(refusal, status_code=403)
             return await handle(request)
 

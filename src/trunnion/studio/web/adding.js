@@ -24,7 +24,7 @@ export function AddDimension() {
   };
   return html`<form class="new-dimension" aria-label="New dimension" onSubmit=${add}>
     <input name="name" aria-label="Name of the new dimension" placeholder="name" spellcheck=${false} />
-    <input name="value" aria-label="Value of the new dimension" placeholder="e.g. 30 mm ± 0.05 mm" spellcheck=${false} />
+    <input name="value" aria-label="Value of the new dimension" placeholder="e.g. 30 mm" spellcheck=${false} />
     <button type="submit" class="plain" title="Then type its name where a number stands; a new name typed there makes one of that number">Add dimension</button>
   </form>`; // prettier-ignore
 }

@@ -11,6 +11,7 @@ import { gridStep, posedAt } from "./geometry.js";
 
 const MANY = 2000; // parts above which each kind is one plain path
 export const KEY = 168; // px, room for the words of the key at the right edge
+const LEGEND = 30; // px at the foot, where scale and key stand
 export const TARGET = 12; // px, radius of what a pointer may hit
 
 /** The drawing of a scene in an SVG element; `draw(scene)` builds, `pose(…)` moves, `fit` and `zoom` change the frame. */
@@ -271,7 +272,7 @@ export function pose(view, scene, index) {
   });
   parts.loads.forEach((one) => {
     one.aim(scene, view.posed);
-    poseLoad(one, spots(one.keys), frame);
+    poseLoad(one, spots(one.keys), { width: frame.width, height: frame.height - LEGEND });
   });
   parts.drives.forEach((one) => poseDrive(view, one, spot(one.joint.at)));
   poseVectors(view, spot);

@@ -38,7 +38,7 @@ function choicesOf(kind, key, part, entries) {
 export function rowsOf(entries, kind, name) {
   const part = kind === "model" ? ownOf(entries) : dictionary(entries?.[kind])[name];
   const from = kind === "model" ? [] : [kind, name];
-  const there = leaves(part, from).map((row) => ({ ...row, example: null }));
+  const there = [...(kind === "links" ? lengths(entries, name) : []), ...leaves(part, from)].map((row) => ({ ...row, example: null }));
   const known = (path) => there.some((row) => starts(row.path, path) || starts(path, row.path));
   const usual = usualOf(kind, part, kind === "links" && name === groundOf(entries));
   const missing = usual
@@ -47,7 +47,7 @@ export function rowsOf(entries, kind, name) {
   const ways = usual.map(([way]) => [...from, ...way.split(".")]);
   const order = ({ path }) => ways.findIndex((way) => starts(way, path) || starts(path, way));
   const rows = [...there, ...missing].sort((a, b) => order(a) - order(b)); // a row stays where it is when it is filled
-  return rows.map((row) => ({ ...row, label: labelOf(row.path.slice(from.length)), choices: choicesOf(kind, row.path[2], part, entries) }));
+  return rows.map((row) => ({ ...row, label: row.label ?? labelOf(row.path.slice(from.length)), choices: choicesOf(kind, row.path[2], part, entries) }));
 }
 
 function usualOf(kind, part, fixed) {
@@ -57,6 +57,19 @@ function usualOf(kind, part, fixed) {
     return USUAL.resistances.filter(([way]) => way !== other);
   }
   return USUAL[part?.type === "prismatic" ? "slides" : kind] ?? [];
+}
+
+/** The lengths of a link from its point at [0, 0] to those on its x axis: their first coordinates under another name. */
+function lengths(entries, name) {
+  if (name === groundOf(entries)) return [];
+  const points = Object.entries(dictionary(entries?.links?.[name]?.points)).map(([point, stated]) => {
+    const nested = !Array.isArray(stated);
+    return { point, at: nested ? dictionary(stated).at : stated, way: nested ? ["at", 0] : [0] };
+  });
+  const zero = (value) => Number(value) === 0;
+  const origin = points.find(({ at }) => Array.isArray(at) && at.every(zero));
+  const ends = origin ? points.filter(({ at }) => Array.isArray(at) && !zero(at[0]) && at.slice(1).every(zero)) : [];
+  return ends.map(({ point, at, way }) => ({ path: ["links", name, "points", point, ...way], label: `length ${origin.point}–${point}`, value: String(at[0]), fixed: false }));
 }
 
 /** What all joints have that state nothing of their own; null where that is nothing. */

@@ -12,6 +12,7 @@ import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
 import { tabled } from "./tables.js";
+import { Tolerances } from "./tolerances.js";
 import { Button, html } from "./ui.js";
 import { Variants, compared } from "./variants.js";
 
@@ -32,6 +33,7 @@ export function Plots() {
     <${Curves} class="charts" listOf=${curves} />
     <${Polars} />
     <${Figures} />
+    <${Tolerances} />
     ${!state.solved.value && html`<p class="calm">Curves appear as soon as the mechanism is solved.</p>`}
   </div>`;
 }
@@ -41,6 +43,7 @@ function Curves({ class: kind, listOf }) {
   const holder = useRef(null);
   useEffect(() => {
     let [list, last] = [[], 0];
+    const box = holder.current; // an answer may come as the panel goes
     const follow = (index) => list.forEach((chart) => chart.show(Math.min(index, last)));
     const stop = [
       effect(() => {
@@ -48,7 +51,7 @@ function Curves({ class: kind, listOf }) {
         const others = compared.value.filter((one) => one.scene && one.scene.count === found?.scene.count);
         list = found ? listOf(found, others) : [];
         last = (found?.scene.count ?? 1) - 1;
-        holder.current.replaceChildren(...list.map((chart) => chart.element));
+        box.replaceChildren(...list.map((chart) => chart.element));
         untracked(() => follow(state.index.value));
       }),
       effect(() => follow(state.index.value)),

@@ -14,6 +14,7 @@ const NOUNS = { links: "Link", joints: "Joint", points: "Point", drivers: "Drive
 const SECTIONS = ["links", "joints", "drivers", "loads", "springs", "gears"];
 const MOST = 300; // parts in a list
 const ROOMY = 9; // letters that every field has room for
+const LONG = 26; // that none has
 
 export function Properties() {
   const chosen = state.selection.value;
@@ -103,7 +104,7 @@ function Row({ row, findings }) {
     <label class="label" for=${`${id}-0`}>${label}</label>
     <span class="values">
       ${parts.map((one, order) => html`<input key=${order} id=${`${id}-${order}`} value=${one} style=${`--wide: ${String(one).length > ROOMY ? String(one).length + 3 : 0}ch`} placeholder=${common ? `${common}, as all joints` : example && `e.g. ${list ? example[order] : example}`}
-        aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${hintOf(units.get(`${id}-${order}`))}
+        aria-label=${list ? `${label}, part ${order + 1}` : label} aria-invalid=${wrong.length > 0} title=${String(one).length > LONG ? one : hintOf(units.get(`${id}-${order}`))}
         aria-describedby=${wrong.length ? `${id}-wrong` : null} onChange=${put(order)} spellcheck=${false} />`)}
     </span>
     ${wrong.length > 0 && html`<p class="wrong" id=${`${id}-wrong`}>${wrong.map(({ what, remedy }) => `${what}${remedy ? ` — ${remedy}` : ""}`).join("; ")}</p>`}
@@ -175,7 +176,7 @@ function Dimension({ name, value, findings }) {
     setPulled(null);
   };
   const slides = start && start.value !== 0;
-  return html`<div class="dimension">
+  return html`<div class=${String(value).length > ROOMY ? "dimension long" : "dimension"}>
     <${Row} row=${{ path, label: name, value: pulled?.text ?? String(value), example: null }} findings=${findings} />
     ${slides && html`<input type="range" aria-label=${`${name}, slider`} min=${Math.min(0, 2 * start.value)} max=${Math.max(0, 2 * start.value)}
       step=${Math.abs(start.value) / 200} value=${numberOf(pulled?.text ?? value)?.value} onInput=${pull} />`}

@@ -1,0 +1,79 @@
+"""The table of what tolerances do, held against the model with its numbers at their limits; lengths as fields."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import trunnion
+from browsing import CHROMIUM
+from served import served
+from studio.asking import ask
+from studio.whitworth import TEXT
+from trunnion.model.file import entries_of
+from trunnion.model.mechanism import Mechanism
+
+TOLERANCED = TEXT.replace("crank: 30 mm", "crank: 30 mm ± 0.5 mm")
+
+
+def cycle(crank):
+    return trunnion.analyse(Mechanism(**entries_of(TEXT.replace("crank: 30 mm", f"crank: {crank} mm"))[0]), 720)
+
+
+def test_worst_cases_are_those_of_the_numbers_at_their_limits():
+    found = ask(ask="tolerances", text=TOLERANCED, steps=360)
+    torque, stroke = found["rows"]
+    ends = [cycle(crank) for crank in (29.5, 30, 30.5)]
+    peaks = [float(np.abs(one["drive_effort"]).max()) for one in ends]
+    ways = [float(np.ptp(one["joint_slide"].sel(joint="G").values)) for one in ends]
+    for row, (low, middle, high) in ((torque, peaks), (stroke, ways)):
+        assert row["nominal"] == pytest.approx(middle, rel=1e-3)
+        assert row["worst"] == pytest.approx([-(high - low) / 2, (high - low) / 2], rel=0.03)
+        assert row["deviation"] == pytest.approx((high - low) / 6, rel=0.03)  # limits at three standard deviations
+    assert torque["label"] == "largest torque, drive A"
+    assert stroke["texts"][0] == "135.0\u00a0mm"
+
+
+def test_a_part_of_the_cycle_that_cannot_be_reached_is_told_with_the_rest():
+    ready = {one["what"]: one for one in ask(ask="model", text=TEXT.replace("[100 mm, 0]", "[10 mm, 0]"))["ready"]}
+    assert ready["motion"]["ok"]
+    assert "the other" in ready["motion"]["why"]
+
+
+if CHROMIUM:  # not a skip: the numbers are tested above
+
+    @pytest.fixture(scope="module")
+    def studio(tmp_path_factory):
+        folder = tmp_path_factory.mktemp("rams")
+        (folder / "ram.yaml").write_text(TOLERANCED, encoding="utf-8")
+        with served(folder, "ram.yaml") as own:
+            yield own
+
+    def test_the_table_stands_under_the_plots(user):
+        user.until("s.solved.value")
+        user.page.click("role=tab[name=Plots]")
+        words = user.page.text_content(".tolerances table")
+        assert "stroke of G" in words
+        assert "± 2.250" in words
+        assert "trunnion tolerance ram.yaml" in user.page.text_content(".tolerances p")
+        user.of("actions", "m.setValue(['dimensions', 'crank'], '30 mm')")
+        user.until("s.answer.value.numbers['dimensions.crank'] === 0.03 && !s.text.value.includes('±')")
+        assert user.page.locator(".tolerances").count() == 0
+
+    def test_a_link_has_its_length_as_a_field(user):
+        user.until("s.solved.value")
+        user.page.click(".parts button:text-is('link2')")
+        field = user.page.get_by_label("length C–D")
+        assert field.input_value() == "180 mm"
+        field.fill("200")
+        user.keys("Enter")
+        user.until("s.answer.value.numbers['links.link2.points.D.x'] === 0.2")
+        assert "D: [200 mm, 0]" in user.state("s.text.value")
+
+    def test_a_browser_that_is_not_let_in_is_told_how(browser, studio):
+        page = browser.new_context().new_page()
+        page.goto(studio.address.split("?")[0] + "#m=abc")
+        words = page.text_content("body")
+        assert "trunnion studio" in words
+        assert "#m=" in words
+        page.context.close()

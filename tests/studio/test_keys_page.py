@@ -86,3 +86,13 @@ if CHROMIUM:  # not a skip: this is the page's own part
         user.until("s.solved.value && s.variant.value")
         user.new_sheet()
         assert user.state("s.variant.value") is None
+
+    def test_what_is_wrong_leaves_the_mechanism_in_view_until_it_is_pointed_at(user):
+        user.of("actions", "m.typed(given)", TEXT.replace("friction: 0.12", "friction: 2"))
+        user.until("s.answer.value.margin_least?.value < 1")
+        card = user.page.locator("button.message-card.bad")
+        low = card.bounding_box()["height"]
+        card.hover()
+        user.page.wait_for_timeout(60)
+        assert low < 40 < card.bounding_box()["height"]
+        assert "all joints below 0.742" in card.text_content()

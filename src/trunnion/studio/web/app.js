@@ -73,7 +73,7 @@ function Messages() {
     ${waiting && html`<div class="message-card">${waiting.name ? `Unsaved work on ${waiting.name}` : "A sheet that was not saved"} is left from ${clock(waiting.time)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}
     ${lacks.length > 0 && html`<div class="message-card">${lacks.join(" ")}</div>`}
-    ${wrong.length > 0 && html`<button type="button" class="message-card bad" onClick=${() => (state.tab.value = "findings")}>
+    ${wrong.length > 0 && html`<button type="button" class="message-card bad" title="Point at it for the whole; click it for all findings" onClick=${() => (state.tab.value = "findings")}>
       <b>${wrong[0].place}</b> ${wrong[0].what}${wrong[0].remedy ? ` — ${wrong[0].remedy}` : ""}${wrong.length > 1 ? ` (and ${wrong.length - 1} more)` : ""}${state.answer.value?.bare ? "; until then it is shown without friction" : ""}</button>`}
   </div>`; // prettier-ignore
 }

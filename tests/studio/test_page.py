@@ -164,11 +164,12 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         undo = user.page.locator("button[title^='Undo'], button[title='Nothing to undo']")
         before = undo.bounding_box()["x"]
         user.of("actions", "m.typed(given)", user.state("s.text.value") + "# more\n")
-        user.idle()
-        assert user.state("s.unsaved.value")
+        user.until("s.unsaved.value && s.answer.value.text === s.text.value")
         assert undo.bounding_box()["x"] == before
         user.of("motion", "m.crank.go(given)", 17)
         user.page.click("role=tab[name=Plots]")
+        user.page.wait_for_selector(".plot path.curve")
+        user.idle()
         box = user.page.locator(".plot").first.bounding_box()
 
         def index_at(share):

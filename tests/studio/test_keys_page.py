@@ -96,3 +96,13 @@ if CHROMIUM:  # not a skip: this is the page's own part
         user.page.wait_for_timeout(60)
         assert low < 40 < card.bounding_box()["height"]
         assert "all joints below 0.742" in card.text_content()
+
+    def test_hints_for_fingers_ask_for_no_keys(browser, studio):
+        context = browser.new_context(viewport={"width": 1280, "height": 720}, has_touch=True, is_mobile=True)
+        page = context.new_page()
+        page.goto(studio.address)
+        page.wait_for_selector(".sheet svg")
+        page.click("button.tool:has-text('Link')")
+        words = page.text_content(".next-step")
+        context.close()
+        assert words == "Touch the first end: a joint, a place on a link, or a free place."

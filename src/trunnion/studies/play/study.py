@@ -31,8 +31,8 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.corners import with_corner
-from trunnion.measures.evaluation import NumpyKernel, at_corner, looking
+from trunnion.measures.corners import switch, with_corner
+from trunnion.measures.evaluation import NumpyKernel, looking
 from trunnion.measures.figures import Reference, moment, reference
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
@@ -49,7 +49,7 @@ from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order
+from trunnion.studies.play.exact import beyond_first_order, figures_with
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -109,15 +109,12 @@ def of_corner(
     kernel: NumpyKernel, places: PositionPlan, one: Reference, known: Mapping[str, Play], carrier: str = HOLE
 ) -> Loads:
     """The same of an extreme at a corner of the course, which moves with the pins: by central differences."""
-    values, rows = kernel.run.values, _offsets(known, carrier)
-    step = STEP * float(np.ravel(primal(kernel.run.system.size(values)))[0])
-
-    def figures(way: float) -> Array:
-        moved = {**values, **{path: way * step * row for path, row in rows.items()}}
-        course = np.asarray(kernel.courses(moved, places.times)[0][one.measure.name][0])
-        return at_corner(kernel, places, moved, one, course[:, one.window.index], course[:, 0])
-
-    return _by_end(known, (figures(1.0) - figures(-1.0))[:, None] / (2 * step))
+    rows = _offsets(known, carrier)
+    step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
+    above, below = (
+        figures_with(kernel, places, one, {path: way * step * row for path, row in rows.items()}) for way in (1.0, -1.0)
+    )
+    return _by_end(known, (above - below)[:, None] / (2 * step))
 
 
 def _offsets(known: Mapping[str, Play], carrier: str) -> dict[str, Array]:
@@ -229,14 +226,16 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
         time = moment(one)
         if not np.isfinite(time):
             continue
+        look = looking(kernel, places, run.values, measure)
+        sharp = with_corner(one, look, run)
+        time = switch(sharp, look, run, time) if sharp.corner else time
         time = time % run.cycle.duration if run.cycle.periodic else time
         there = _over(run, [measure], known, np.array([time]))
-        sharp = with_corner(one, looking(kernel, places, run.values, measure), run)
         if sharp.corner:
             loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)
             there = replace(there, corner=(sharp.figure, one.figure))
-        found[measure.name] = there
+        found[measure.name] = replace(there, figure=partial(figures_with, kernel, places, sharp))
     return found
 
 

@@ -73,7 +73,8 @@ PLAY = {
     ),
     "play.at_a_place": Sentence(
         NOTE,
-        "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the table has the whole cycle",
+        "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the figure and the files show the "
+        "whole cycle besides",
     ),
     "play.at_an_extreme": Sentence(
         NOTE,

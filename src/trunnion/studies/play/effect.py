@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
     worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status. extremes:
-    of each measure whose figure is a maximum or minimum, by name, what play does to it alone at its place; corner: of
-    such an effect at a corner of its course, the figure and what the positions have of it. figure: of such an effect,
-    the extreme itself, (sample,), with pins at offsets, (sample, 1), by path.
+    of each measure whose figure is a maximum or minimum, or at a stated place, by name, what play does to it alone
+    there; corner: of such an effect at a corner of its course, the figure and what the positions have of it. figure: of
+    a maximum or minimum the extreme itself, (sample,), with pins at offsets, (sample, 1), by path.
     """
 
     run: Run

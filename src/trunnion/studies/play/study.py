@@ -209,13 +209,16 @@ def _covered(run: Run, measure: Measure) -> bool:
 
 
 def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], steps: int) -> dict[str, Effect]:
-    """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole.
+    """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole;
+    and to a measure at a stated place.
 
     To first order an extreme changes as its course does there: where the course turns back, to move along it does
     nothing. One at a corner of its course changes as the corner moves too. None of a course that does not change.
     """
     found = {}
     for measure in measures:
+        if measure.at is not None:
+            found[measure.name] = _over(run, [measure], known, plan(run, [measure], 1).times)
         if measure.rule not in EXTREMES:
             continue
         places = plan(run, [measure], steps)
@@ -434,29 +437,20 @@ def _against(run: Run, measure: Measure, limit: float, worst: float, at: str, ov
 def _places(run: Run, effect: Effect) -> Iterator[Finding]:
     """What play does at the place that a measure states, or where its extreme is: the result has the whole cycle."""
     for measure in effect.measures:
-        if measure.name in effect.extremes:
-            there = effect.extremes[measure.name]
-            if there.corner is not None:
-                figure, coarse = there.corner
-                unit, where = measure.unit(run.system), f"measures.{measure.name}"
-                yield finding_for("play.beside_jump", where, figure=figure, coarse=coarse, unit=unit)
-            worst, at = float(there.total[0, 0]), run.system.dial(run.values, there.time).at(0)
-            yield finding_for(
-                "play.at_an_extreme", f"measures.{measure.name}", measure=measure.name, at=at, worst=worst,
-                statistic=measure.rule, unit=measure.unit(run.system),
-            )  # fmt: skip
-            yield from _limit_at(run, measure, worst, at)
-        if measure.at is None:
+        if measure.name not in effect.extremes:
             continue
-        there = _over(run, [measure], effect.plays, plan(run, [measure], 1).times)
+        there, unit, where = effect.extremes[measure.name], measure.unit(run.system), f"measures.{measure.name}"
         worst = float(relied_on(there.total[0], there.status)[0])
         at = run.system.dial(run.values, there.time).at(0)
-        yield finding_for(
-            "play.at_a_place", f"measures.{measure.name}.at", measure=measure.name, at=at, worst=worst,
-            unit=measure.unit(run.system),
-        )  # fmt: skip
+        told: dict[str, Any] = {"measure": measure.name, "at": at, "worst": worst, "unit": unit}
+        if there.corner is not None:
+            figure, coarse = there.corner
+            yield finding_for("play.beside_jump", where, figure=figure, coarse=coarse, unit=unit)
+        if measure.at is not None:
+            yield finding_for("play.at_a_place", f"{where}.at", **told)
+        else:
+            yield finding_for("play.at_an_extreme", where, statistic=measure.rule, **told)
         yield from _limit_at(run, measure, worst, at)
-        yield from beyond_first_order(there, 0)
 
 
 def _idle(run: Run, effect: Effect) -> Iterator[Finding]:

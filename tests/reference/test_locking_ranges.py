@@ -181,10 +181,13 @@ def test_without_friction_every_load_drives_back() -> None:
 def test_an_analysis_has_the_ranges_of_the_positions_that_it_looks_at(steps: int) -> None:
     """At most 360 positions; the report shows them."""
     run = trunnion.analyse(hoist(), steps)
-    known, told = ranges(locking(hoist(), min(steps, 360)), 0.0), attribute(run, "locking_ranges")
+    own = locking(hoist(), min(steps, 360))
+    known, told = ranges(own, 0.0), attribute(run, "locking_ranges")
     assert told["positions"] == min(steps, 360)
     found = [(row["state"], row["first"], row["count"]) for row in told["rows"]]
     assert found == [(one.state.name.lower(), one.first, one.last - one.first + 1) for one in known]
+    margins = [row["cells"][3:] for row in attribute(own, "locking_ranges")["rows"] if row["state"]]
+    assert [row["cells"][3:] for row in told["rows"]] == margins  # and where each is smallest
     page = run.trunnion.report()
     assert 'id="locking"' in page
     assert all(f'<rect class="{state}"' in page for state, _, _ in found)

@@ -111,3 +111,50 @@ def test_the_effort_at_a_place_is_told_where_first_order_says_little() -> None:
     with_pins = np.ravel(measure.curve(run.at(time, offsets))[0]) - float(measure.curve(run.solve(time))[0].item())
     ends = (found["low"], found["high"]) if "low" in found else (-found["exact"], found["exact"])
     assert max(map(abs, ends)) == pytest.approx(np.max(np.abs(with_pins)), rel=0.01)
+
+
+@pytest.mark.parametrize("play", [2e-5, 5e-4])
+def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
+    """A press whose force begins at x = 115 mm: M = F r sin(θ + φ)/cos φ there, of the crank and the place that play
+    leaves; the pins at both ends of the crank do most on it, the one of the ram as an offset of x."""
+    result = trunnion.play(press(play), ["top"])
+    slope = [(moment(r, x) - moment(s, y)) / 2e-8 for r, x, s, y in (
+        (0.03 + 1e-8, 0.115, 0.03 - 1e-8, 0.115), (0.03, 0.115 + 1e-8, 0.03, 0.115 - 1e-8),
+    )]  # fmt: skip
+    first = play * (2 * abs(slope[0]) + abs(slope[1]))
+    assert result["extreme_worst_case"].sum().item() == pytest.approx(first, rel=1e-4)
+    ends = [moment(0.03 + way * 2 * play, 0.115 - way * play) - moment(0.03, 0.115) for way in (1, -1)]
+    exact = max(map(abs, ends))
+    found = [one.figures for one in findings_of(result) if one.code.endswith("_first_order")]
+    assert bool(found) == (exact > 1.01 * first)
+    assert all(one["exact"] == pytest.approx(exact, rel=1e-4) for one in found)
+
+
+def moment(crank: float, place: float, rod: float = 0.1, force: float = 1000.0) -> float:
+    """Drive moment, N m, of a slider-crank in line whose slider, at a place, is pressed on."""
+    angle = np.arccos((crank**2 + place**2 - rod**2) / (2 * crank * place))
+    lean = np.arcsin(crank * np.sin(angle) / rod)
+    return float(force * crank * np.sin(angle + lean) / np.cos(lean))
+
+
+def press(play: float) -> Mechanism:
+    points = {"S": {"at": [0, 0], "axis": [1, 0]}}
+    return Mechanism(
+        trunnion=1,
+        links={
+            "ground": {"points": {**points, "O": [0, 0]}},
+            "crank": {"points": {"O": [0, 0], "P": [0.03, 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": [0.1, 0]}},
+            "ram": {"points": {**points, "Q": [0, 0]}},
+        },
+        joints={
+            "O": revolute("ground", "crank"),
+            "P": revolute("crank", "rod"),
+            "Q": revolute("rod", "ram"),
+            "S": {"type": "prismatic", "links": ["ground", "ram"]},
+        },
+        joint_defaults={"pin": {"radius": 0.005, "clearance": play}, "friction": 0},
+        drivers={"O": {"speed": 6.0}},
+        loads={"press": {"joint": "S", "resisting_force": "1000 N * between(S.slide, 115 mm, 200 mm)"}},
+        measures={"top": {"effort": "O", "as": "maximum"}},
+    )  # fmt: skip

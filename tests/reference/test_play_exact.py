@@ -115,25 +115,32 @@ def test_the_effort_at_a_place_is_told_where_first_order_says_little() -> None:
 
 @pytest.mark.parametrize("play", [2e-5, 5e-4])
 def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
-    """A press whose force begins at x = 115 mm: M = F r sin(θ + φ)/cos φ there, of the crank and the place that play
-    leaves; the pins at both ends of the crank do most on it, the one of the ram as an offset of x."""
+    """A press whose force begins at x = 115 mm, passed both ways: M = F r sin(θ + φ)/cos φ there, of the crank
+    that play leaves, by the pins at both its ends, and of the place of the rod's end, by that of the ram. Before and
+    behind the dead centre the effort is as large, so that a ram off the line to either side raises it."""
     result = trunnion.play(press(play), ["top"])
-    slope = [(moment(r, x) - moment(s, y)) / 2e-8 for r, x, s, y in (
-        (0.03 + 1e-8, 0.115, 0.03 - 1e-8, 0.115), (0.03, 0.115 + 1e-8, 0.03, 0.115 - 1e-8),
-    )]  # fmt: skip
-    first = play * (2 * abs(slope[0]) + abs(slope[1]))
-    assert result["extreme_worst_case"].sum().item() == pytest.approx(first, rel=1e-4)
-    ends = [moment(0.03 + way * 2 * play, 0.115 - way * play) - moment(0.03, 0.115) for way in (1, -1)]
-    exact = max(map(abs, ends))
+    by_crank, by_x, by_y = (
+        (moment(*(np.array(PRESSED) + step)) - moment(*(np.array(PRESSED) - step))) / 2e-7 for step in 1e-7 * np.eye(3)
+    )
+    ram = np.hypot(by_x, by_y)
+    effects = play * np.array([abs(by_crank), abs(by_crank), ram])
+    assert result["extreme_worst_case"].values.ravel() == pytest.approx(effects, rel=1e-5)
+    ways = play * np.array([(2 * way, way * by_x / ram, to * by_y / ram) for way in (1, -1) for to in (1, -1)])
+    reached = np.reshape([moment(*(PRESSED + way)) for way in ways], (2, 2)).max(axis=1)
+    exact = np.max(np.abs(reached - moment(*PRESSED)))
     found = [one.figures for one in findings_of(result) if one.code.endswith("_first_order")]
-    assert bool(found) == (exact > 1.01 * first)
+    assert bool(found) == (exact > 1.01 * np.sum(effects))
     assert all(one["exact"] == pytest.approx(exact, rel=1e-4) for one in found)
 
 
-def moment(crank: float, place: float, rod: float = 0.1, force: float = 1000.0) -> float:
-    """Drive moment, N m, of a slider-crank in line whose slider, at a place, is pressed on."""
-    angle = np.arccos((crank**2 + place**2 - rod**2) / (2 * crank * place))
-    lean = np.arcsin(crank * np.sin(angle) / rod)
+PRESSED = (0.03, 0.115, 0.0)  # m: crank, and where the force begins
+
+
+def moment(crank: float, x: float, y: float, rod: float = 0.1, force: float = 1000.0) -> float:
+    """Drive moment, N m, of a slider-crank whose slider is pressed on, with the end of its rod at (x, y)."""
+    away = np.hypot(x, y)
+    angle = np.arctan2(y, x) + np.arccos((crank**2 + away**2 - rod**2) / (2 * crank * away))
+    lean = np.arcsin((crank * np.sin(angle) - y) / rod)
     return float(force * crank * np.sin(angle + lean) / np.cos(lean))
 
 

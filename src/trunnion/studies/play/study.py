@@ -31,7 +31,7 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.corners import with_corner
+from trunnion.measures.corners import change_by_step, with_corner
 from trunnion.measures.evaluation import NumpyKernel, at_corner, looking
 from trunnion.measures.figures import Reference, moment, reference
 from trunnion.measures.measures import Measure, named, outputs
@@ -108,11 +108,11 @@ def by_duals(
 def of_corner(
     kernel: NumpyKernel, places: PositionPlan, one: Reference, known: Mapping[str, Play], carrier: str = HOLE
 ) -> Loads:
-    """The same of an extreme at a corner of the course, which moves with the pins: by central differences."""
+    """The same of an extreme at a corner of the course, which moves with the pins: by differences."""
     rows = _offsets(known, carrier)
     step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
-    ends = [_moved(kernel, places, one, {path: way * row for path, row in rows.items()}) for way in (step, -step)]
-    return _by_end(known, (ends[0] - ends[1])[:, None] / (2 * step))
+    figures = [_moved(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)]
+    return _by_end(known, change_by_step(*figures)[:, None] / step)
 
 
 def _moved(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:

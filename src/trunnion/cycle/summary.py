@@ -415,7 +415,8 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
     margin = found.arrays["locking_margin"]
     if len(near.times) != len(found.time):
         with np.errstate(all="ignore"):
-            margin = locking_margin(run.solve(near.times, method=found.method))
+            own = locking_margin(run.solve(near.times, method=found.method))
+        margin = np.broadcast_to(np.asarray(own, float), near.times.shape)
     dial = _dial_of(near, run, found)
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),

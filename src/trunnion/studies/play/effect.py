@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -23,9 +23,10 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
-    worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position); status. extremes:
-    of each measure whose figure is a maximum or minimum, by name, what play does to it alone at its place; corner: of
-    such an effect at a corner of its course, the figure and what the positions have of it.
+    worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position), others: the same
+    with seats on the other links, where the model does not say which carry them; status. extremes: of each measure
+    whose figure is a maximum or minimum, by name, what play does to it alone at its place; corner: of such an effect at
+    a corner of its course, the figure and what the positions have of it; moved: that figure with pins at offsets.
     """
 
     run: Run
@@ -36,9 +37,11 @@ class Effect:
     worst_case: Array
     deviation: Array
     loads: Array
+    others: Array
     status: NDArray[np.int8]
     extremes: Mapping[str, Effect] = field(default_factory=dict)
     corner: tuple[float, float] | None = None
+    moved: Callable[[Mapping[str, Array]], Array] | None = None
 
     def of(self, i: int) -> tuple[Effect, int]:
         """Where the figure of a measure is looked for, and its number there: at its extreme, or over the cycle."""

@@ -31,7 +31,7 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.corners import with_corner
+from trunnion.measures.corners import change_by_step, with_corner
 from trunnion.measures.evaluation import NumpyKernel, at_corner, looking
 from trunnion.measures.figures import Reference, moment, reference
 from trunnion.measures.measures import Measure, named, outputs
@@ -108,16 +108,18 @@ def by_duals(
 def of_corner(
     kernel: NumpyKernel, places: PositionPlan, one: Reference, known: Mapping[str, Play], carrier: str = HOLE
 ) -> Loads:
-    """The same of an extreme at a corner of the course, which moves with the pins: by central differences."""
-    values, rows = kernel.run.values, _offsets(known, carrier)
-    step = STEP * float(np.ravel(primal(kernel.run.system.size(values)))[0])
+    """The same of an extreme at a corner of the course, which moves with the pins: by differences."""
+    rows = _offsets(known, carrier)
+    step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
+    figures = [_moved(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)]
+    return _by_end(known, change_by_step(*figures)[:, None] / step)
 
-    def figures(way: float) -> Array:
-        moved = {**values, **{path: way * step * row for path, row in rows.items()}}
-        course = np.asarray(kernel.courses(moved, places.times)[0][one.measure.name][0])
-        return at_corner(kernel, places, moved, one, course[:, one.window.index], course[:, 0])
 
-    return _by_end(known, (figures(1.0) - figures(-1.0))[:, None] / (2 * step))
+def _moved(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
+    """An extreme at a corner, (sample,), with pins at offsets in their holes, m, (sample, 1)."""
+    values = {**kernel.run.values, **offsets}
+    course = np.asarray(kernel.courses(values, places.times)[0][one.measure.name][0])
+    return at_corner(kernel, places, values, one, course[:, one.window.index], course[:, 0])
 
 
 def _offsets(known: Mapping[str, Play], carrier: str) -> dict[str, Array]:
@@ -235,7 +237,8 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
         if sharp.corner:
             loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)
-            there = replace(there, corner=(sharp.figure, one.figure))
+            moved = partial(_moved, kernel, places, sharp)
+            there = replace(there, corner=(sharp.figure, one.figure), moved=moved)
         found[measure.name] = there
     return found
 
@@ -261,9 +264,10 @@ def _over(
     steps = len(time)
     shape = (len(measures), len(known), steps)
     ends = max(len(play.model.ends) for play in known.values())
+    loads, others = np.full((2, len(measures), len(known), ends, 3, steps), np.nan)
     effect = Effect(
-        run, measures, known, time, np.zeros((len(measures), steps)), np.zeros(shape), np.zeros(shape),
-        np.full((len(measures), len(known), ends, 3, steps), np.nan), np.zeros(steps, np.int8),
+        run, measures, known, time, np.zeros((len(measures), steps)), np.zeros(shape), np.zeros(shape), loads, others,
+        np.zeros(steps, np.int8),
     )  # fmt: skip
     rates = np.zeros((len(measures), steps))
     for low in range(0, steps, CHUNK):
@@ -326,10 +330,10 @@ def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.
         most = np.maximum(most, worst_case(others[name], one.radii)) if name in others else most
         effect.worst_case[i, j, window] = np.where(known, most, np.nan)
         effect.deviation[i, j, window] = np.where(known, np.sqrt(variance(loads[name], one.radii)), np.nan)
-        for k, (end, load) in enumerate(zip(one.model.ends, loads[name], strict=True)):
-            for key, part in zip(end, load, strict=True):
-                axis = "xyz".index(key.rpartition(".")[2])
-                effect.loads[i, j, k, axis, window] = np.where(known, part, np.nan)
+        for of, kept in ((loads, effect.loads), (others, effect.others)):
+            for k, (end, load) in enumerate(zip(one.model.ends, of.get(name, ()), strict=False)):
+                for key, part in zip(end, load, strict=True):
+                    kept[i, j, k, "xyz".index(key.rpartition(".")[2]), window] = np.where(known, part, np.nan)
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------

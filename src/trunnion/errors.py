@@ -33,6 +33,10 @@ class Severity(StrEnum):
     NOTE = "note"
 
 
+# words that sentences begin with
+OPENINGS = {"a", "an", "at", "both", "has", "is", "it", "no", "of", "states", "the", "there", "this", "two"}
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing to know about a model or a result.
@@ -64,9 +68,9 @@ class Finding:
 
     @property
     def kind_of_part(self) -> str:
-        """What `joints.A` is, joint, where the sentence begins with A itself; nothing elsewhere."""
+        """What `joints.A` is, joint, where the sentence begins with A itself; nothing elsewhere, nor if A is a word."""
         section, _, name = self.where.partition(".")
-        named = name and self.what.startswith(f"{name} ")
+        named = name and name not in OPENINGS and self.what.startswith(f"{name} ")
         return (section if "," in name else section.removesuffix("s")) if named else ""
 
     def __str__(self) -> str:

@@ -52,3 +52,8 @@ def test_lists_counts_and_the_infinite_are_told_in_words() -> None:
 def test_what_was_put_in_has_a_code_by_its_section() -> None:
     codes = [Finding("is wrong", where).code for where in ("links.crank.mass", "--kind", "parameter x", "")]
     assert codes == ["input.links", "input.kind", "input.parameter", "input.file"]
+
+
+def test_a_part_named_as_a_word_keeps_its_place() -> None:
+    assert str(Finding("A locks", "joints.A")) == "error: joint A locks"
+    assert str(Finding("a cylindrical joint does not exist", "joints.a")).startswith("error: joints.a: a cylindrical")

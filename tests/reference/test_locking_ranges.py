@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,6 +19,7 @@ from trunnion.cycle.locking_states import NO_MARGIN
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.run import prepare
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 ARM, RADIUS, FRICTION = 0.02, 0.012, 0.5
 
 
@@ -181,10 +184,13 @@ def test_without_friction_every_load_drives_back() -> None:
 def test_an_analysis_has_the_ranges_of_the_positions_that_it_looks_at(steps: int) -> None:
     """At most 360 positions; the report shows them."""
     run = trunnion.analyse(hoist(), steps)
-    known, told = ranges(locking(hoist(), min(steps, 360)), 0.0), attribute(run, "locking_ranges")
+    own = locking(hoist(), min(steps, 360))
+    known, told = ranges(own, 0.0), attribute(run, "locking_ranges")
     assert told["positions"] == min(steps, 360)
     found = [(row["state"], row["first"], row["count"]) for row in told["rows"]]
     assert found == [(one.state.name.lower(), one.first, one.last - one.first + 1) for one in known]
+    margins = [row["cells"][3:] for row in attribute(own, "locking_ranges")["rows"] if row["state"]]
+    assert [row["cells"][3:] for row in told["rows"]] == margins  # and where each is smallest
     page = run.trunnion.report()
     assert 'id="locking"' in page
     assert all(f'<rect class="{state}"' in page for state, _, _ in found)
@@ -350,3 +356,13 @@ def test_joints_whose_friction_is_zero_are_not_named() -> None:
         run = prepare(Mechanism(**data))
         names = {one.name.partition(".")[0] for one in report_figures(run, look(run, 8)) if "critical" in one.name}
         assert names == set(named)
+
+
+def test_what_masses_hold_is_no_self_locking() -> None:
+    """A four-bar without friction whose links take more power than the load gives: no friction holds it."""
+    data = trunnion.read(EXAMPLES / "durango-fourbar.yaml").model_dump(by_alias=True, exclude_unset=True)
+    data["drivers"]["A"]["range"] = [0.0, 0.08]
+    mechanism = trunnion.Mechanism(**data).with_friction("off")
+    found = {one.name: one for one in report_figures(prepare(mechanism), trunnion.locking(mechanism, steps=9))}
+    assert "holding_multiple" not in found
+    assert found["efficiency_reverse"].note == "held without friction"

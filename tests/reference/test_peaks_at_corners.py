@@ -240,3 +240,35 @@ def test_a_sweep_says_why_there_is_no_efficiency_where_the_load_never_acts() -> 
     assert (
         note.what == "the efficiency is undefined at 2 of 3 points, the first at r = 10 mm: the driver does no net work"
     )
+
+
+def test_two_corners_that_are_as_high_do_not_cancel() -> None:
+    """A press in line whose force acts both ways: a slide off the line raises one of its peaks as it lowers the other.
+    That of half a turn alone is the same size."""
+    mechanism = trunnion.Mechanism(
+        trunnion=1,
+        dimensions={"r": "30 mm", "l": "100 mm", "e": "0 mm ± 0.1 mm"},
+        links={
+            "ground": {"points": {"O": [0, 0], "S": {"at": [0, "e"], "axis": [1, 0]}}},
+            "crank": {"points": {"O": [0, 0], "P": ["r", 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": ["l", 0]}},
+            "ram": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        },
+        joints={
+            "O": {"type": "revolute", "links": ["ground", "crank"]},
+            "P": {"type": "revolute", "links": ["crank", "rod"]},
+            "Q": {"type": "revolute", "links": ["rod", "ram"]},
+            "S": {"type": "prismatic", "links": ["ground", "ram"]},
+        },
+        drivers={"O": {"speed": 6.0}},
+        loads={"press": {"joint": "S", "resisting_force": "1000 N * between(S.slide, 115 mm, 200 mm)"}},
+        measures={
+            "top": {"effort": "O", "as": "maximum"},
+            "half": {"effort": "O", "as": "maximum", "over": ["0 deg", "180 deg"]},
+            "beside": {"effort": "O", "as": "maximum", "over": ["51 deg", "55 deg"]},
+        },
+    )  # fmt: skip
+    found = trunnion.tolerance(mechanism, methods=["linear", "worst-case"])
+    assert found["nominal"].values == pytest.approx(28.49227750631508, rel=1e-8)  # F r sin(θ + φ)/cos φ at 115 mm
+    assert found["worst_case_upper"].values == pytest.approx(6.13845e-3, rel=1e-4)  # its derivative by e
+    assert found["searched_upper"].values == pytest.approx(6.13845e-3, rel=1e-2)

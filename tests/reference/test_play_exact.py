@@ -111,3 +111,57 @@ def test_the_effort_at_a_place_is_told_where_first_order_says_little() -> None:
     with_pins = np.ravel(measure.curve(run.at(time, offsets))[0]) - float(measure.curve(run.solve(time))[0].item())
     ends = (found["low"], found["high"]) if "low" in found else (-found["exact"], found["exact"])
     assert max(map(abs, ends)) == pytest.approx(np.max(np.abs(with_pins)), rel=0.01)
+
+
+@pytest.mark.parametrize("play", [2e-5, 5e-4])
+def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
+    """A press whose force begins at x = 115 mm, passed both ways: M = F r sin(θ + φ)/cos φ there, of the crank
+    that play leaves, by the pins at both its ends, and of the place of the rod's end, by that of the ram. Before and
+    behind the dead centre the effort is as large, so that a ram off the line to either side raises it."""
+    result = trunnion.play(press(play), ["top"])
+    by_crank, by_x, by_y = (
+        (moment(*(np.array(PRESSED) + step)) - moment(*(np.array(PRESSED) - step))) / 2e-7 for step in 1e-7 * np.eye(3)
+    )
+    ram = np.hypot(by_x, by_y)
+    effects = play * np.array([abs(by_crank), abs(by_crank), ram])
+    assert result["extreme_worst_case"].values.ravel() == pytest.approx(effects, rel=1e-5)
+    ways = play * np.array([(2 * way, way * by_x / ram, to * by_y / ram) for way in (1, -1) for to in (1, -1)])
+    reached = np.reshape([moment(*(PRESSED + way)) for way in ways], (2, 2)).max(axis=1)
+    exact = np.max(np.abs(reached - moment(*PRESSED)))
+    found = [one.figures for one in findings_of(result) if one.code.endswith("_first_order")]
+    assert bool(found) == (exact > 1.01 * np.sum(effects))
+    assert all(one["exact"] == pytest.approx(exact, rel=1e-4) for one in found)
+
+
+PRESSED = (0.03, 0.115, 0.0)  # m: crank, and where the force begins
+
+
+def moment(crank: float, x: float, y: float, rod: float = 0.1, force: float = 1000.0) -> float:
+    """Drive moment, N m, of a slider-crank whose slider is pressed on, with the end of its rod at (x, y)."""
+    away = np.hypot(x, y)
+    angle = np.arctan2(y, x) + np.arccos((crank**2 + away**2 - rod**2) / (2 * crank * away))
+    lean = np.arcsin((crank * np.sin(angle) - y) / rod)
+    return float(force * crank * np.sin(angle + lean) / np.cos(lean))
+
+
+def press(play: float) -> Mechanism:
+    points = {"S": {"at": [0, 0], "axis": [1, 0]}}
+    return Mechanism(
+        trunnion=1,
+        links={
+            "ground": {"points": {**points, "O": [0, 0]}},
+            "crank": {"points": {"O": [0, 0], "P": [0.03, 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": [0.1, 0]}},
+            "ram": {"points": {**points, "Q": [0, 0]}},
+        },
+        joints={
+            "O": revolute("ground", "crank"),
+            "P": revolute("crank", "rod"),
+            "Q": revolute("rod", "ram"),
+            "S": {"type": "prismatic", "links": ["ground", "ram"]},
+        },
+        joint_defaults={"pin": {"radius": 0.005, "clearance": play}, "friction": 0},
+        drivers={"O": {"speed": 6.0}},
+        loads={"press": {"joint": "S", "resisting_force": "1000 N * between(S.slide, 115 mm, 200 mm)"}},
+        measures={"top": {"effort": "O", "as": "maximum"}},
+    )  # fmt: skip

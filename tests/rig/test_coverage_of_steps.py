@@ -113,9 +113,9 @@ def test_frictions_of_two_joints_add() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noise", "seeds"), [(0.25, 150), (0.1, 60)])
+@pytest.mark.parametrize(("noise", "seeds"), [(0.25, 300), (0.1, 150)])
 def test_coverage_where_steps_repeat(tmp_path: Path, noise: float, seeds: int) -> None:
-    """Of 150 measurements 87 % at least: of a true 93 % that fails in 0.2 % of cases, of 80 % in all but 2 %."""
+    """Of 300 measurements 88 % at least: of a true 93 % that fails in 0.03 % of cases, of 80 % in all but 0.03 %."""
     every = np.array([held(identified(tmp_path, seed, noise)) for seed in range(seeds)])
-    assert np.all(np.mean(every, axis=0) >= 0.87), np.mean(every, axis=0)
+    assert np.all(np.mean(every, axis=0) >= 0.88), np.mean(every, axis=0)
     assert 0.9 <= np.mean(every) <= 0.99

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import CANCELLED, integrals
 from trunnion.algebra.roots import root
-from trunnion.cycle.locking_states import PUSHED, LockingState, pushed
+from trunnion.cycle.locking_states import PUSHES, LockingState, pushed
 from trunnion.cycle.near_locking import Passage, passed, reverse
 from trunnion.errors import counted
 from trunnion.results.figure import Figure
@@ -45,12 +45,19 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
         return Figure(name, subject, None, note="not every position is solved")
     if delivered - given > error:  # over a range what masses and springs have stored comes on top
         return Figure(name, subject, None, note=_beside(run))
-    states = {one for one in PUSHED if one in state}
+    states = {one for one in PUSHES if one in state}
     value, held = min(delivered / given, 1.0), states <= {LockingState.SELF_LOCKING}
     if value <= 0 and held:
-        return Figure(name, subject, value, note="self-locking")
+        return Figure(name, subject, value, note="self-locking" if _by_friction(run, back) else "held without friction")
     differ = value <= 0 or (len(states) > 1 and felt(run.system, run.values))
     return Figure(name, subject, value, note="a mean: the ranges of `locking` differ" * bool(differ))
+
+
+def _by_friction(run: Run, back: Passage) -> bool:
+    """Whether the loads would drive it backward somewhere without friction."""
+    time = run.cycle.times(len(back.given))
+    bare = reverse(run, run.walk(time), FrictionMethod(multiple=np.zeros(len(time))))
+    return bool(np.any(bare.delivered[pushed(back)] > 0))
 
 
 def _centred(run: Run) -> str:
@@ -117,12 +124,17 @@ def _released(run: Run, time: Array, turned: bool) -> Callable[[Array], Array]:
 
 
 def holding_figures(run: Run, multiples: Array, state: NDArray[np.int8], dial: Dial) -> list[Figure]:
-    """From which friction on it holds: wherever the loads push, if it does, else at the end of its range, if there."""
+    """From which friction on it holds: wherever the loads push, if it does, else at the end of its range, if there.
+
+    None where it holds even without, as where masses take more than the loads give.
+    """
     held = np.flatnonzero(np.isfinite(multiples))
-    everywhere = len(held) and {one for one in PUSHED if one in state} <= set(HELD)
+    everywhere = len(held) and {one for one in PUSHES if one in state} <= set(HELD)
     if not everywhere and (run.cycle.periodic or len(multiples) - 1 not in held):
         return []
     at = int(np.nanargmax(multiples)) if everywhere else len(multiples) - 1
+    if not multiples[at] > 0:
+        return []
     aspect, subject = "maximum" * bool(everywhere), "down to which it is self-locking" + _centred(run)
     place, multiple = f"at {dial.at(at)}", float(multiples[at])
     figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, "1", aspect, place)]

@@ -32,6 +32,7 @@ from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
 from trunnion.solve.loads import Stated, stated_walk
+from trunnion.solve.margin import locking_margin
 from trunnion.solve.system import Dial, System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -412,8 +413,10 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
     if near is None or not (useful_loads(mechanism) or useful_springs(mechanism)):
         return {}
     margin = found.arrays["locking_margin"]
-    if len(near.times) != len(found.time):  # of more positions: the smallest margin from each to the next
-        margin = np.minimum.reduceat(margin, np.searchsorted(found.time, near.times * (1 - 1e-12)))
+    if len(near.times) != len(found.time):
+        with np.errstate(all="ignore"):
+            own = locking_margin(run.solve(near.times, method=found.method))
+        margin = np.broadcast_to(np.asarray(own, float), near.times.shape)
     dial = _dial_of(near, run, found)
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),

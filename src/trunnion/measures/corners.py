@@ -25,7 +25,7 @@ from trunnion.solve.system import Cycle
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Sides", "extreme", "raised", "sides_of", "switch", "with_corner"]
+__all__ = ["Sides", "change_by_step", "extreme", "raised", "sides_of", "switch", "with_corner"]
 
 Array = NDArray[np.float64]
 Look = Callable[[Array], Array]  # from times in the cycle, s, to the course there, both (row, place)
@@ -36,6 +36,7 @@ SAME = 1e-6  # of the range of a course: figures that are one
 REACH, ALIKE = 3.5, 1e-6  # steps that a polynomial reaches; of the range of a course: what it may be off
 TOPS, NEAR = 3, 0.02  # places that are looked about, and of the range of a course what they may be lower than the best
 BENDS, LOW = 16, 0.25  # the same of the places of the nominal mechanism that are looked at in others
+KINK = 0.1  # of a change: what that to the other side may differ by and the course still be smooth
 FEWEST = 8  # positions from which the shape of a course is known
 
 
@@ -51,14 +52,16 @@ def with_corner(known: Reference, look: Look, run: Run) -> Reference:
 
     It is at one where no polynomial goes through the positions, or the course is higher where the model bends or jumps;
     near an edge of the run also where what one makes of the positions is not found there, as it may round off an obtuse
-    corner. Where it is not, the places remain at which the course jumps from nearly as high.
+    corner. Of few positions only the bends and jumps of the model tell. Where it is not at one, the places remain at
+    which the course jumps from nearly as high.
     """
     tops = _tops(known)
     if not tops:
         return known
     bends, above, jumps = _bends(known, look, run, [float(top.value) for top in tops])
-    sharp = bool(np.any(above > ALIKE)) or any(bool(top.inside) and int(top.used) == 0 for top in tops)
-    if sharp or any(_beside(known, float(np.ravel(top.place)[0]), run.edges) for top in tops):
+    enough = len(known.window.index) >= FEWEST
+    sharp = bool(np.any(above > ALIKE)) or (enough and any(bool(top.inside) and int(top.used) == 0 for top in tops))
+    if sharp or (enough and any(_beside(known, float(np.ravel(top.place)[0]), run.edges) for top in tops)):
         times = np.array([[one.time for one in bends]]).reshape(1, -1)
         corner = replace(known, corner=True, bends=tuple(bends))
         figure = float(extreme(corner, known.parts[0][None], look, sides_of(known, times, run.cycle))[0])
@@ -123,7 +126,7 @@ def _tops(known: Reference) -> list[Extreme]:
     signs = SIGNS.get(measure.rule, ())
     if not signs or known.against or known.turning or measure.of_motion or measure.in_time or len(known.parts) != 1:
         return []
-    if len(known.window.index) < FEWEST or not np.all(np.isfinite(known.parts[0])):
+    if len(known.window.index) < 2 or not np.all(np.isfinite(known.parts[0])):
         return []
     course = course_of(known, known.parts[0])
     if not np.ptp(course.number) > FLAT * np.max(np.abs(course.number)):
@@ -156,6 +159,15 @@ def raised(known: Reference, course: Array, look: Look, sides: Sides, figures: A
         tops = list(course_of(known, course).both())
     highest = (np.fmax.reduce(sign * there, axis=1) for sign in SIGNS[rule])
     return _figure(known, [np.where(high > top, high, top) for top, high in zip(tops, highest, strict=True)])
+
+
+def change_by_step(before: Array, figures: Array, after: Array) -> Array:
+    """Of figures by one step, from those a step before and after, (row,): half their difference; where two corners are
+    as high, as of a crank that turns past a load both ways, one rises as the other falls, and it is the larger of both.
+    """
+    ahead, behind = after - figures, figures - before
+    larger = np.where(np.abs(ahead) >= np.abs(behind), ahead, behind)
+    return np.where(np.abs(ahead - behind) > KINK * np.abs(larger), larger, (ahead + behind) / 2)
 
 
 def _figure(known: Reference, tops: Sequence[Array]) -> Array:

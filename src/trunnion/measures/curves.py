@@ -20,7 +20,7 @@ from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
-from trunnion.solve.loads import springs, useful_powers
+from trunnion.solve.loads import SpringState, springs, useful_powers
 from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.space.motion import SpatialWalk
 
@@ -108,6 +108,20 @@ def joint_acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, .
     return (walk.second_rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
 
 
+def spring_elongation(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
+    """Length or angle of a spring beyond its free one, m or rad."""
+    return (_spring(measure, walk).elongation,)
+
+
+def _spring(measure: MotionRequest, walk: Forward) -> SpringState:
+    return next(state for name, _, state in springs(walk) if name == measure.subject)
+
+
+def spring_force(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
+    """Pull of a spring and its damper, N, or torque, N m."""
+    return (_spring(measure, walk).force,)
+
+
 # ---- of the forces --------------------------------------------------------------------------------------------
 
 
@@ -127,16 +141,6 @@ def load(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     moving = primal(speed) != 0
     xp = namespace(speed)
     return (-back.load_powers[measure.subject] / xp.where(moving, speed, np.nan),)
-
-
-def spring_force(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """Pull of a spring and its damper, N, or torque, N m."""
-    return (back.springs[measure.subject].force,)
-
-
-def spring_elongation(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Length or angle of a spring beyond its free one, m or rad."""
-    return (next(state for name, _, state in springs(walk) if name == measure.subject).elongation,)
 
 
 def reaction(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:

@@ -156,7 +156,7 @@ MEASURES: dict[str, MeasureKind] = {
     ),
     "spring_force": MeasureKind(
         "spring whose pull is watched, negative where it pushes; in a joint that turns its torque",
-        "force or torque of a spring", EFFORT, "spring", "forces",
+        "force or torque of a spring", EFFORT, "spring", "motion",
     ),
     "spring_elongation": MeasureKind(
         "spring, how far it is beyond its free length or angle", "elongation of a spring", MOTION, "spring", "motion",

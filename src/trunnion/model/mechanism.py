@@ -234,7 +234,8 @@ class Mechanism(Numbers):
             return self.parameter_set.resolve(name)
         except MechanismError:
             found = self._unstated(name)
-            if not found and (path := not_stated(self, name)):
+            part = any(f".{name}." in f".{one}" for one in self.parameter_set.entries)  # of which some number is stated
+            if not found and not part and (path := not_stated(self, name)):
                 remedy = "write it into the model file: then this name changes it"
                 raise MechanismError(Finding(f"the model states no {path}", name, remedy)) from None
             if not found:

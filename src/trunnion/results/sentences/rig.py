@@ -261,7 +261,7 @@ IDENTIFY = {
     ),
     "fit.few_positions": Sentence(
         ERROR,
-        "{positions:#position} with data for {unknowns}{out_told}: they cannot be told apart",
+        "{positions:#position} with data for {unknowns}{out_told}: they are not separately identifiable",
         "state more positions: in the mapping, add channels, or identify fewer parameters",
     ),
     "parameter.no_effect": Sentence(

@@ -154,7 +154,7 @@ def signal(
     _stuck(where, part, time, span, account)
     _plateaus(where, part, time, wide, span, limit, account)
     near = slice(max(span.low - span.beside, 0), span.high + span.beside)
-    _spikes(where, readings[near], seconds[near], span.low - near.start, wide, span, account)
+    _spikes(where, readings[near], seconds[near], wide, span, account)
 
 
 def _leave_out(part: Array, mask: Mask) -> None:
@@ -317,16 +317,8 @@ def _stuck(where: str, part: Array, time: Array, span: FaultSpan, account: Accou
     account.warn("data.readings.stuck", where, f"{what}; {_doubtful(part, bad, span)}", "check sensor and logger")
 
 
-def _between(known: Array, at: int) -> bool:
-    """Whether a reading lies between those before it and after it, as where the drive starts or stops."""
-    before, after = known[max(at - WIDTH, 0) : at], known[at + 1 : at + 1 + WIDTH]
-    if not before.size or not after.size:
-        return False
-    return bool((known[at] - np.median(before)) * (known[at] - np.median(after)) <= 0)
-
-
-def _spikes(where: str, part: Array, time: Array, first: int, wide: float, span: FaultSpan, account: Account) -> None:
-    """One to three readings far from the median of those around them; first: row at which the turns begin."""
+def _spikes(where: str, part: Array, time: Array, wide: float, span: FaultSpan, account: Account) -> None:
+    """One to three readings far from the median of those around them."""
     finite = np.isfinite(part)
     if np.count_nonzero(finite) < 2 * WIDTH:
         return
@@ -337,9 +329,6 @@ def _spikes(where: str, part: Array, time: Array, first: int, wide: float, span:
     spread = 1.4826 * float(np.median(off))
     usual = float(np.percentile(off, 99))
     far = off > max(FAR * spread, 2.5 * usual, SEEN * wide)
-    row = np.flatnonzero(finite) - first
-    for at in np.flatnonzero(far & ((row < 0) | (row >= span.high - span.low))):
-        far[at] = not _between(known, int(at))
     if _own(int(runs(far)[0].size), span):
         return
     bad = np.zeros(part.size, dtype=np.bool_)

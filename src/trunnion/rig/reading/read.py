@@ -131,11 +131,13 @@ def _distinct(conditions: Sequence[Condition]) -> list[Condition]:
 
 @dataclass(frozen=True)
 class _Part:
-    """One condition of a file: its setting, its turns and the courses of the channels, (turn, position)."""
+    """One condition of a file: its setting, its turns, the courses of the channels, (turn, position), and by channel
+    what of the error by steps its turns repeat."""
 
     setting: Setting
     turns: Turns
     courses: dict[str, Array]
+    left: dict[str, LeftOfSteps]
 
 
 class _File:
@@ -159,7 +161,7 @@ class _File:
         self.angle: Array | None = None  # of the driver by row, rad
         self.readings: dict[str, Array] = {}
         self.beyond: dict[str, faults.BeyondRange] = {}
-        self.steps: dict[str, tuple[float, LeftOfSteps | None]] = {}  # SI, and what of it turns repeat
+        self.steps: dict[str, float] = {}  # SI
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
@@ -197,7 +199,7 @@ class _File:
             return []
         self._check_rows(cuts)
         self._check_zeros(cuts, share)
-        parts = [_Part(setting, turns, {}) for setting, turns in cuts]
+        parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
         drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
         if not mapping.timed:
@@ -360,7 +362,7 @@ class _File:
         if mapping.filter is None:
             rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
             noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
-        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2), None  # more noise carries it over them
+        self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over them
         if step and noise < step / 2:
             self._check_repeated(name, step, noise, parts, readings, max(scatters))
         if speed:  # one that creeps is the drive's
@@ -391,9 +393,10 @@ class _File:
         """How much of the error by steps, in readings, all turns repeat; it is told where it counts beside scatter."""
         own = self.own[name]
         size, (unit, in_si) = abs(own.scale.factor) * step, shown(own)
-        found = left_in_turns([(one.turns, one.courses[name] / size) for one in parts], readings / step, noise / step)
-        self.steps[name] = size, found
-        if told := found.told(scatter / step, size / in_si, unit):
+        for part in parts:
+            part.left[name] = left_in_turns(part.turns, part.courses[name] / size, readings / step, noise / step)
+        most = max((part.left[name] for part in parts), key=lambda one: one.share)
+        if told := most.told(scatter / step, size / in_si, unit):
             remedy = "sample at a rate that is no multiple of the turns"
             self.account.note("data.turns.same", f"channels.{name}", told, remedy)
 
@@ -412,14 +415,13 @@ class _File:
             extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
-            step, repeats = self.steps[name]
-            accuracy = Accuracy(zero, own.accuracy_gain, step, of_file)
+            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
             nothing = None
             if isinstance(channel.zero, Amount):
                 nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
             course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
-            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=repeats))
+            courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=part.left.get(name)))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
         speed = np.nan if self.mapping.timed else way * self._rate([part.turns])
         for path, channel_name in part.setting.means.items():

@@ -9,7 +9,6 @@ Over all places in a step its mean square is q²/(2π²) Σ exp(−4π²k²σ²/
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,22 +57,21 @@ class LeftOfSteps:
         return f"{what}: averaging over turns leaves ± {left} of each reading"
 
 
-def left_in_turns(parts: Sequence[tuple[Turns, Array]], readings: Array, noise: float) -> LeftOfSteps:
+def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) -> LeftOfSteps:
     """How much of the error by steps is the same in all turns.
 
-    parts: turns with the course of each, (turn, position), and readings, one a row of the file, all in steps; noise:
-    scatter of the readings from row to row, with the error by steps in it unless the course stays within one.
+    course: (turn, position); readings: one a row of the file; both in steps; noise: scatter of the readings from row to
+    row, in steps, with the error by steps in it unless the course stays within one.
     """
-    share = float(np.mean([in_step(*one) for one in parts]))
-    ways = (k for k in range(1, MOST_TURNS + 1) if np.mean([in_step(*one, k) for one in parts]) > ALIKE)
-    if every := next(ways, 0):
-        squares = np.concatenate([_turns_later(turns, readings, every) ** 2 for turns, _ in parts])
+    share = in_step(turns, course)
+    if every := next((k for k in range(1, MOST_TURNS + 1) if in_step(turns, course, k) > ALIKE), 0):
+        squares = _turns_later(turns, readings, every) ** 2
         noise = noise_before(float(np.sqrt(np.mean(squares) / 2))) if squares.size else 0.0
     else:
         noise = float(np.sqrt(max(noise**2 - 1 / 12, 0.0)))
-    turn = [float(np.median(turns.end - turns.begin)) / turns.line.step for turns, _ in parts]
+    samples = float(np.median(turns.end - turns.begin)) / turns.line.step
     found = float(np.sqrt(share * left_of_steps(noise)))
-    return LeftOfSteps(found, noise, max(one[0].numbers.size for one in parts), float(np.mean(turn)), every)
+    return LeftOfSteps(found, noise, turns.numbers.size, samples, every)
 
 
 def _turns_later(turns: Turns, readings: Array, every: int) -> Array:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
-__all__ = ["beyond_first_order", "exact_changes", "figures_with"]
+__all__ = ["beyond_first_order", "exact_changes", "moved_figure"]
 
 Array = NDArray[np.float64]
 SLIGHT, GRAVE = (
@@ -42,30 +42,38 @@ SLIGHT, GRAVE = (
 def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
     """Changes of a measure, (side, position), with the pins at the worst of first order, and what that has of them.
 
-    at: numbers of the positions. Of an extreme the change is that of the extreme, wherever the pins move its place.
+    at: numbers of the positions; of an extreme the change is that of the extreme, wherever it moves. Pins lie on
+    the link on which they do more, if the model does not say which.
     """
-    measure, first = effect.measures[i], np.zeros(len(at))
+    run, measure, first = effect.run, effect.measures[i], np.zeros(len(at))
     offsets: tuple[dict[str, Array], dict[str, Array]] = {}, {}
     for j, (name, one) in enumerate(effect.plays.items()):
-        moved = HOLE if measure.kind in MOTIONS else carriers_of(effect.run.system.mechanism, name)[0]
-        for k, (end, radius) in enumerate(zip(one.model.ends, one.radii, strict=True)):
-            load = {key: effect.loads[i, j, k, "xyz".index(key.rpartition(".")[2]), at] for key in end}
-            size = np.sqrt(np.sum([part**2 for part in load.values()], axis=0))
-            scale = np.asarray(primal(radius), float) / np.where(size > 0, size, np.inf)
-            first = first + scale * size**2
-            for side, own in zip((-1.0, 1.0), offsets, strict=True):
-                own |= {f"{moved}.{name}.{key}": side * scale * part for key, part in load.items()}
-    if effect.figure is None:
-        found = np.array([_value(effect.run, measure, effect.time[at], own) for own in offsets]) - effect.value[i, at]
+        carriers = (HOLE,) if measure.kind in MOTIONS else carriers_of(run.system.mechanism, name)
+        radii = np.array([np.broadcast_to(np.asarray(primal(radius), float), at.shape) for radius in one.radii])
+        both = np.array([loads[i, j][: len(radii), :, at] for loads in (effect.loads, effect.others)[: len(carriers)]])
+        size = np.sqrt(np.nansum(both**2, axis=2))  # (carrier, end, position)
+        work = np.sum(radii * size, axis=1)
+        first = first + np.max(work, axis=0)
+        here = np.argmax(work, axis=0) == np.arange(len(carriers))[:, None]
+        places = np.nan_to_num(
+            both * np.where(here[:, None], radii / np.where(size > 0, size, np.inf), 0.0)[:, :, None]
+        )
+        for carrier, place in zip(carriers, places, strict=True):
+            for parts, end in zip(place, one.model.ends, strict=True):
+                own = {f"{carrier}.{name}.{key}": parts["xyz".index(key.rpartition(".")[2])] for key in end}
+                offsets[0].update((path, -part) for path, part in own.items())
+                offsets[1].update(own)
+    if effect.moved is None:
+        found = np.array([_value(run, measure, effect.time[at], own) for own in offsets]) - effect.value[i, at]
     else:
-        sides = {path: np.stack([own[path] for own in offsets]) for path in offsets[0]}
-        found = (effect.figure(sides) - effect.figure({}))[:, None]
-    if measure.turning(effect.run.system):
+        both_ways = {path: np.stack([own[path] for own in offsets]) for path in offsets[0]}
+        found = (effect.moved(both_ways) - effect.moved({}))[:, None]
+    if measure.turning(run.system):
         found = found - 2 * np.pi * np.round(found / (2 * np.pi))
     return found, first
 
 
-def figures_with(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
+def moved_figure(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
     """An extreme, (sample,), with pins at offsets by path, m, (sample, 1); at a corner if it is at one."""
     values = {**kernel.run.values, **offsets}
     curve = kernel.courses(values, places.times)[0][one.measure.name]
@@ -114,7 +122,7 @@ def beyond_first_order(effect: Effect, i: int) -> Iterator[Finding]:
             "play.beyond_first_order", where, severity=severity, exact=float(exact[at]), first=largest, unit=unit,
             percent=100 * over, at=dial.at(int(places[at])),
         )  # fmt: skip
-    elif np.any(np.abs(both[:, there]) < (1 - GRAVE) * own[there]):
+    elif np.all(np.isfinite(both[:, there])) and np.any(np.abs(both[:, there]) < (1 - GRAVE) * own[there]):
         low, high = np.sort(both[:, there]).tolist()
         yield finding_for(
             "play.below_first_order", where, low=low, high=high, first=largest, unit=unit, at=dial.at(top)

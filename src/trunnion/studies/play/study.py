@@ -31,7 +31,7 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.corners import switch, with_corner
+from trunnion.measures.corners import change_by_step, switch, with_corner
 from trunnion.measures.evaluation import NumpyKernel, looking
 from trunnion.measures.figures import Reference, moment, reference
 from trunnion.measures.measures import Measure, named, outputs
@@ -49,7 +49,7 @@ from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order, figures_with
+from trunnion.studies.play.exact import beyond_first_order, moved_figure
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -108,13 +108,13 @@ def by_duals(
 def of_corner(
     kernel: NumpyKernel, places: PositionPlan, one: Reference, known: Mapping[str, Play], carrier: str = HOLE
 ) -> Loads:
-    """The same of an extreme at a corner of the course, which moves with the pins: by central differences."""
+    """The same of an extreme at a corner of the course, which moves with the pins: by differences."""
     rows = _offsets(known, carrier)
     step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
-    above, below = (
-        figures_with(kernel, places, one, {path: way * step * row for path, row in rows.items()}) for way in (1.0, -1.0)
-    )
-    return _by_end(known, (above - below)[:, None] / (2 * step))
+    figures = [
+        moved_figure(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)
+    ]
+    return _by_end(known, change_by_step(*figures)[:, None] / step)
 
 
 def _offsets(known: Mapping[str, Play], carrier: str) -> dict[str, Array]:
@@ -238,7 +238,7 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
             loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)
             there = replace(there, corner=(sharp.figure, one.figure))
-        found[measure.name] = replace(there, figure=partial(figures_with, kernel, places, sharp))
+        found[measure.name] = replace(there, moved=partial(moved_figure, kernel, places, sharp))
     return found
 
 
@@ -263,9 +263,10 @@ def _over(
     steps = len(time)
     shape = (len(measures), len(known), steps)
     ends = max(len(play.model.ends) for play in known.values())
+    loads, others = np.full((2, len(measures), len(known), ends, 3, steps), np.nan)
     effect = Effect(
-        run, measures, known, time, np.zeros((len(measures), steps)), np.zeros(shape), np.zeros(shape),
-        np.full((len(measures), len(known), ends, 3, steps), np.nan), np.zeros(steps, np.int8),
+        run, measures, known, time, np.zeros((len(measures), steps)), np.zeros(shape), np.zeros(shape), loads, others,
+        np.zeros(steps, np.int8),
     )  # fmt: skip
     rates = np.zeros((len(measures), steps))
     for low in range(0, steps, CHUNK):
@@ -328,10 +329,10 @@ def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.
         most = np.maximum(most, worst_case(others[name], one.radii)) if name in others else most
         effect.worst_case[i, j, window] = np.where(known, most, np.nan)
         effect.deviation[i, j, window] = np.where(known, np.sqrt(variance(loads[name], one.radii)), np.nan)
-        for k, (end, load) in enumerate(zip(one.model.ends, loads[name], strict=True)):
-            for key, part in zip(end, load, strict=True):
-                axis = "xyz".index(key.rpartition(".")[2])
-                effect.loads[i, j, k, axis, window] = np.where(known, part, np.nan)
+        for of, kept in ((loads, effect.loads), (others, effect.others)):
+            for k, (end, load) in enumerate(zip(one.model.ends, of.get(name, ()), strict=False)):
+                for key, part in zip(end, load, strict=True):
+                    kept[i, j, k, "xyz".index(key.rpartition(".")[2]), window] = np.where(known, part, np.nan)
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------

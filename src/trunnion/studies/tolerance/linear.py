@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
+from trunnion.measures.corners import change_by_step
 from trunnion.measures.evaluation import NumpyKernel, at_corner
 from trunnion.measures.figures import Reference, figure, shown, span
 from trunnion.measures.measures import Measure
@@ -102,7 +103,7 @@ def _courses(
 def _at_corner(
     kernel: NumpyKernel, plan: PositionPlan, effects: Effects, values: Mapping[str, Number], known: Reference
 ) -> tuple[Array, Array]:
-    """A figure at a corner of the course and its derivatives, (row,): central differences, as the corner moves too."""
+    """A figure at a corner of the course and its derivatives, (row,): differences, as the corner moves too."""
     alone = replace(kernel, measures=[known.measure])
     step = _steps(effects)
 
@@ -114,8 +115,8 @@ def _at_corner(
     middle, moving = figures(0.0), step > 0
     if not np.any(moving):
         return middle, 0.0 * step
-    change = figures(1.0) - figures(-1.0)
-    return middle, np.divide(change, 2 * step, out=np.zeros_like(change), where=moving)
+    found = change_by_step(figures(-1.0), middle, figures(1.0))
+    return middle, np.divide(found, step, out=np.zeros_like(found), where=moving)
 
 
 def _steps(effects: Effects) -> Array:

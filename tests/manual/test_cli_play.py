@@ -14,6 +14,7 @@ import xarray as xr
 import trunnion
 from manual.conftest import Outcome, Run
 from played import four_bar
+from trunnion.results.attributes import summary_of
 from trunnion.views.play.figure import figure
 from trunnion.views.play.tables import tables
 
@@ -120,7 +121,7 @@ def test_one_position_and_no_answer_are_drawn_and_told() -> None:
 
 
 def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
-    """The table has the whole cycle; a measure with a place has its figure there beside it."""
+    """The table and the summary of a measure with a place have its figure there."""
     model = tmp_path / "model.yaml"
     text = (EXAMPLES / "fourbar-with-play.yaml").read_text(encoding="utf-8")
     assert "measures:" not in text
@@ -131,6 +132,10 @@ def test_a_place_and_joints_without_effect_are_told(tmp_path: Path) -> None:
     findings = {one.code: one for one in result.trunnion.findings}
     there = float(result["worst_case_total"].sel(measure="place").isel(position=2))  # 90° of 0°, 45°, 90° …
     assert findings["play.at_a_place"].figures["worst"] == pytest.approx(there, rel=1e-9)
+    assert float(result["extreme_worst_case"].sel(measure="place").sum()) == pytest.approx(there, rel=1e-9)
+    assert there < float(result["worst_case_total"].sel(measure="place").max())
+    assert summary_of(result)[0].value == pytest.approx(there, rel=1e-9)
+    assert tables(result)[0].title == "place, at 90°"
     assert findings["play.no_effect"].figures["measure"] == "held"
 
 

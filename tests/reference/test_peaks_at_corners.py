@@ -115,6 +115,39 @@ def test_the_worst_case_found_includes_a_play() -> None:
         assert float(result[key][0]) == pytest.approx(worst, rel=0.01)
 
 
+def loose(play: float, crank: float = 301.3) -> trunnion.Mechanism:
+    """Play between rod and ram, m; the load begins at a crank angle, deg, a hair before it."""
+    angle = np.radians(crank)
+    start = R * np.cos(angle) + np.sqrt(L**2 - (R * np.sin(angle)) ** 2) - 1e-9
+    joints = {**model().data()["joints"]}
+    joints["Q"] = {**joints["Q"], "pin": {"radius": "20 mm", "clearance": play}}
+    return model(joints=joints, dimensions={**model().data()["dimensions"], "x0": float(start)})
+
+
+@pytest.mark.parametrize("steps", [72, 73, 90])
+@pytest.mark.parametrize("crank", [300.0, 301.3])
+def test_play_changes_the_peak_itself_not_the_torque_at_one_crank_angle(crank: float, steps: int) -> None:
+    """At that angle there is all of the load or none; first order is right where the play is small."""
+    result = trunnion.play(loose(1e-5, crank), ["peak"], steps)
+    assert not {one.code for one in result.trunnion.findings if one.code.endswith("_first_order")}
+    assert float(result["extreme_time"][0]) == pytest.approx(((crank - 180) % 360) / 360, abs=1e-7)
+
+
+def test_pins_in_a_large_play_change_the_peak_by_what_the_triangle_says() -> None:
+    """The pin anywhere at the rim of its hole, the triangle of crank and rod being closed there."""
+    play = 3e-3
+    result = trunnion.play(loose(play), ["peak"], 72)
+    (found,) = [one.figures for one in result.trunnion.findings if one.code.endswith("_first_order")]
+    begin = loose(play).data()["dimensions"]["x0"]
+    rim = np.linspace(0, 2 * np.pi, 3601)
+    x, y = begin + play * np.cos(rim), play * np.sin(rim)
+    far = np.hypot(x, y)
+    angle = np.arctan2(y, x) - np.arccos((far**2 + R**2 - L**2) / (2 * R * far))
+    up = R * np.sin(angle) - y
+    torque = FORCE * R * (-np.sin(angle) - np.cos(angle) * up / np.sqrt(L**2 - up**2))
+    assert found["exact"] == pytest.approx(np.max(np.abs(torque - peak(x0=begin))), rel=0.01)
+
+
 def test_an_allocation_keeps_the_yield_that_the_formula_has() -> None:
     costs = {name: {"model": "power", "B": 1, "k": 0.5, "unit": "mm", "most": "0.2 mm"} for name in LIMIT}
     room = 3.5 * float(np.sqrt(sum((slope(name) * limit / 3) ** 2 for name, limit in LIMIT.items())))

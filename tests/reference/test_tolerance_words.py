@@ -173,5 +173,19 @@ def test_pins_that_are_pressed_to_one_side_throughout_are_told(swing: int, load:
         loads={"weight": {"link": "lever", "at": "P", "force": [0, load]}},
     )
     found = tolerance(model, ["lever.P.y"], methods=("linear",), steps=12).trunnion.findings
-    told = [one.figures["joints"] for one in found if one.code == "tolerance.pressed"]
-    assert told == ([["A"]] if pressed else [])
+    told = [one for one in found if one.code == "tolerance.pressed"]
+    assert [one.figures["joints"] for one in told] == ([["A"]] if pressed else [])
+    assert all("one side of their holes, at every position;" in one.what for one in told)
+
+
+def test_where_pins_are_pressed_that_a_load_presses_for_a_part_of_the_way_is_told() -> None:
+    model = Mechanism(
+        trunnion=1,
+        links={"ground": {"points": {"A": [0, 0]}}, "lever": {"points": {"A": [0, 0], "P": [1, 0]}}},
+        joints={"A": {**revolute("ground", "lever"), "pin": {"clearance": 1e-4}}},
+        drivers={"A": {"speed": 1.0, "range": ["0 deg", "40 deg"]}},
+        loads={"weight": {"link": "lever", "at": "P", "force": [0, "-10 N * between(drive, 10 deg, 20 deg)"]}},
+    )
+    found = tolerance(model, ["lever.P.y"], methods=("linear",), steps=12).trunnion.findings
+    (told,) = [one for one in found if one.code == "tolerance.pressed"]
+    assert "one side of their holes, wherever they are loaded: between 10" in told.what

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 import typer
 import xarray as xr
+from as_built_models import EXAMPLES
 from matplotlib.axis import Tick
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
 from stand_in_tolerances import CASES, LIMIT, QUANTILES, at_one_position, gap, odd_names, toleranced
 
+import trunnion
 from trunnion.cli.result import check_files
 from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
@@ -409,3 +411,11 @@ def test_a_unit_of_two_words_is_not_broken():
     assert read.say(read.nominal).endswith("\u00a0kN\u00a0m")
     cells = [cell for table in tables(result) for row in table.rows for cell in row]
     assert not [cell for cell in cells if "N m" in cell]
+
+
+def test_a_measure_that_is_undefined_has_a_row_that_says_so():
+    data = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml").data()
+    data["measures"] = {"least": {"angle": "rocker", "as": "minimum"}}
+    data["dimensions"] = {**data["dimensions"], "l2": "200 mm"}
+    (table,) = tables(trunnion.tolerance(trunnion.Mechanism(**data), ["least"], methods=("linear",), steps=12))
+    assert table.rows == [["nominal", "undefined"]]

@@ -25,13 +25,14 @@ from trunnion.solve.system import Cycle
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Sides", "change_by_step", "extreme", "raised", "sides_of", "with_corner"]
+__all__ = ["Sides", "change_by_step", "extreme", "raised", "sides_of", "switch", "with_corner"]
 
 Array = NDArray[np.float64]
 Look = Callable[[Array], Array]  # from times in the cycle, s, to the course there, both (row, place)
 SIGNS = {"maximum": (1.0,), "minimum": (-1.0,), "largest": (1.0, -1.0), "peak-to-peak": (1.0, -1.0)}
 ROUNDS, PARTS = 12, 4  # of either gap about the best place in a round; the next one takes the two about its best
 BESIDE = 1e-9  # of the cycle: on the sides of a place at which the model switches
+SAME = 1e-6  # of the range of a course: figures that are one
 REACH, ALIKE = 3.5, 1e-6  # steps that a polynomial reaches; of the range of a course: what it may be off
 TOPS, NEAR = 3, 0.02  # places that are looked about, and of the range of a course what they may be lower than the best
 BENDS, LOW = 16, 0.25  # the same of the places of the nominal mechanism that are looked at in others
@@ -67,6 +68,20 @@ def with_corner(known: Reference, look: Look, run: Run) -> Reference:
         if sharp or abs(figure - known.figure) > ALIKE * np.ptp(known.parts[0]):
             return replace(corner, figure=figure)
     return replace(known, bends=tuple(bends[i] for i in np.flatnonzero(jumps & (above > -NEAR))))
+
+
+def switch(known: Reference, look: Look, run: Run, time: float) -> float:
+    """Time, s, of the place at which the model switches where the course has its figure; if there is none, as given."""
+    window, cycle = known.window, run.cycle
+    beside = (run.edges[:, None] + BESIDE * cycle.duration * np.array([-1.0, 1.0])).ravel()
+    beside = beside if window.period else beside[(beside >= window.time[0]) & (beside <= window.time[-1])]
+    if not len(beside):
+        return time
+    course = look(beside)
+    course = np.abs(course) if known.measure.rule == "largest" else course
+    off = np.nan_to_num(np.abs(course - known.figure), nan=np.inf)
+    best = int(np.argmin(off))
+    return float(beside[best]) if off[best] <= SAME * np.ptp(known.parts[0]) else time
 
 
 def _bends(

@@ -73,7 +73,8 @@ PLAY = {
     ),
     "play.at_a_place": Sentence(
         NOTE,
-        "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the table has the whole cycle",
+        "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the figure and the files show the "
+        "whole cycle besides",
     ),
     "play.at_an_extreme": Sentence(
         NOTE,
@@ -83,8 +84,8 @@ PLAY = {
     "play.beside_jump": Sentence(
         NOTE,
         "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
-        "positions ({figure:~{unit}}; {coarse:~{unit}} at the positions); what play does to the place of the corner is "
-        "included",
+        "positions ({figure:~~{unit}}; {coarse:~~{unit}} at the positions); what play does to the place of the corner "
+        "is included",
     ),
     "play.no_effect": Sentence(
         NOTE,
@@ -192,8 +193,8 @@ TOLERANCE = {
     ),
     "tolerance.pressed": Sentence(
         NOTE,
-        "the loads press the pins of {joints} to one side of their holes throughout; nominal value, mean and scatter "
-        "are about pins in the middle of their holes",
+        "the loads press the pins of {joints} to one side of their holes, {where}; nominal value, mean and scatter are "
+        "about pins in the middle of their holes",
         "`trunnion analyse --seat loaded` has the effect; pins that lie so in every piece: state seat: {{xi: …}}",
     ),
     "tolerance.correlations_left_out": Sentence(
@@ -228,7 +229,8 @@ TOLERANCE = {
     "tolerance.corner": Sentence(
         NOTE,
         "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
-        "positions (nominal {figure:~{unit}}; {coarse:~{unit}} at the positions); the motion of the corner is included",
+        "positions (nominal {figure:~~{unit}}; {coarse:~~{unit}} at the positions); the motion of the corner is "
+        "included",
     ),
     "tolerance.impossible": Sentence(
         WARNING, "its tolerance includes {value:~{unit}}, which no model may have: {why}", "narrow the tolerance"

@@ -27,7 +27,9 @@ TRIALS = 12
 HIGHEST = 8.0  # standard score that is looked at
 CHECKS = 4  # by fresh samples, each with a margin that the one before has raised
 STEP = 1.0  # of z, at most, after one sampling
-AIMS = {"share": 0.5, "low": 1.25, "high": -0.75}  # of half an interval: where the share is aimed at
+WORTH = 0.02  # of the cost: a saving that is worth one more sampling
+LEAST = 1e-3  # in standard scores: how much more is asked at least after fresh samples have missed the target
+AIMS = {"share": 0.25, "high": -0.75}  # of half an interval: where the share is aimed at
 CLOSE = 1e-3  # of z: two choices of processes that lie closer are neighbours
 
 
@@ -36,8 +38,8 @@ class Samples:
     """How half widths are judged, see `meet`.
 
     reserve: the narrowest half widths as an allocation, taken where all others miss; None without such. by: what of a
-    sampled yield has to meet the target: its share, and the lower or the upper end of its interval where first order
-    says that the target cannot be met, or where it can be, but too closely for samples to tell.
+    sampled yield has to meet the target: its share, or the upper end of its interval where first order says that the
+    target can be met, but too closely for samples to tell.
     """
 
     target: float
@@ -45,7 +47,7 @@ class Samples:
     verify: Verify
     check: Check | None
     reserve: Answer | None
-    by: Literal["share", "low", "high"] = "share"
+    by: Literal["share", "high"] = "share"
 
     def level(self, sampled: SampledYield | None) -> float:
         """What of a sampled yield has to meet the target."""
@@ -78,44 +80,76 @@ class Samples:
 
 
 def corrected(answer: Answer, samples: Samples) -> Answer:
-    """The same with the margin corrected by what is sampled, until the samples meet the target, and fresh ones too."""
-    low, high = 0.0, np.inf
+    """The same with the margin corrected by what is sampled, until the samples meet the target, and fresh ones too.
+
+    The margin is looked for between the widest that falls short and the narrowest that does not, until what the next
+    one would save is too little for one more sampling.
+    """
     z, problem, target = answer.problem.z, answer.problem, samples.target
     end = np.inf if problem.caps is None else furthest(problem)
-    goal, checks = score(target), 0
+    goal, checks, refused = score(target), 0, np.inf
     seen: dict[bytes, Answer] = {}
     trials: list[Trial] = []
     while len(trials) < TRIALS:
-        if answer.found:
+        if not answer.found:
+            refused = z
+        else:
             key = np.round(answer.tolerances, 15).tobytes()
             known = samples.verified(seen.get(key, answer))
             sampled = known.sampled or SampledYield(0.0, 0.0, 0.0)
             seen[key] = answer = replace(answer, sampled=sampled, checked=known.checked, expected=known.expected)
             trials.append(Trial(z, answer.cost, sampled))
-            level, spare = samples.level(sampled), sampled.share - sampled.low
-            short = score(level) < goal
-            if not short and (samples.by == "high" or score(level - spare) <= goal):
-                if samples.check is None or checks == CHECKS:
-                    break
-                checks += 1
-                seen[key] = answer = samples.checked(answer, checks)
-                if samples.holds(answer):
-                    break
-                # the fresh samples are the ones without a bias: as much more of the others as those are short of
-                goal = score(level) + max(score(target) - score(samples.level(answer.checked)), 0.0)
-                short = True
-            step = _correction(trials, goal + _above(sampled, samples))
-        else:
-            short, step = False, np.nan
-        low, high = (z, high) if short else (low, z)
-        if high - low < CLOSE or (short and z >= end):
+        after = _next(trials, goal, samples, (refused, end))
+        ahead = None if after is None else samples.solve(replace(problem, z=after))
+        if answer.found and _enough(sampled, goal, samples) and not _cheaper(ahead, answer):
+            if samples.check is None or checks == CHECKS:
+                break
+            checks += 1
+            seen[key] = answer = samples.checked(answer, checks)
+            if samples.holds(answer):
+                break
+            # the fresh samples are the ones without a bias: as much more of the others as those are short of
+            missed = max(score(target) - score(samples.level(answer.checked)), LEAST)
+            goal = score(samples.level(sampled)) + missed
+            after = _next(trials, goal, samples, (refused, end))
+            ahead = None if after is None else samples.solve(replace(problem, z=after))
+        if after is None or ahead is None:
             break
-        z = z + step
-        if not low < z < high:
-            z = (low + high) / 2 if np.isfinite(high) else low + STEP
-        z = min(z, end)
-        answer = samples.solve(replace(problem, z=z))
+        z, answer = after, ahead
     return replace(_chosen(list(seen.values()), samples, checks), trials=tuple(trials))
+
+
+def _next(trials: list[Trial], goal: float, samples: Samples, ends: tuple[float, float]) -> float | None:
+    """The margin to try next: by the line through the last trials, within the bracket; None if none is better.
+
+    ends: a margin that no half widths have, and the largest there is.
+    """
+    refused, end = ends
+    low = max((one.z for one in trials if score(samples.level(one.sampled)) < goal), default=0.0)
+    high = min((one.z for one in trials if one.z > low), default=np.inf)
+    high = min(high, refused)
+    if high - low < CLOSE or low >= end:
+        return None
+    z = np.nan
+    if trials:
+        last = trials[-1]
+        z = last.z + _correction(trials, goal + _above(last.sampled, samples))
+        if last.z == high <= z:  # it meets the goal, and by no more than is aimed at
+            return None
+    if not low < z < high:
+        z = (low + high) / 2 if np.isfinite(high) else low + STEP
+    return min(z, end)
+
+
+def _enough(sampled: SampledYield, goal: float, samples: Samples) -> bool:
+    """Whether a share meets the goal, and by no more than samples can tell."""
+    level, spare = samples.level(sampled), sampled.share - sampled.low
+    return score(level) >= goal and (samples.by == "high" or score(level - spare) <= goal)
+
+
+def _cheaper(ahead: Answer | None, answer: Answer) -> bool:
+    """Whether what could be tried next costs enough less to be sampled."""
+    return ahead is not None and ahead.found and ahead.cost < (1 - WORTH) * answer.cost
 
 
 def _chosen(seen: list[Answer], samples: Samples, checks: int) -> Answer:

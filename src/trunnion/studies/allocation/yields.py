@@ -35,6 +35,7 @@ SURE = 1e-9  # of the target, in standard scores
 EVEN = 1e-3  # of z: margins that differ less are the same
 LEAST = 1e-3  # of z: how far beside the limit of what can be it is looked for
 CLOSELY = 0.25  # of the permitted failures: if the narrowest half widths have more, samples of these are looked at
+EASED = (0.0, 0.5, 1.0)  # of what a limit can have with the narrowest half widths: margins asked of one that is short
 FEW = 0.5  # of the permitted failures: what measures fail together that are judged as normal ones
 
 
@@ -59,7 +60,7 @@ def meet(
     else:
         first = replace(_expected(problem, target, solve, reserve=reserve), floor=floor)
     if not first.found or _refused(first):
-        sure = None if verify is None else Samples(target, solve, verify, check, reserve, "low")
+        sure = None if verify is None else Samples(target, solve, verify, check, reserve)
         answer = first if sure is None else _beyond_normal(first, problem, fails, sure)
         return replace(answer, alone=fails)
     found = first
@@ -150,8 +151,9 @@ def _expected(
 def _beyond_normal(first: Answer, problem: AllocationProblem, fails: dict[str, float], samples: Samples) -> Answer:
     """Where no half widths keep the limits for normal deviations: those that samples keep, as without tails they may.
 
-    That normal deviations do not is a reason to be sure of it: luck of the samples is not enough. The measures that
-    are short get a smaller margin, however large that of the others: first none, then more.
+    That normal deviations do not is a reason to be sure of it: the narrowest half widths have to meet the target with
+    the lower end of their interval. The measures that are short get a smaller margin, however large that of the
+    others: none, then more, up to that of the others; the cheapest that meets the target is taken.
     `first` if no such allocation meets the target with samples; fails: what each measure fails with the narrowest.
     """
     reserve = samples.reserve or samples.solve(replace(problem, z=furthest(problem)))
@@ -171,19 +173,28 @@ def _beyond_normal(first: Answer, problem: AllocationProblem, fails: dict[str, f
         asked = np.where(own, np.minimum(share * caps / one.z, 1.0), 1.0)
         return samples.solve(replace(one, ratios=asked))
 
-    for share in (0.0, 0.5, 1.0):
-        begin = eased(replace(problem, z=first.problem.z), share)
-        if not begin.found:
-            continue
-        own_solve = replace(samples, solve=partial(eased, share=share), reserve=least)
-        found = corrected(begin, own_solve)
-        if not _refused(found) and samples.holds(found):
-            note = finding_for(
-                "yield.not_normal", "yield", measures=sorted(name.removeprefix("measures.") for name in short),
-                share=found.sampled.share if found.sampled else np.nan, normal=found.expected,
-            )  # fmt: skip
-            return replace(found, findings=(note,))
-    return replace(first, sampled=least.sampled) if first.found else first
+    begin = min(first.problem.z, _ends(problem, samples.target)[1])
+    ways = [replace(samples, reserve=least)]
+    if not np.all(own):
+        ways += [replace(samples, solve=partial(eased, share=share), reserve=None) for share in EASED]
+    kept = [answer for way in ways if (answer := _along(way, problem, begin)) is not None]
+    if not kept:
+        return replace(first, sampled=least.sampled) if first.found else first
+    found = min(kept, key=lambda one: one.cost)
+    note = finding_for(
+        "yield.not_normal", "yield", measures=sorted(name.removeprefix("measures.") for name in short),
+        share=found.sampled.share if found.sampled else np.nan, normal=found.expected,
+    )  # fmt: skip
+    return replace(found, findings=(note,))
+
+
+def _along(way: Samples, problem: AllocationProblem, z: float) -> Answer | None:
+    """The allocation that meets the target with samples, the margin of its problem being changed; None without one."""
+    most, begin = (way.solve(replace(problem, z=one)) for one in (furthest(problem), z))
+    if not most.found or not begin.found or way.level(way.verified(most).sampled) < way.target:
+        return None
+    found = corrected(begin, way)
+    return found if not _refused(found) and way.holds(found) else None
 
 
 def _short(fails: dict[str, float], target: float) -> set[str]:

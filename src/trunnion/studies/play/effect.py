@@ -25,8 +25,9 @@ class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
     worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position), others: the same
     with seats on the other links, where the model does not say which carry them; status. extremes: of each measure
-    whose figure is a maximum or minimum, by name, what play does to it alone at its place; corner: of such an effect at
-    a corner of its course, the figure and what the positions have of it; moved: that figure with pins at offsets.
+    whose figure is a maximum or minimum, or at a stated place, by name, what play does to it alone there; corner: of
+    such an effect at a corner of its course, the figure and what the positions have of it. figure: of a maximum or
+    minimum the extreme itself, (sample,), with pins at offsets, (sample, 1), by path.
     """
 
     run: Run
@@ -41,7 +42,7 @@ class Effect:
     status: NDArray[np.int8]
     extremes: Mapping[str, Effect] = field(default_factory=dict)
     corner: tuple[float, float] | None = None
-    moved: Callable[[Mapping[str, Array]], Array] | None = None
+    figure: Callable[[Mapping[str, Array]], Array] | None = None
 
     def of(self, i: int) -> tuple[Effect, int]:
         """Where the figure of a measure is looked for, and its number there: at its extreme, or over the cycle."""

@@ -7,7 +7,7 @@ that lie in seats can reach it; it can be less, and not the same on both sides, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity, Status
+from trunnion.measures.evaluation import NumpyKernel, at_corner
+from trunnion.measures.figures import Reference, figure
 from trunnion.measures.measures import Measure
 from trunnion.measures.motion import MOTIONS
+from trunnion.measures.positions import PositionPlan
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
-__all__ = ["beyond_first_order", "exact_changes"]
+__all__ = ["beyond_first_order", "exact_changes", "figures_with"]
 
 Array = NDArray[np.float64]
 SLIGHT, GRAVE = (
@@ -39,7 +42,8 @@ SLIGHT, GRAVE = (
 def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
     """Changes of a measure, (side, position), with the pins at the worst of first order, and what that has of them.
 
-    at: numbers of the positions. Pins lie on the link on which they do more, if the model does not say which.
+    at: numbers of the positions. Pins lie on the link on which they do more, if the model does not say which. Of an
+    extreme the change is that of the extreme, wherever the pins move its place.
     """
     run, measure, first = effect.run, effect.measures[i], np.zeros(len(at))
     offsets: tuple[dict[str, Array], dict[str, Array]] = {}, {}
@@ -59,13 +63,25 @@ def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, 
                 own = {f"{carrier}.{name}.{key}": parts["xyz".index(key.rpartition(".")[2])] for key in end}
                 offsets[0].update((path, -part) for path, part in own.items())
                 offsets[1].update(own)
-    if effect.moved is not None and effect.corner is not None:
-        found = np.array([effect.moved({path: row[:, None] for path, row in own.items()}) for own in offsets])
-        return found - effect.corner[0], first
-    found = np.array([_value(run, measure, effect.time[at], own) for own in offsets]) - effect.value[i, at]
+    if effect.figure is None:
+        found = np.array([_value(run, measure, effect.time[at], own) for own in offsets]) - effect.value[i, at]
+    else:
+        sides = {path: np.stack([own[path] for own in offsets]) for path in offsets[0]}
+        found = (effect.figure(sides) - effect.figure({}))[:, None]
     if measure.turning(run.system):
         found = found - 2 * np.pi * np.round(found / (2 * np.pi))
     return found, first
+
+
+def figures_with(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
+    """An extreme, (sample,), with pins at offsets by path, m, (sample, 1); at a corner if it is at one."""
+    values = {**kernel.run.values, **offsets}
+    curve = kernel.courses(values, places.times)[0][one.measure.name]
+    found = np.atleast_1d(np.asarray(primal(figure(curve, one)), float))
+    if not (one.corner or one.bends):
+        return found
+    course = np.broadcast_to(np.asarray(primal(curve[0]), float), (len(found), places.times.size))
+    return at_corner(kernel, places, values, one, course[:, one.window.index], found)
 
 
 def _value(run: Run, measure: Measure, time: Array, offsets: dict[str, Array]) -> Array:

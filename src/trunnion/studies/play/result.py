@@ -42,12 +42,16 @@ VARIABLES: dict[str, Variable] = {
     ),
     "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
     "extreme_worst_case": Variable(
-        ("measure", "joint"), "", "worst case of a maximum or minimum, at its place; NaN of other measures"
+        ("measure", "joint"), "", "worst case of a maximum or minimum, or a stated place, there; NaN of other measures"
     ),
     "extreme_deviation": Variable(
-        ("measure", "joint"), "", "standard deviation of a maximum or minimum, at its place; NaN of other measures"
+        ("measure", "joint"),
+        "",
+        "standard deviation of a maximum or minimum, or a stated place, there; NaN of other measures",
     ),
-    "extreme_time": Variable(("measure",), "s", "time at which a maximum or minimum is; NaN of other measures"),
+    "extreme_time": Variable(
+        ("measure",), "s", "time of a maximum or minimum, or a stated place; NaN of other measures"
+    ),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
 }
 
@@ -123,13 +127,13 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
 
 
 def _extreme_of(found: PlayEffects, measure: Measure) -> list[str]:
-    """The word for a measure's extreme and where in the cycle it is, for tables; empty of one that is none."""
+    """The word for a measure's extreme, or "value", and where in the cycle it is, for tables; empty of other ones."""
     there = found.extremes.get(measure.name)
     return [] if there is None else [measure.rule, found.run.system.dial(found.run.values, there.time).at(0)]
 
 
 def _at_extremes(found: PlayEffects) -> dict[str, Array]:
-    """What is at the places of extremes, NaN of measures that are none."""
+    """What is at the places of extremes, or stated, NaN of other measures."""
     names, count = [measure.name for measure in found.measures], len(found.plays)
     worst, deviation = (np.full((len(names), count), np.nan) for _ in range(2))
     time = np.full(len(names), np.nan)
@@ -166,7 +170,7 @@ def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
             yield Figure(*worst, None, unit)
             continue
         top = int(np.nanargmax(total))
-        aspect = "maximum" if there is None else f"of the {measure.rule}"
+        aspect = "maximum" if there is None else f"of the {measure.rule}" if measure.at is None else ""
         yield Figure(*worst, total[top], unit, aspect, f"at {of.at(top)}")
         rss, deviation = (np.sqrt(np.sum(part[k, :, top] ** 2)) for part in (own.worst_case, own.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)

@@ -31,8 +31,8 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.corners import change_by_step, with_corner
-from trunnion.measures.evaluation import NumpyKernel, at_corner, looking
+from trunnion.measures.corners import change_by_step, switch, with_corner
+from trunnion.measures.evaluation import NumpyKernel, looking
 from trunnion.measures.figures import Reference, moment, reference
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
@@ -49,7 +49,7 @@ from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order
+from trunnion.studies.play.exact import beyond_first_order, figures_with
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -111,15 +111,10 @@ def of_corner(
     """The same of an extreme at a corner of the course, which moves with the pins: by differences."""
     rows = _offsets(known, carrier)
     step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
-    figures = [_moved(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)]
+    figures = [
+        figures_with(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)
+    ]
     return _by_end(known, change_by_step(*figures)[:, None] / step)
-
-
-def _moved(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
-    """An extreme at a corner, (sample,), with pins at offsets in their holes, m, (sample, 1)."""
-    values = {**kernel.run.values, **offsets}
-    course = np.asarray(kernel.courses(values, places.times)[0][one.measure.name][0])
-    return at_corner(kernel, places, values, one, course[:, one.window.index], course[:, 0])
 
 
 def _offsets(known: Mapping[str, Play], carrier: str) -> dict[str, Array]:
@@ -214,13 +209,16 @@ def _covered(run: Run, measure: Measure) -> bool:
 
 
 def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], steps: int) -> dict[str, Effect]:
-    """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole.
+    """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole;
+    and to a measure at a stated place.
 
     To first order an extreme changes as its course does there: where the course turns back, to move along it does
     nothing. One at a corner of its course changes as the corner moves too. None of a course that does not change.
     """
     found = {}
     for measure in measures:
+        if measure.at is not None:
+            found[measure.name] = _over(run, [measure], known, plan(run, [measure], 1).times)
         if measure.rule not in EXTREMES:
             continue
         places = plan(run, [measure], steps)
@@ -231,15 +229,16 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
         time = moment(one)
         if not np.isfinite(time):
             continue
+        look = looking(kernel, places, run.values, measure)
+        sharp = with_corner(one, look, run)
+        time = switch(sharp, look, run, time) if sharp.corner else time
         time = time % run.cycle.duration if run.cycle.periodic else time
         there = _over(run, [measure], known, np.array([time]))
-        sharp = with_corner(one, looking(kernel, places, run.values, measure), run)
         if sharp.corner:
             loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)
-            moved = partial(_moved, kernel, places, sharp)
-            there = replace(there, corner=(sharp.figure, one.figure), moved=moved)
-        found[measure.name] = there
+            there = replace(there, corner=(sharp.figure, one.figure))
+        found[measure.name] = replace(there, figure=partial(figures_with, kernel, places, sharp))
     return found
 
 
@@ -439,29 +438,20 @@ def _against(run: Run, measure: Measure, limit: float, worst: float, at: str, ov
 def _places(run: Run, effect: Effect) -> Iterator[Finding]:
     """What play does at the place that a measure states, or where its extreme is: the result has the whole cycle."""
     for measure in effect.measures:
-        if measure.name in effect.extremes:
-            there = effect.extremes[measure.name]
-            if there.corner is not None:
-                figure, coarse = there.corner
-                unit, where = measure.unit(run.system), f"measures.{measure.name}"
-                yield finding_for("play.beside_jump", where, figure=figure, coarse=coarse, unit=unit)
-            worst, at = float(there.total[0, 0]), run.system.dial(run.values, there.time).at(0)
-            yield finding_for(
-                "play.at_an_extreme", f"measures.{measure.name}", measure=measure.name, at=at, worst=worst,
-                statistic=measure.rule, unit=measure.unit(run.system),
-            )  # fmt: skip
-            yield from _limit_at(run, measure, worst, at)
-        if measure.at is None:
+        if measure.name not in effect.extremes:
             continue
-        there = _over(run, [measure], effect.plays, plan(run, [measure], 1).times)
+        there, unit, where = effect.extremes[measure.name], measure.unit(run.system), f"measures.{measure.name}"
         worst = float(relied_on(there.total[0], there.status)[0])
         at = run.system.dial(run.values, there.time).at(0)
-        yield finding_for(
-            "play.at_a_place", f"measures.{measure.name}.at", measure=measure.name, at=at, worst=worst,
-            unit=measure.unit(run.system),
-        )  # fmt: skip
+        told: dict[str, Any] = {"measure": measure.name, "at": at, "worst": worst, "unit": unit}
+        if there.corner is not None:
+            figure, coarse = there.corner
+            yield finding_for("play.beside_jump", where, figure=figure, coarse=coarse, unit=unit)
+        if measure.at is not None:
+            yield finding_for("play.at_a_place", f"{where}.at", **told)
+        else:
+            yield finding_for("play.at_an_extreme", where, statistic=measure.rule, **told)
         yield from _limit_at(run, measure, worst, at)
-        yield from beyond_first_order(there, 0)
 
 
 def _idle(run: Run, effect: Effect) -> Iterator[Finding]:

@@ -35,7 +35,7 @@ __all__ = ["findings_of", "summary"]
 Array = NDArray[np.float64]
 CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
-LOOKED = 72  # positions at which loads of pins are looked at
+LOOKED = 360  # positions at which loads of pins are looked at
 UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
 ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
 SIZES = ("pin.clearance", "guide.clearance", "pin.hole_radius", "pin.radius")  # what the size of a play depends on
@@ -116,7 +116,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if loaded:
         yield finding_for("tolerance.seats_not_taken", "joints", joints=loaded)
     elif pressed := _pressed(study):
-        yield finding_for("tolerance.pressed", "joints", joints=pressed)
+        yield finding_for("tolerance.pressed", "joints", phrases={"where": pressed[1]}, joints=pressed[0])
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from shared_dimensions.findings(mechanism)
@@ -135,24 +135,30 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield finding_for("tolerance.indices_lost", count=outcome.indices.lost)
 
 
-def _pressed(study: ToleranceStudy) -> list[str]:
+def _pressed(study: ToleranceStudy) -> tuple[list[str], str] | None:
     """Of planar pins that may lie anywhere, those that the nominal loads press to one side of their holes, wherever
-    they are loaded."""
+    they are loaded, and where that is."""
     found: list[str] = []
     if study.run.system.mechanism.space != "planar" or not study.inputs.loose:
-        return found
+        return None
+    times, loaded = study.run.cycle.times(LOOKED), np.zeros(LOOKED, bool)
     with np.errstate(all="ignore"):
-        back = study.run.solve(study.run.cycle.times(LOOKED))
+        back = study.run.solve(times)
         for joint in study.inputs.loose:
             if study.run.system.joints[joint][0] != "revolute":
                 continue
             force = np.array([np.broadcast_to(primal(part), LOOKED) for part in back.on_hole(joint)[0]])
             size = np.hypot(*force)
-            ways = (force / size)[:, size > UNLOADED * np.nanmax(size, initial=0.0)]
+            pressing = size > UNLOADED * np.nanmax(size, initial=0.0)
+            ways = (force / size)[:, pressing]
             mean = np.mean(ways, axis=1) if ways.shape[1] else np.zeros(2)
             if np.min(mean @ ways, initial=np.inf) > ONE_SIDE * np.hypot(*mean) > 0:
                 found.append(joint)
-    return found
+                loaded |= pressing
+    if not found:
+        return None
+    part = "" if np.all(loaded) else "wherever they are loaded: "
+    return found, part + study.run.system.dial(study.run.values, times).intervals(np.flatnonzero(loaded))
 
 
 def _play_sizes(outcome: Outcome) -> Iterator[Finding]:

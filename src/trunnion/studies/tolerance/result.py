@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
 from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
-from trunnion.measures.figures import Reference, moment
+from trunnion.measures.corners import switch
+from trunnion.measures.evaluation import looking
+from trunnion.measures.figures import moment
 from trunnion.measures.measures import Measure
 from trunnion.model.parameters import dimension_kinds
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
@@ -37,7 +38,6 @@ Array = NDArray[np.float64]
 # `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
 # course over parameter; "drive": deg, mm or s, as `drive_unit` says
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
-BESIDE, SAME = 1e-9, 1e-6  # of the cycle: on the sides of a switch; of the range of a course: figures that are one
 VARIABLES: dict[str, Variable] = {
     "nominal": Variable(M, "", "figure of the nominal mechanism"),
     "place": Variable(M, "drive", "drive coordinate of the measure; for an extreme, the nominal one"),
@@ -221,25 +221,12 @@ def _place(found: ToleranceStudy, of: Of) -> float:
     """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
     run, known = found.run, of.reference
     time = known.window.time[of.place] if of.place >= 0 else moment(known)
-    time = _switch(found, known, time) if known.corner else time
+    if known.corner:
+        time = switch(known, looking(found.kernel, found.plan, run.values, known.measure), run, time)
     if not np.isfinite(time) or run.cycle.duration <= 0:
         return float("nan")
     time = time % run.cycle.duration if run.cycle.periodic else time
     return float(run.system.dial(run.values, np.array([time])).values[0])
-
-
-def _switch(found: ToleranceStudy, known: Reference, time: float) -> float:
-    """Time, s, of the place at which the model switches where the course has its figure; if there is none, as given."""
-    run, window = found.run, known.window
-    beside = (run.edges[:, None] + BESIDE * run.cycle.duration * np.array([-1.0, 1.0])).ravel()
-    beside = beside if window.period else beside[(beside >= window.time[0]) & (beside <= window.time[-1])]
-    if not len(beside):
-        return time
-    course = np.asarray(primal(found.kernel.courses(run.values, beside)[0][known.measure.name][0]), float)
-    course = np.abs(course) if known.measure.rule == "largest" else course
-    off = np.nan_to_num(np.broadcast_to(np.abs(course - known.figure), beside.shape), nan=np.inf)
-    best = int(np.argmin(off))
-    return float(beside[best]) if off[best] <= SAME * np.ptp(known.parts[0]) else time
 
 
 def _spread_out(found: ToleranceStudy, arrays: Sequence[Array], shape: tuple[int, ...]) -> Array:

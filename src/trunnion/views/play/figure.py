@@ -69,7 +69,7 @@ def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str,
         axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
     if "extreme_worst_case" in result and np.isfinite(there := float(np.sum(result["extreme_worst_case"].values))):
         # the curve is of the whole course, the figure of this place
-        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label="at the extreme", clip_on=False)
+        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label="at its place", clip_on=False)
     axes.set_ylim(bottom=0.0)
     frame_peak(axes, most, shown, factor, unit)
     legend(axes)

@@ -59,7 +59,7 @@ def _extremes(result: xr.Dataset) -> list[list[str]]:
 
 
 def _table_there(result: xr.Dataset, name: str, unit: str, word: str, where: str) -> TextTable:
-    """The same of a measure that is a maximum or minimum: all effects are those at its place."""
+    """The same of a measure that is a maximum or minimum, or at a stated place: all effects are those there."""
     effects, deviations = (result[f"extreme_{key}"].values for key in ("worst_case", "deviation"))
     total, rows = float(np.sum(effects)), list[list[str]]()
     for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
@@ -68,7 +68,8 @@ def _table_there(result: xr.Dataset, name: str, unit: str, word: str, where: str
     sums = total, np.sqrt(np.sum(effects**2)), np.sqrt(np.sum(deviations**2))
     for label, number in zip(SUMS, sums, strict=True):
         rows.append([label, "", quantity(float(number), unit), where, ""])
-    return TextTable(f"{name}: the {word}, at {where}", ["joint", "play", "effect ±", "at", "share"], rows)
+    title = f"{name}, at {where}" if word == "value" else f"{name}: the {word}, at {where}"
+    return TextTable(title, ["joint", "play", "effect ±", "at", "share"], rows)
 
 
 def _size(effect: float, total: float, unit: str) -> str:

@@ -70,6 +70,8 @@ def figures(read: MeasureReading) -> TextTable:
     """Nominal, worst case, RSS, deviation, range, yield and capability, a column for each method."""
     told = [(_label(read, label), tell(read)) for label, tell in FIGURES]
     rows = [(label, cells) for label, cells in told if any(cells.values())]
+    if not rows:  # findings say why
+        return TextTable(heading(read), ["", "linear"], [["nominal", "undefined"]])
     shown = [key for key in COLUMNS if any(cells.get(key) for _, cells in rows)]
     head = ["", *(_sampling(read) if key == "sampled" else COLUMNS[key] for key in shown)]
     return TextTable(heading(read), head, [[label, *(cells.get(key, "") for key in shown)] for label, cells in rows])

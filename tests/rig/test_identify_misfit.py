@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import trunnion
 from trunnion.errors import Finding
+from trunnion.views.identify.figure import figure
 from trunnion.views.identify.report import report
 
 GUIDE = "S.friction.coefficient"
@@ -136,6 +138,7 @@ def test_what_is_expected_is_the_scatter_of_what_is_used(folder: Path) -> None:
     data = replace(data, conditions=tuple(conditions))
     result = trunnion.rig.identify(trunnion.read(MODEL), data, {"mu": [GUIDE]}, ["M"])
     assert np.array_equal(np.isfinite(result["residual_after"].values[0]), used)
+    assert float(result["reduced_chi_squared"]) == pytest.approx(float(plain["reduced_chi_squared"]), rel=0.01)
     for k, mask in enumerate(used):
         assert not np.all(mask)
         turns = data.conditions[k].courses["M"].turns[:, mask]
@@ -219,6 +222,23 @@ def test_no_cause_is_named_whose_size_is_zero_within_its_uncertainty(folder: Pat
     assert np.ptp(list(told.figures["conditions"].values())) == pytest.approx(
         2 * 2 * np.pi / result.sizes["position"], rel=0.05
     )
+
+
+def test_the_legend_of_the_residuals_stands_above_the_name_of_the_condition(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = identified(folder)
+    sheet = figure(result, "residuals")
+    sheet.draw_without_rendering()
+    first = sheet.axes[0]
+    legend = first.get_legend()
+    assert legend is not None
+    title = next(one for one in first.get_children() if isinstance(one, Text) and "600 rpm" in one.get_text())
+    assert legend.get_window_extent().y0 >= title.get_window_extent().y1 - 1
+    assert len(sheet.axes) == 2 * 2
+    assert "courses" not in sheet.get_suptitle()
+    monkeypatch.setattr("trunnion.views.identify.figure.MOST_PANELS", 1)
+    assert "1 of 2 courses" in figure(result, "residuals").get_suptitle()
 
 
 def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:

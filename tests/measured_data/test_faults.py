@@ -222,7 +222,11 @@ def test_what_comes_back_every_turn_is_the_signals_own(run: Columns, tmp_path: P
 @pytest.mark.parametrize(
     ("column", "channel", "told"),
     [
-        ("T1", "torque-in", "power into input is negative in all 19 turns"),
+        (
+            "T1",
+            "torque-in",
+            "turns (-1257 W): the sign of torque-in is wrong, unless the load drives the motor",
+        ),
         ("n1", "speed-in", "the angle has the wrong sign"),
         ("T2", "brake", "power delivered to brake is negative in all 19 turns"),
     ],

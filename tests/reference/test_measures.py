@@ -125,8 +125,9 @@ def test_dead_centres_of_the_four_bar(durango: Run) -> None:
         assert np.degrees(found["least"]) % 360 == pytest.approx(14.361511563, abs=close)
 
 
-@pytest.mark.parametrize("pivots", [25, 60, 90, 300])
-def test_time_ratio_of_a_quick_return(pivots: float) -> None:
+@pytest.mark.parametrize("steps", [60, 360])
+@pytest.mark.parametrize("pivots", [25, 60, 90, 120 / 1.01, 120 / 1.0025, 120 / 1.00025, 300])
+def test_time_ratio_of_a_quick_return(pivots: float, steps: int) -> None:
     """Ram in line with the lever's pivot. Inside the crank's circle the lever turns right round (Whitworth) and stands
     along the guide at both ends of the shorter way, φ = 2 acos(d/r) of the crank; outside it rocks, φ = 2 acos(r/d).
     """
@@ -135,8 +136,33 @@ def test_time_ratio_of_a_quick_return(pivots: float) -> None:
     joint = "G" if pivots < 120 else "C"
     for law in ({"speed": "40 rpm"}, {"speed": "-3 rad/s", "start": "1 rad"}):
         run = prepare(Mechanism(**{**whitworth.data(), "drivers": {"O": law}}))
-        found = figures(run, [Measure("ratio", "time_ratio", joint)], 360)["ratio"]
-        assert found == pytest.approx((2 * np.pi - short) / short, rel=1e-7)
+        found = figures(run, [Measure("ratio", "time_ratio", joint), Measure("stroke", "stroke", joint)], steps)
+        ratio = (2 * np.pi - short) / short
+        assert found["ratio"] == pytest.approx(ratio, rel=max(1e-7, 1e-8 * ratio))
+        stroke = 200e-3 if pivots < 120 else 2 * np.arcsin(120 / pivots)
+        assert found["stroke"] == pytest.approx(stroke, rel=1e-8)
+
+
+def test_time_ratio_where_the_lever_goes_through_its_pivot() -> None:
+    """The crank as long as the pivots are apart: the lever jumps by half a turn, and there is no ratio."""
+    whitworth = trunnion.read(EXAMPLES / "whitworth-quick-return.yaml").with_values({"d": "120 mm"})
+    for steps in (60, 360):
+        assert np.isnan(figures(prepare(whitworth), [Measure("ratio", "time_ratio", "G")], steps)["ratio"])
+
+
+@pytest.mark.parametrize("short", [0.0, 1e-3, 1e-6])
+def test_time_ratio_of_a_slider_crank_that_can_just_turn(short: float) -> None:
+    """φ = asin(e/(l − r)) − asin(e/(l + r)); as the offset e nears l − r the inner dead centre becomes a sharp one."""
+    offset = trunnion.read(EXAMPLES / "offset-slider-crank.yaml")
+    r, length = (offset.parameters()[f"dimensions.{name}"] for name in "rl")
+    e = (length - r) * (1 - short) if short else 0.5 * (length - r)
+    run = prepare(offset.with_values({"e": f"{float(e)!r} m"}))
+    turn = np.arcsin(e / (length - r)) - np.arcsin(e / (length + r))
+    for steps in (60, 360):
+        found = figures(run, [Measure("ratio", "time_ratio", "S"), Measure("stroke", "stroke", "S")], steps)
+        assert found["ratio"] == pytest.approx((np.pi + turn) / (np.pi - turn), rel=1e-7)
+        ends = np.sqrt((length + r) ** 2 - e**2) - np.sqrt((length - r) ** 2 - e**2)
+        assert found["stroke"] == pytest.approx(ends, rel=1e-8)
 
 
 def test_time_ratio_is_of_a_whole_turn(durango: Run) -> None:
@@ -634,7 +660,7 @@ def test_positions_stay_with_speeds_and_starts() -> None:
     ):
         run = press(**driver)
         at = Measure("at", "rotation", "A", at=1.1)
-        grid = Measure("grid", "stroke", "C")
+        grid = Measure("grid", "slide", "C")
         positions = plan(run, [at, grid], 36)
         values = run.system.mechanism.parameters({path: value * change})
         times = positions.moved(values)

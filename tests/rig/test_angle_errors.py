@@ -13,6 +13,7 @@ import yaml
 
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
+from trunnion.cli.identify import _write_model
 from trunnion.rig.reading.measurement import Accuracy
 from trunnion.rig.reading.read import read_measured
 from trunnion.rig.reading.units_taken import read_as
@@ -161,17 +162,17 @@ def test_a_channel_that_is_not_used_is_judged_by_its_shape(tmp_path: Path, lengt
         assert np.degrees(one.figures["expected"]) == pytest.approx(scatter, rel=0.1)
 
 
-def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:
-    """Half a step of 0.1° is √3 of its standard uncertainty: one error, which three files tell better than one."""
+def in_steps(folder: Path, zero: float = 0.0, noise: float = 0.05) -> Any:
+    """Three files whose angle, cut off to 0.1°, reads so much too little, deg; noise of the torque, N m."""
     files = []
     for name, rpm in (("a", 61.3), ("b", 122.7), ("c", 203.9)):
         random = np.random.default_rng(round(rpm))
         time = np.arange(int(12.5 * 60 / rpm * 1000)) / 1000
         crank = 2 * np.pi * rpm / 60 * time
         slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
-        read = np.floor(10 * np.degrees(crank)) / 10
-        columns = np.column_stack([time, read, 20 * np.abs(slope) + random.normal(0, 0.05, time.size)])
-        np.savetxt(tmp_path / f"{name}.csv", columns, "%.5f", ",", header="t,a,M", comments="")
+        read = np.floor(10 * (np.degrees(crank) - zero)) / 10
+        columns = np.column_stack([time, read, 20 * np.abs(slope) + random.normal(0, noise, time.size)])
+        np.savetxt(folder / f"{name}.csv", columns, "%.5f", ",", header="t,a,M", comments="")
         files.append({"file": f"{name}.csv", "set": {"A.speed": f"{rpm} rpm"}})
     stated = {
         "trunnion-data": 1,
@@ -180,10 +181,29 @@ def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> 
         "angle": {"from": "column", "column": "a", "unit": "deg", "resolution": "0.1 deg"},
         "channels": {"M": RATES["M"]},
     }
-    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(stated))
-    data = read_measured(tmp_path / "mapping.yaml")
+    (folder / "mapping.yaml").write_text(yaml.safe_dump(stated))
     model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
-    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    return trunnion.rig.identify(model, read_measured(folder / "mapping.yaml"), ["brake.resisting_torque"])
+
+
+@pytest.mark.parametrize("noise", [0.05, 1.0])
+def test_a_wrong_zero_of_the_angle_is_not_taken_for_half_a_step(tmp_path: Path, noise: float) -> None:
+    """1.4° are 48 standard uncertainties of half a step: an error, also where noise hides most of the misfit."""
+    result = in_steps(tmp_path, 1.4, noise)
+    told = {one.code: one for one in result.trunnion.findings}
+    assert (float(result["reduced_chi_squared"]) > 9) == (noise < 1)
+    assert np.all(np.abs(result["sensor_error"].values) <= np.sqrt(3) + 1e-9)
+    assert told["fit.misfit"].severity == "error"
+    assert told["fit.cause"].figures["kind"] == "shift"
+    assert np.degrees(told["fit.cause"].figures["size"]) == pytest.approx(1.45, abs=0.1)  # and half a step, cut off
+    table = sensors(result)
+    assert table is not None
+    assert re.fullmatch(r"\S+ ± \S+ °", next(row[1] for row in table.rows if row[0].startswith("angle in steps")))
+
+
+def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> None:
+    """Half a step of 0.1° is √3 of its standard uncertainty: one error, which three files tell better than one."""
+    result = in_steps(tmp_path)
     names = [str(one) for one in result["sensor"].values]
     assert names.count("angle in steps of 0.1 deg") == 1
     at = names.index("angle in steps of 0.1 deg")
@@ -194,14 +214,34 @@ def test_angles_that_are_cut_off_are_late_alike_in_all_files(tmp_path: Path) -> 
     assert np.isnan(float(result["sensor_size"][at]))  # in seconds it is another one at each speed
 
 
-def test_the_zero_of_a_sensor_is_told_in_its_unit(tmp_path: Path) -> None:
-    data = braked(tmp_path, 0.0)
+def with_zero(folder: Path, offset: float, zero: float) -> Any:
+    """Identified from a torque that is off, with the stated standard uncertainty of its zero, N m."""
+    data = braked(folder, 0.0)
     (one,) = data.conditions
     torque = one.courses["M"]
-    off = replace(torque, turns=torque.turns + 0.2, accuracy=Accuracy(zero=0.3))
+    off = replace(torque, turns=torque.turns + offset, accuracy=Accuracy(zero=zero))
     data = replace(data, conditions=(replace(one, courses={**one.courses, "M": off}),))
     model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
-    table = sensors(trunnion.rig.identify(model, data, ["brake.resisting_torque"]))
+    return trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+
+
+def test_a_zero_far_beyond_what_is_stated_is_an_error_though_the_model_fits(tmp_path: Path) -> None:
+    """An offset of 0.02 N m is hidden by the scatter, but is 20 stated standard uncertainties."""
+    result = with_zero(tmp_path, 0.02, 0.001)
+    told = {one.code: one for one in result.trunnion.findings}
+    assert "fit.misfit" not in told
+    found = told["sensor.off"]
+    assert (found.severity, found.where) == ("error", "zero of M")
+    assert found.figures["times"] == pytest.approx(20, abs=3)
+    assert "N m" in found.what
+    model = trunnion.Mechanism.model_validate(LOADED)
+    (unwritten,) = _write_model(model, result, tmp_path / "old.yaml", tmp_path / "new.yaml", False, [])
+    assert "new.yaml' is not written: zero of M is off" in unwritten.what
+    assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)
+
+
+def test_the_zero_of_a_sensor_is_told_in_its_unit(tmp_path: Path) -> None:
+    table = sensors(with_zero(tmp_path, 0.2, 0.3))
     assert table is not None
     ((name, told, _),) = table.rows
     found = re.fullmatch(r"(\S+) ± (\S+) N m", told)

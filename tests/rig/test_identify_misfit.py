@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import trunnion
 from trunnion.errors import Finding
+from trunnion.views.identify.figure import figure
 from trunnion.views.identify.report import report
 
 GUIDE = "S.friction.coefficient"
@@ -101,6 +103,49 @@ def test_an_error_of_the_model_is_not_laid_on_a_sensor(folder: Path) -> None:
     assert "fit.cause" not in codes
 
 
+def test_a_wrong_unit_is_no_error_of_a_gain_that_is_stated(folder: Path) -> None:
+    """Readings of lbf ft as N m are off by 26 %, 130 times the 0.2 % that are stated."""
+    result = identified(folder, "    accuracy: {zero", "    gain: 0.7376\n    accuracy: {gain: 0.2 %, zero")
+    errors = [one for one in result.trunnion.findings if one.severity == "error"]
+    assert [one.code for one in errors] == ["fit.misfit"]
+    assert cause(result).figures["size"] == pytest.approx(0.7376 - 1, abs=0.005)
+    assert "lbf ft read as N m" in cause(result).what
+    assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)
+
+
+def test_an_offset_that_leaves_a_misfit_is_first_one_of_the_dimensions(tmp_path: Path) -> None:
+    """A rod 1 mm too long moves the slider by nearly 1 mm everywhere, but not quite."""
+    slide = {"measures": "slide:S", "range": "500 mm", "noise": "0.1 mm", "bits": 16}
+    rig = {**RIG, "sensors": {**RIG["sensors"], "x": slide}}
+    trunnion.rig.observe(trunnion.read(MODEL), rig, seed=3).write(tmp_path)
+    data, parameters = trunnion.rig.read(tmp_path / "mapping.yaml"), {"mu": [GUIDE], "enc": ["O.start"]}
+    found = cause(trunnion.rig.identify(trunnion.read(MODEL).with_values({"l": "131 mm"}), data, parameters))
+    assert (found.figures["kind"], found.figures["size"]) == ("zero", pytest.approx(-1e-3, abs=5e-5))
+    assert re.search(r"reduced χ² 1\.\d+ remains", found.what)
+    assert "check the dimensions of the model, then check the zero of x" in found.remedy
+
+
+def test_what_is_expected_is_the_scatter_of_what_is_used(folder: Path) -> None:
+    """Beside jumps, which are left out, turns scatter ten times as much: they tell nothing of the others."""
+    plain = identified(folder)
+    used = np.isfinite(plain["residual_after"].values[0])
+    data = trunnion.rig.read(folder / "mapping.yaml")
+    conditions = []
+    for condition, mask in zip(data.conditions, used, strict=True):
+        course = condition.courses["M"]
+        wild = np.where(mask, course.turns, course.mean + 10 * (course.turns - course.mean))
+        conditions.append(replace(condition, courses={"M": replace(course, turns=wild)}))
+    data = replace(data, conditions=tuple(conditions))
+    result = trunnion.rig.identify(trunnion.read(MODEL), data, {"mu": [GUIDE]}, ["M"])
+    assert np.array_equal(np.isfinite(result["residual_after"].values[0]), used)
+    assert float(result["reduced_chi_squared"]) == pytest.approx(float(plain["reduced_chi_squared"]), rel=0.01)
+    for k, mask in enumerate(used):
+        assert not np.all(mask)
+        turns = data.conditions[k].courses["M"].turns[:, mask]
+        scatter = np.sqrt(np.mean(np.var(turns, axis=0, ddof=1)) / len(turns))
+        assert result["rms_expected"].values[0, k] == pytest.approx(scatter, rel=1e-3)
+
+
 Change = Callable[[np.ndarray], np.ndarray]
 
 
@@ -177,6 +222,23 @@ def test_no_cause_is_named_whose_size_is_zero_within_its_uncertainty(folder: Pat
     assert np.ptp(list(told.figures["conditions"].values())) == pytest.approx(
         2 * 2 * np.pi / result.sizes["position"], rel=0.05
     )
+
+
+def test_the_legend_of_the_residuals_stands_above_the_name_of_the_condition(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = identified(folder)
+    sheet = figure(result, "residuals")
+    sheet.draw_without_rendering()
+    first = sheet.axes[0]
+    legend = first.get_legend()
+    assert legend is not None
+    title = next(one for one in first.get_children() if isinstance(one, Text) and "600 rpm" in one.get_text())
+    assert legend.get_window_extent().y0 >= title.get_window_extent().y1 - 1
+    assert len(sheet.axes) == 2 * 2
+    assert "courses" not in sheet.get_suptitle()
+    monkeypatch.setattr("trunnion.views.identify.figure.MOST_PANELS", 1)
+    assert "1 of 2 courses" in figure(result, "residuals").get_suptitle()
 
 
 def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:

@@ -201,11 +201,12 @@ def _write_model(
     if len(lost) == result.sizes["parameter"] or not result.attrs["converged"]:
         why = "no parameter is identifiable" if result.attrs["converged"] else "the search did not converge"
         return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
-    told = {one.code: one.severity for one in findings_of(result)}
-    if told.get("fit.misfit") is Severity.ERROR:
-        misfit = float(result["reduced_chi_squared"])
-        what = f"'{write}' is not written: the model does not fit (reduced χ² {misfit:.3g})"
-        explained = "fit.cause" in told
+    errors = {one.code: one.where for one in findings_of(result) if one.severity is Severity.ERROR}
+    if "fit.misfit" in errors or "sensor.off" in errors:
+        reduced = float(f"{float(result['reduced_chi_squared']):.3g}")
+        misfit = f"the model does not fit (reduced χ² {reduced:,.10g})"
+        what = f"'{write}' is not written: {misfit if 'fit.misfit' in errors else errors['sensor.off'] + ' is off'}"
+        explained = "sensor.off" in errors or "fit.cause" in {one.code for one in findings_of(result)}
         named = "correct what explains the misfit, and identify again"
         unknown = "find the cause first: `trunnion compare` shows each channel and names errors of sensors and angle"
         return [Finding(what, "--write", named if explained else unknown)]

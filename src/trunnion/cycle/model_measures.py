@@ -120,7 +120,7 @@ def watched(
             what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
             notes[measure.name] = f"no {what} within the cycle; for a {other}"
         elif measure.rule == "time ratio" and not np.isfinite(figure):
-            notes[measure.name] = "it does not go forth and back in a cycle that repeats"
+            notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
     if np.all(valid):
         return Watched(run, measures, values, figures, findings, valid, notes)
     dial = run.system.dial(run.values, time)

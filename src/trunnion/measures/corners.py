@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.measures.extremes import Extreme
-from trunnion.measures.figures import FLAT, Reference, course_of
+from trunnion.measures.extremes import FLAT, Extreme
+from trunnion.measures.figures import Reference, course_of
 from trunnion.solve.switches import Bend
 from trunnion.solve.system import Cycle
 

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = ["Extreme", "Grid", "Tops", "highest", "largest", "shape_of"]
+__all__ = ["FLAT", "Extreme", "Grid", "Tops", "highest", "largest", "shape_of"]
 
+FLAT = 1e-9  # of its size: a course that changes less has no extremes to tell the place of
 POINTS, FEWER = 7, 5
 CUBIC = 4  # positions through which the curve goes that a mean over a range is of
 UNEVEN = 8.0  # times the least bend the largest one may have, for a polynomial to go through

@@ -28,7 +28,7 @@ from trunnion.algebra.quadrature import CANCELLED
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Status
 from trunnion.measures.dwell import share_within
-from trunnion.measures.extremes import Extreme, Grid, largest, shape_of
+from trunnion.measures.extremes import FLAT, Extreme, Grid, largest, shape_of
 from trunnion.measures.lines import distances, total, turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import Window
@@ -36,13 +36,13 @@ from trunnion.solve.switches import Bend
 from trunnion.solve.system import System
 
 __all__ = [
-    "FLAT", "RULES", "Curve", "Reference", "course_of", "figure", "judged", "judged_course", "kept", "known", "moment",
+    "RULES", "Curve", "Reference", "course_of", "figure", "judged", "judged_course", "kept", "known", "moment",
     "number_at", "reference", "shown", "span",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
-FLAT = 1e-9  # of its size: a course that changes less has no extremes to tell the place of
+SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
 
 
 class Curve(NamedTuple):
@@ -102,7 +102,7 @@ def _time_ratio(course: Curve) -> Number:
     """The longer of the two ways between the places of its largest and its least value over the shorter.
 
     At an even drive it is that of their times: (1 − s)/s or s/(1 − s), s being their distance over that of a period.
-    NaN where the motion does not come again, or is none.
+    NaN where the motion does not come again, is none, or jumps.
     """
     ways = _dead_centre(course) - _dead_centre(course, -1.0)
     if course.grid.period is None or not course.gain:
@@ -111,7 +111,7 @@ def _time_ratio(course: Curve) -> Number:
     share = share - np.floor(primal(share))
     xp = namespace(share)
     longer = xp.maximum(share, 1.0 - share)
-    return longer / xp.where(primal(longer) < 1, 1.0 - longer, np.nan)
+    return longer / xp.where(primal(longer) < 1 - SHORTEST, 1.0 - longer, np.nan)
 
 
 def _rms(course: Curve) -> Number:

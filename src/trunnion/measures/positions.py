@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.quadrature import Nodes, nodes
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure
+from trunnion.measures.turning_back import REVERSING, turning_back
 from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
@@ -127,7 +128,29 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     index = np.searchsorted(times, rule.at)
     period = duration if run.cycle.periodic else None
     whole = Window(index, rule.at, known[0][index], period, known[1], (rule.weights, rule.inside))
-    return PositionPlan(run, times, windows | dict.fromkeys(averaged, whole))
+    return _with_dead_centres(PositionPlan(run, times, windows | dict.fromkeys(averaged, whole)), measures)
+
+
+def _with_dead_centres(plan: PositionPlan, measures: Sequence[Measure]) -> PositionPlan:
+    """The same with positions about the dead centres that measures are of, where the motion turns back sharply."""
+    run, windows = plan.run, dict(plan.windows)
+    for measure in measures:
+        window = windows[measure.name]
+        more = turning_back(run, measure, window.time, window.period) if measure.kind in REVERSING else np.zeros(0)
+        if not len(more):
+            continue
+        laps = np.floor(more / run.cycle.duration) if run.cycle.periodic else 0.0 * more
+        within = more - laps * run.cycle.duration
+        times = np.union1d(plan.times, within)
+        now = np.searchsorted(times, plan.times)
+        windows = {name: replace(one, index=now[one.index]) for name, one in windows.items()}
+        time = np.concatenate([window.time, more])
+        index = np.concatenate([windows[measure.name].index, np.searchsorted(times, within)])
+        coordinate = np.concatenate([window.coordinate, _path(run, within) + laps * _gain(run)])
+        order = np.argsort(time)
+        windows[measure.name] = replace(window, index=index[order], time=time[order], coordinate=coordinate[order])
+        plan = replace(plan, times=times, windows=windows)
+    return plan
 
 
 def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:

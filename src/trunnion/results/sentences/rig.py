@@ -188,12 +188,13 @@ IDENTIFY = {
     ),
     "fit.cause": Sentence(
         WARNING,
-        "{story} would explain {explains_percent:.0f} % of the misfit{also}; the estimates would then be {estimates}",
-        lambda kind, size_told, channel, odd, files, conditions=None, **_: (
+        "{story} would explain {explains_percent:.0f} % of the misfit{left}{also}; the estimates would then be "
+        "{estimates}",
+        lambda kind, size_told, channel, odd, files, before, conditions=None, **_: (
             {
                 "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
                 f"correct the zero of their files alone: files: [{files or '{file: …, angle: {zero: …}}'}]",
-                "zero": f"check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
+                "zero": f"{before}check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
                 "gain": f"check range and gain of {channel}, and lengths and loads of the model, in {odd}",
             }
             if conditions
@@ -206,7 +207,8 @@ IDENTIFY = {
                 ),
                 "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
                 "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
-                "zero": f"check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is estimated too",
+                "zero": f"{before}check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is "
+                "estimated too",
                 "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike; "
                 "with accuracy: {gain: …} in the mapping a gain is estimated too",
             }
@@ -288,8 +290,17 @@ IDENTIFY = {
     ),
     "sensor.off": Sentence(
         WARNING,
-        "differs from its stated value by {times:.1f} standard uncertainties",
-        "check the sensor, its stated accuracy, and the loads of the model",
+        lambda beyond, times, times_told, size_told, **_: (
+            f"would have to be off by {size_told}, {times_told} stated standard uncertainties: the estimates mean "
+            "nothing"
+            if beyond
+            else f"differs from its stated value by {times:.1f} standard uncertainties"
+        ),
+        lambda of_angle, **_: (
+            "check the zero of the angle, and the lengths and loads of the model"
+            if of_angle
+            else "check the sensor, its unit, its stated accuracy, and the loads of the model"
+        ),
     ),
     "sensor.no_accuracy": Sentence(
         NOTE,

@@ -22,7 +22,7 @@ from trunnion.rig.reading.units_taken import read_as
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
 
-__all__ = ["AGREE", "corrected", "explained", "hides_friction"]
+__all__ = ["AGREE", "LENGTHS", "corrected", "explained", "hides_friction"]
 
 Members = Sequence[tuple["Compared", "ChannelComparison"]]
 STANDS_OUT = 2.0  # times the median of the conditions

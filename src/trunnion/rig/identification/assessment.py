@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.fit import FAR, FitProblem
 from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.uncertainty import quantile
 
@@ -56,6 +56,18 @@ class Assessment:
     def problem(self) -> FitProblem:
         """What was fitted."""
         return self.found.problem
+
+    @cached_property
+    def refuted(self) -> bool:
+        """Whether the estimates stand for something else: by the residuals, or since an error of a sensor that explains
+        them is beyond what is stated of it."""
+        spread, first = self.found.spread, next(iter(self.found.causes), None)
+        if spread.test.gross or spread.beyond or first is None:
+            return spread.test.gross or bool(spread.beyond)
+        kind, own = first.kind, [one for one in self.problem.sensors if one.stated]
+        alike = [max(map(abs, one.sizes)) for one in own if (one.kind, one.channel) == (kind, first.channel)]
+        stated = max([one.angle for one in own] if kind == "shift" else alike, default=0.0)
+        return 0 < FAR * stated < abs(first.size)
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
@@ -159,7 +171,7 @@ class Assessment:
             mask = self.problem.masks[k]
             before = np.where(mask, self.problem.misses(self.start, k, block.mean), np.nan)
             after = np.where(mask, self.problem.misses(self.found.x, k, block.mean), np.nan)
-            scatter = np.sqrt(self.problem.variances[k] / np.maximum(block.count, 1) + block.unresolved**2)
+            scatter = np.sqrt(self._variance(k) / np.maximum(block.count, 1) + block.unresolved**2)
             known = scatter if block.known else np.full(len(mask), np.nan)
             out = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
             row = (before, after, np.where(mask, known, np.nan))
@@ -186,17 +198,23 @@ class Assessment:
             found.append(HeldOut(k, _rms(before), _rms(after), _rms(np.sqrt(expected)), len(block.held)))
         return found
 
+    def _variance(self, k: int) -> Array:
+        """Variance of one turn of a block, at the positions that are used: beside jumps turns scatter more."""
+        block = self.problem.blocks[k]
+        used = block.pooled(self.problem.masks[k]) if block.repeats else self.problem.variances[k]
+        return np.broadcast_to(used, len(self.problem.masks[k]))
+
     def _scatter(self, k: int) -> Array:
         """Variance of one turn of a block, from all its turns."""
         block = self.problem.blocks[k]
         if block.repeats:
-            return block.variance
+            return self._variance(k)
         if block.stated:
             return np.full(block.held.shape[1], block.unresolved**2)
         if len(block.held) > 1:
-            gaps = block.held - block.held_mean
+            gaps = (block.held - block.held_mean)[:, self.problem.masks[k]]
             return np.full(block.held.shape[1], float(np.nanmean(gaps**2)) * len(gaps) / (len(gaps) - 1))
-        same = [self.problem.variances[i] for i in self._alike(k)]
+        same = [self._variance(i) for i in self._alike(k)]
         return np.full(block.held.shape[1], float(np.mean([np.mean(one) for one in same])) if same else np.nan)
 
     def _alike(self, k: int) -> Sequence[int]:

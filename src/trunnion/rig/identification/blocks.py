@@ -110,10 +110,12 @@ class Block:
         One for all of them: weights that follow the scatter from place to place would trust most where it happens to
         be small, and the covariance, which is made of the same scatter, would come out too small.
         """
-        if not self.repeats:
-            return np.full(self.turns.shape[1], np.nan)
-        freedom = np.maximum(self.count - 1, 0)
-        return np.full(self.turns.shape[1], float(np.sum(self.deviations**2) / np.sum(freedom)))
+        return np.full(self.turns.shape[1], self.pooled(np.isfinite(self.mean)) if self.repeats else np.nan)
+
+    def pooled(self, mask: NDArray[np.bool_]) -> float:
+        """Variance of one turn, pooled over some positions, (position,); NaN where none of them repeats."""
+        freedom = int(np.sum(np.maximum(self.count - 1, 0)[mask]))
+        return float(np.sum(self.deviations[:, mask] ** 2) / freedom) if freedom else float("nan")
 
 
 def _mean(turns: Array) -> Array:

@@ -10,15 +10,17 @@ import numpy as np
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
+from trunnion.rig.comparison.explanations import LENGTHS
 from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
-from trunnion.rig.identification.blocks import OWN, shared_zero
+from trunnion.rig.identification.blocks import shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
 from trunnion.rig.identification.misfit import MisfitCause, OwnSize
 from trunnion.rig.identification.number_text import amount, share
 from trunnion.rig.identification.outstanding import Outstanding, outstanding
-from trunnion.rig.identification.uncertainty import RANDOM, STATED, quantile
+from trunnion.rig.identification.sensor_findings import of_sensors
+from trunnion.rig.identification.uncertainty import quantile
 from trunnion.rig.reading.log import few_digits
 from trunnion.rig.reading.measurement import zeros_of_files
 from trunnion.rig.reading.units_taken import read_as
@@ -27,8 +29,6 @@ __all__ = ["sentences"]
 
 ALIKE = 0.95  # correlation from which two are hardly told apart
 MUCH = 3.0  # times what scatter explains, between conditions
-FAR = 3.0  # standard uncertainties from what was stated of a sensor
-MOSTLY = 0.5  # of the variance
 POOR = 2.0  # times what is expected, of predictions
 MOST_NAMED = 3
 SMALL = 0.2  # of the largest: what a condition has of an error to be named with it
@@ -41,7 +41,7 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 def sentences(judged: Assessment) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_speeds, _search, _fit, _unused, _groups, _near, _limits, _sensors, _exact, _data, _held)
+    parts = (_speeds, _search, _fit, _unused, _groups, _near, _limits, of_sensors, _exact, _data, _held)
     found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
@@ -81,12 +81,12 @@ def _search(judged: Assessment) -> Iterator[Finding]:
 
 def _fit(judged: Assessment) -> Iterator[Finding]:
     """Whether the model fits, and whether turns repeat."""
-    test, problem = judged.found.spread.test, judged.problem
+    test, problem, refuted = judged.found.spread.test, judged.problem, judged.refuted
     if test.misfit:
         chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
-        worth = "the estimates mean nothing" if test.gross else "the intervals are widened accordingly"
+        worth = "the estimates mean nothing" if refuted else "the intervals are widened accordingly"
         phrases = {"chance_told": chance, "reduced_told": _times(test.reduced), "worth": worth}
-        severity = Severity.ERROR if test.gross else None
+        severity = Severity.ERROR if refuted else None
         yield finding_for(
             "fit.misfit", "fit", severity=severity, phrases=phrases, reduced=test.reduced, chance=test.chance
         )
@@ -115,7 +115,7 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
         phrases = {"one": "start" if judged.found.measurement.of_starts else "turn"}
         yield finding_for("fit.not_repeated", "data", phrases=phrases)
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
-    if freedom.size and np.min(freedom) < FEW and not test.gross:
+    if freedom.size and np.min(freedom) < FEW and not refuted:
         least = round(float(np.min(freedom)))
         yield finding_for("fit.freedom", "data", phrases={"told": _count(least, "degree")}, degrees=least)
     follows = judged.found.spread.follows
@@ -178,6 +178,8 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     unit = {"shift": "rad", "delay": "s", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
     phrases = {
         "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
+        "left": f", reduced χ² {_times(first.left.reduced)} remains" if first.left.misfit else "",
+        "before": f"{LENGTHS}, then " if first.left.misfit and _moves(judged, first) else "",
         "odd": _joined(_odd(judged, first)), "files": _zeros(judged, first),
         "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
     }  # fmt: skip
@@ -187,6 +189,11 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
         expanded=first.expanded, explains_percent=100 * first.explains, **each,
         values={one.name: float(value) for one, value in zip(problem.model.unknowns, first.estimates, strict=True)},
     )  # fmt: skip
+
+
+def _moves(judged: Assessment, one: MisfitCause) -> bool:
+    """Whether it is an offset of a motion, on which lengths act."""
+    return one.kind == "zero" and judged.problem.model.measures[one.channel].of_motion
 
 
 def _zeros(judged: Assessment, one: MisfitCause) -> str:
@@ -414,34 +421,10 @@ def _limits(judged: Assessment) -> Iterator[Finding]:
             continue
         size = max(abs(judged.estimate[p]), unknown.size)
         half = quantile(judged.found.spread.freedom[p]) * judged.deviation[p]
-        if size > 0 and half > size and not judged.found.spread.test.gross:
+        if size > 0 and half > size and not judged.refuted:
             value = judged.estimate[p]
             phrases = {"told": amount(value, half, unknown.unit)}
             yield finding_for("parameter.hardly_known", where, phrases=phrases, value=value, half=half)
-
-
-def _sensors(judged: Assessment) -> Iterator[Finding]:
-    """Which sensor limits what is known, and whether one is off by more than was stated of it."""
-    problem = judged.problem
-    if judged.found.spread.test.gross:  # then they stand for what the model lacks
-        return
-    names, shares = judged.budget
-    for p, unknown in enumerate(problem.model.unknowns):
-        for source, part in zip(names, shares[p], strict=True):
-            if source not in (*RANDOM, STATED, "resolution") and part > MOSTLY:
-                remedy = "calibrate that sensor better"
-                if source.startswith(OWN):
-                    remedy = "record a longer unloaded stretch in each file, or more files"
-                elif source.startswith("angle "):
-                    remedy = "use an encoder with finer steps"
-                phrases = {"share_told": share(part), "remedy": remedy}
-                yield finding_for(
-                    "parameter.sensor", f"parameter {unknown.name}", phrases=phrases, share=part, source=source
-                )
-    for s, sensor in enumerate(problem.sensors, problem.count):
-        explained = bool(judged.found.causes)  # then it is off because of what explains the misfit
-        if sensor.stated and abs(judged.found.x[s]) > FAR and not explained:
-            yield finding_for("sensor.off", sensor.name, times=abs(judged.found.x[s]))
 
 
 def _exact(judged: Assessment) -> Iterator[Finding]:

@@ -1,8 +1,9 @@
 """Least squares with exact derivatives: residuals of all blocks, and of the errors that are stated of the sensors.
 
 A sensor reads (1 + g) f + z of what there is: f of the model, g and z its errors, the same at every position. They
-are unknowns too, in units of their standard uncertainties, each with the observation 0 ± 1: what is stated of it. So is
-a delay τ of the sensor behind the angle, of which f − τ df/dt is read.
+are unknowns too, in units of their standard uncertainties, each with the observation 0 ± 1: what is stated of it, and
+within ± `most`: what is further off is no error that was stated. So is a delay τ of the sensor behind the angle, of
+which f − τ df/dt is there to be read.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
 ANGLE = "angle of each condition"  # by the sampling of pulses
+FAR = 5.0  # standard uncertainties: what a stated error may come to at most
+HALF_STEP = 3**0.5  # standard uncertainties of an error that may be anything up to half a step
 LEAST_GAIN = 0.1  # of the model: what a sensor reads at least, 0 would do away with the model
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
 
@@ -38,7 +41,8 @@ class SensorError:
     sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
     of a sensor behind a course that is computed, what it does to that, with its sign.
     stated: whether anything is known of it; one that is not is free. group: of one of many, what they are together.
-    least: of a gain, the least factor that a sensor may read of the model.
+    least: of a gain, the least factor that a sensor may read of the model. most: what one that is stated may come to,
+    in its standard uncertainties. angle: of an error of the crank angle, its standard uncertainty as such, rad.
     """
 
     name: str
@@ -48,6 +52,8 @@ class SensorError:
     stated: bool
     group: str = ""
     least: float = LEAST_GAIN
+    most: float = FAR
+    angle: float = 0.0
 
     @property
     def source(self) -> str:
@@ -146,7 +152,8 @@ def _cut(blocks: Sequence[Block], cuts: Sequence[tuple[float, float]]) -> list[S
         late = [cut / speed if abs(cut) == size and speed else 0.0 for cut, speed in cuts]
         sizes = tuple(late[one.condition] * (one.turns.shape[1] > 2) for one in blocks)
         step = np.degrees(size * np.sqrt(12.0))
-        found.append(SensorError(f"angle in steps of {step:.4g} deg", "", "delay", sizes, stated=True))
+        name = f"angle in steps of {step:.4g} deg"
+        found.append(SensorError(name, "", "delay", sizes, stated=True, most=HALF_STEP, angle=size))
     return [one for one in found if any(one.sizes)]
 
 
@@ -209,8 +216,10 @@ class FitProblem:
         """Limits of unknowns and sensors."""
         low = [one.lower for one in self.model.unknowns]
         high = [one.upper for one in self.model.unknowns]
-        least = [(one.least - 1) / max(one.sizes) if one.kind == "gain" else -inf for one in self.sensors]
-        return np.array([*low, *least]), np.array([*high, *([inf] * len(self.sensors))])
+        most = [one.most if one.stated else inf for one in self.sensors]
+        pairs = zip(self.sensors, most, strict=True)
+        least = [max((one.least - 1) / max(one.sizes), -far) if one.kind == "gain" else -far for one, far in pairs]
+        return np.array([*low, *least]), np.array([*high, *most])
 
     def courses(self, x: Array) -> Courses:
         """What the model says; of the last few places it is kept."""
@@ -231,24 +240,20 @@ class FitProblem:
         one = self.courses(x).said[block.condition][block.channel]
         size = block.turns.shape[1]
         value, slope = one.value[:size], one.slope[:, :size]
-        gain, late, read = 1.0, 0.0, np.zeros(size)
-        columns = np.zeros((len(x), size))
-        for s, sensor in enumerate(self.sensors, self.count):
-            u = sensor.sizes[k]
-            if sensor.kind == "delay" and u:
-                late += u * x[s]
-                columns[s] = -u * self.model.rate(block.condition, value)
-            elif sensor.kind == "gain":
-                gain += u * x[s]
-                columns[s] = u * value
-            else:
-                read += u * x[s]
-                columns[s] = u
-        columns[: self.count] = gain * slope
+        errors = [(s, one.kind, one.sizes[k]) for s, one in enumerate(self.sensors, self.count) if one.sizes[k]]
+        gain, late, zero = (
+            float(sum(u * x[s] for s, kind, u in errors if kind == own)) for own in ("gain", "delay", "zero")
+        )
+        gain += 1.0
+        rate = self.model.rate(block.condition, value) if any(kind == "delay" for _, kind, _ in errors) else 0.0
         if late:
-            columns[: self.count] -= late * self.model.rate(block.condition, slope)
-            read = read - late * self.model.rate(block.condition, value)
-        return gain * value + read, columns
+            slope = slope - late * self.model.rate(block.condition, slope)
+        seen = value - late * rate
+        columns = np.zeros((len(x), size))
+        columns[: self.count] = gain * slope
+        for s, kind, u in errors:
+            columns[s] = {"delay": -gain * u * rate, "gain": u * seen}.get(kind, u)
+        return gain * seen + zero, columns
 
     def misses(self, x: Array, k: int, data: Array) -> Array:
         """Data less what the sensor would read, (…, position); angles by the nearest turn."""

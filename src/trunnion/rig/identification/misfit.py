@@ -50,8 +50,9 @@ class MisfitCause:
     kind: as in `error_sources.KINDS`, or "delay"; channel: empty of what all channels have in common; size: of a shift
     rad by which the readings are ahead of the model, of a delay s, of a zero in the unit of the channel, of a gain
     relative; expanded: U of it, 95 %; explains: share of the misfit, the part of χ² above what scatter leads to expect;
-    estimates, halves: of the unknowns with it, (unknown,), and U of each, 95 %; own: of each condition by itself, of an
-    error that conditions do not share; size and expanded are then those of the largest.
+    estimates, halves: of the unknowns with it, (unknown,), and U of each, 95 %; left: how well the model fits with it;
+    own: of each condition by itself, of an error that conditions do not share; size and expanded are then those of the
+    largest.
     """
 
     kind: str
@@ -61,6 +62,7 @@ class MisfitCause:
     explains: float
     estimates: Array
     halves: Array
+    left: Test
     own: tuple[OwnSize, ...] = ()
 
 
@@ -104,12 +106,13 @@ def explanations(
     tried = [
         one for one in _candidates(problem, search) if np.isfinite(one.fit.cost) and not one.strange and not one.bounded
     ]
-    left = [lack_of_fit(one.problem, one.fit.x).reduced for one in tried]
+    tests = [lack_of_fit(one.problem, one.fit.x) for one in tried]
+    left = [one.reduced for one in tests]
     explained = [min((test.reduced - one) / (test.reduced - 1), 1.0) for one in left]
     chance = 1 + ALIKE * np.sqrt(2 / max(test.freedom, 2.0))  # of the ratio of two reduced χ²
     least = min((one for one in left if np.isfinite(one)), default=float("nan"))
-    rows = zip(tried, left, explained, strict=True)
-    found = [_cause(one, share) for one, rest, share in rows if share >= ENOUGH and rest <= chance * max(least, 1.0)]
+    rows, most = zip(tried, tests, explained, strict=True), chance * max(least, 1.0)
+    found = [_cause(one, share, rest) for one, rest, share in rows if share >= ENOUGH and rest.reduced <= most]
     found = [one for one in found if one.kind == "sign" or abs(one.size) > one.expanded]
     if unused is not None:
         found = [one for one in found if one.kind != "shift" or not unused.refute(one.estimates, _ahead(problem, one))]
@@ -124,7 +127,7 @@ def _ahead(problem: FitProblem, one: MisfitCause) -> Array:
     return found
 
 
-def _cause(one: _Refit, explains: float) -> MisfitCause:
+def _cause(one: _Refit, explains: float, left: Test) -> MisfitCause:
     """A candidate with its uncertainty."""
     spread = spread_of(one.problem, one.fit.x)
     half = quantile(spread.freedom) * np.sqrt(np.maximum(np.diagonal(spread.covariance), 0.0))
@@ -132,7 +135,9 @@ def _cause(one: _Refit, explains: float) -> MisfitCause:
     wide = [float(row) for row in half[-len(one.sizes) :] * one.scale]
     k = int(np.argmax(np.abs(one.sizes)))
     own = tuple(map(OwnSize, one.conditions, one.sizes, wide))
-    return MisfitCause(one.kind, one.channel, one.sizes[k], wide[k], explains, one.fit.x[:count], half[:count], own)
+    return MisfitCause(
+        one.kind, one.channel, one.sizes[k], wide[k], explains, one.fit.x[:count], half[:count], left, own
+    )
 
 
 # ---- candidates, the simplest first ---------------------------------------------------------------------------

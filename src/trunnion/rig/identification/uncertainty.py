@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from trunnion.rig.identification.blocks import Block
-from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.fit import FAR, FitProblem
 from trunnion.rig.reading.repeated_steps import covariance_of_steps
 
 __all__ = [
@@ -72,7 +72,7 @@ class Covariances:
     information: Jᵀ W J + Λ; inverse: its inverse, pseudo where it is singular; null: (direction, unknown and sensor),
     what nothing is known of; parts: covariance by source; freedom: degrees of freedom, (unknown and sensor,);
     follows: how much a turn resembles the one before it, −1 to 1, NaN if not known; apart: (unknown,), how much more
-    than turns the conditions differ in what they say of it, as variances, 1 if not.
+    than turns the conditions differ in what they say of it, as variances, 1 if not; beyond: see `beyond_stated`.
     """
 
     information: Array
@@ -83,6 +83,7 @@ class Covariances:
     test: Test
     follows: float
     apart: Array
+    beyond: dict[int, float]
 
     @property
     def covariance(self) -> Array:
@@ -198,7 +199,33 @@ def spread_of(problem: FitProblem, x: Array) -> Covariances:
     random = np.diagonal(np.sum([parts[key] for key in RANDOM if key in parts], axis=0))
     with np.errstate(all="ignore"):  # Welch and Satterthwaite; what was stated has infinite freedom
         freedom = np.where(random > 0, freedom * (whole / random) ** 2, np.inf)
-    return Covariances(information, inverse, null, parts, freedom, test, follows, apart[: problem.count])
+    beyond = beyond_stated(problem, x, information)
+    return Covariances(information, inverse, null, parts, freedom, test, follows, apart[: problem.count], beyond)
+
+
+def beyond_stated(problem: FitProblem, x: Array, information: Array) -> dict[int, float]:
+    """What errors of sensors on a limit would come to without it, where that is more than any stated error may be.
+
+    In standard uncertainties, by the place among the sensors. Of each the Newton step in which it alone leaves its
+    limit, beside all that are on none: with what is stated of it more than `FAR`, and its size without that.
+    """
+    low, high = problem.bounds
+    size = np.sqrt(np.maximum(np.diagonal(information), 1e-300))
+    on = np.minimum(x - low, high - x) <= ON_LIMIT / size + 1e-9 * np.abs(x)
+    places = [s for s in range(problem.count, len(x)) if on[s] and problem.sensors[s - problem.count].stated]
+    slope = problem.jacobian(x).T @ problem.residuals(x) if places else x
+    found = {}
+    for s in places:
+        own = np.flatnonzero(~on | (np.arange(len(x)) == s))
+        stated = (own == s) * 1.0
+        rows = information[np.ix_(own, own)]
+        free, alone = (
+            float(x[s] - stated @ _inverse(rows - left * np.diag(stated))[0] @ (slope[own] - left * stated * x[s]))
+            for left in (0.0, 1.0)
+        )
+        if abs(free) >= FAR and free * x[s] > 0:
+            found[s - problem.count] = alone
+    return found
 
 
 def _steps(problem: FitProblem, x: Array, inverse: Array, blocks: Sequence[int]) -> Array:
@@ -229,6 +256,7 @@ def _inverse(information: Array) -> tuple[Array, Array]:
     return inverse, (vectors[:, lost] / size[:, None]).T
 
 
+ON_LIMIT = 0.05  # of how well an unknown would be known by itself
 SINGULAR = 1e-10  # of the largest eigenvalue of the scaled information: derivatives are exact to some 1e-12 of it
 
 

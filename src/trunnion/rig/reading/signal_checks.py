@@ -119,14 +119,16 @@ def signs(
                 rate and turning is not None and float(np.nanmean(courses[rate])) * turning < 0 and len(drivers) == 1
             )
             likely = str(rate) if opposed else effort
-            other = (
-                "the angle has the wrong sign" if opposed else "or the load drives the motor, then the sign is correct"
+            cause = (
+                "the angle has the wrong sign"
+                if opposed
+                else f"the sign of {likely} is wrong, unless the load drives the motor"
             )
-            what = f"sign: the power into {driver} is negative in {_of(power)}"
+            what = f"the power into {driver} is negative in {_of(power)}"
             account.warn(
                 "data.power.sign",
                 f"channels.{likely}",
-                f"{what} ({power.mean():.4g} W), {other}",
+                f"sign: {what} ({power.mean():.4g} W): {cause}",
                 f"write sign: {-channels[likely].sign}"
                 + ("" if rate else "; or sign: in angle:, if that runs backwards"),
             )

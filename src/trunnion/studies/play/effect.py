@@ -26,8 +26,8 @@ class Effect:
     worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position), others: the same
     with seats on the other links, where the model does not say which carry them; status. extremes: of each measure
     whose figure is a maximum or minimum, or at a stated place, by name, what play does to it alone there; corner: of
-    such an effect at a corner of its course, the figure and what the positions have of it; moved: of a maximum or
-    minimum the figure, (sample,), with pins at offsets, (sample, 1), by path.
+    such an effect at a corner of its course, the figure and what the positions have of it. figure: of a maximum or
+    minimum the extreme itself, (sample,), with pins at offsets, (sample, 1), by path.
     """
 
     run: Run
@@ -42,7 +42,7 @@ class Effect:
     status: NDArray[np.int8]
     extremes: Mapping[str, Effect] = field(default_factory=dict)
     corner: tuple[float, float] | None = None
-    moved: Callable[[Mapping[str, Array]], Array] | None = None
+    figure: Callable[[Mapping[str, Array]], Array] | None = None
 
     def of(self, i: int) -> tuple[Effect, int]:
         """Where the figure of a measure is looked for, and its number there: at its extreme, or over the cycle."""

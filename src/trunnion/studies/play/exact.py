@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
-__all__ = ["beyond_first_order", "exact_changes", "moved_figure"]
+__all__ = ["beyond_first_order", "exact_changes", "figures_with"]
 
 Array = NDArray[np.float64]
 SLIGHT, GRAVE = (
@@ -42,8 +42,8 @@ SLIGHT, GRAVE = (
 def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
     """Changes of a measure, (side, position), with the pins at the worst of first order, and what that has of them.
 
-    at: numbers of the positions; of an extreme the change is that of the extreme, wherever it moves. Pins lie on
-    the link on which they do more, if the model does not say which.
+    at: numbers of the positions. Pins lie on the link on which they do more, if the model does not say which. Of an
+    extreme the change is that of the extreme, wherever the pins move its place.
     """
     run, measure, first = effect.run, effect.measures[i], np.zeros(len(at))
     offsets: tuple[dict[str, Array], dict[str, Array]] = {}, {}
@@ -63,17 +63,17 @@ def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, 
                 own = {f"{carrier}.{name}.{key}": parts["xyz".index(key.rpartition(".")[2])] for key in end}
                 offsets[0].update((path, -part) for path, part in own.items())
                 offsets[1].update(own)
-    if effect.moved is None:
+    if effect.figure is None:
         found = np.array([_value(run, measure, effect.time[at], own) for own in offsets]) - effect.value[i, at]
     else:
-        both_ways = {path: np.stack([own[path] for own in offsets]) for path in offsets[0]}
-        found = (effect.moved(both_ways) - effect.moved({}))[:, None]
+        sides = {path: np.stack([own[path] for own in offsets]) for path in offsets[0]}
+        found = (effect.figure(sides) - effect.figure({}))[:, None]
     if measure.turning(run.system):
         found = found - 2 * np.pi * np.round(found / (2 * np.pi))
     return found, first
 
 
-def moved_figure(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
+def figures_with(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
     """An extreme, (sample,), with pins at offsets by path, m, (sample, 1); at a corner if it is at one."""
     values = {**kernel.run.values, **offsets}
     curve = kernel.courses(values, places.times)[0][one.measure.name]

@@ -49,7 +49,7 @@ from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order, moved_figure
+from trunnion.studies.play.exact import beyond_first_order, figures_with
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def of_corner(
     rows = _offsets(known, carrier)
     step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
     figures = [
-        moved_figure(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)
+        figures_with(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)
     ]
     return _by_end(known, change_by_step(*figures)[:, None] / step)
 
@@ -238,7 +238,7 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
             loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)
             there = replace(there, corner=(sharp.figure, one.figure))
-        found[measure.name] = replace(there, moved=partial(moved_figure, kernel, places, sharp))
+        found[measure.name] = replace(there, figure=partial(figures_with, kernel, places, sharp))
     return found
 
 

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["KINDS", "MOST_PANELS", "check_kind", "figure"]
 
-MOST_PANELS = 6
+MOST_PANELS = 8
+SUBTITLE = 12.0  # points: height of the name of a condition above its axes
 FEW = 5  # conditions whose names stand side by side
 MOST_TOLD = 12  # parameters whose correlations have room for their numbers
 COVERED = 2.0  # standard uncertainties of the band
@@ -118,10 +119,12 @@ def correlation(result: xr.Dataset) -> Figure:
 
 def residuals(result: xr.Dataset) -> Figure:
     """Measured less model over the cycle, before and after, with the band that the scatter leaves the mean."""
-    pairs = panels(result)
-    if not pairs:
+    every = courses(result)
+    if not every:
         return _figures(result)
-    sheet = new("Residuals, before and after", result, height=1.0 + 1.75 * len(pairs))
+    pairs = panels(every)
+    more = f", {len(pairs)} of {len(every)} courses" if len(pairs) < len(every) else ""
+    sheet = new(f"Residuals, before and after{more}", result, height=1.0 + 1.75 * len(pairs))
     rows = sheet.subplots(len(pairs), 2, sharex=True, squeeze=False)
     drive = str(result.attrs.get("drive", ""))
     angles = [_angles(result, condition) for _, condition in pairs]
@@ -135,7 +138,7 @@ def residuals(result: xr.Dataset) -> Figure:
         other = "time [s]" if durations else "share of the cycle"
         dress(axes, plain(f"drive angle {drive} [°]") if turned else other, axes.get_ylabel())
     for axes in rows[0]:
-        legend(axes, least=1)
+        legend(axes, least=1, lift=SUBTITLE)
     return sheet
 
 
@@ -149,17 +152,21 @@ def _angles(result: xr.Dataset, condition: int) -> Array | None:
     return np.asarray(np.degrees(first + (last - first) * phase))
 
 
-def panels(result: xr.Dataset) -> list[tuple[int, int]]:
-    """(channel, condition) with courses over the cycle that were fitted: the first, evenly chosen if there are many."""
-    found = [
+def courses(result: xr.Dataset) -> list[tuple[int, int]]:
+    """(channel, condition) with courses over the cycle that were fitted."""
+    return [
         (i, k)
         for i, _, _ in channels(result)
         for k in conditions(result, i)
         if np.count_nonzero(np.isfinite(curve_of(result, "residual_after", i, k))) > 1
     ]
-    if len(found) <= MOST_PANELS:
-        return found
-    return [found[int(j)] for j in np.rint(np.linspace(0, len(found) - 1, MOST_PANELS))]
+
+
+def panels(every: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Those of the courses that are drawn: all, evenly chosen if there are many."""
+    if len(every) <= MOST_PANELS:
+        return every
+    return [every[int(j)] for j in np.rint(np.linspace(0, len(every) - 1, MOST_PANELS))]
 
 
 def _residual(axes: Axes, result: xr.Dataset, pair: tuple[int, int], x: Array, before: bool) -> None:

@@ -105,7 +105,7 @@ def _sections(result: xr.Dataset) -> list[dict[str, Any]]:
     told = [one for one in estimates(result) if one.told]
     several = correlations(result)
     held = held_out(result)
-    unheld = "Measured minus model over the cycle, before and after the fit; a selection if there are many conditions."
+    unheld = "Measured minus model over the cycle, before and after the fit."
     found = [
         _section("Estimates", result, "intervals", [estimated(result), budget(result), sensors(result)]),
         _section("Correlation", result, "correlation" if len(told) > FEW else "", [several]) if several else None,

@@ -136,6 +136,8 @@ def sensors(result: xr.Dataset) -> TextTable | None:
             continue
         kind, _, channel = name.partition(" of ")
         unit = {"zero": units.get(channel.partition(" in ")[0], "")}.get(kind, "%" if kind == "gain" else "")
+        if kind == "angle in steps":  # in seconds it is another one at each speed
+            unit, size = "rad", math.radians(float(channel.removesuffix(" deg"))) / math.sqrt(12)
         factor = size * (100.0 if unit == "%" else 1.0)
         known = math.isfinite(error) and math.isfinite(factor) and bool(unit)
         rows.append([

@@ -188,9 +188,9 @@ IDENTIFY = {
     ),
     "fit.cause": Sentence(
         WARNING,
-        "{story} would explain {explains_percent:.0f} % of the misfit{left}{also}; the estimates would then be "
+        "{story}{times} would explain {explains_percent:.0f} % of the misfit{left}{also}; the estimates would then be "
         "{estimates}",
-        lambda kind, size_told, channel, odd, files, before, conditions=None, **_: (
+        lambda kind, size_told, channel, odd, files, before, times, conditions=None, **_: (
             {
                 "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
                 f"correct the zero of their files alone: files: [{files or '{file: …, angle: {zero: …}}'}]",
@@ -207,10 +207,10 @@ IDENTIFY = {
                 ),
                 "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
                 "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
-                "zero": f"{before}check the zero of {channel}; with accuracy: {{zero: …}} in the mapping it is "
-                "estimated too",
-                "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike; "
-                "with accuracy: {gain: …} in the mapping a gain is estimated too",
+                "zero": f"{before}check the zero of {channel}"
+                + ("" if times else "; with accuracy: {zero: …} in the mapping it is estimated too"),
+                "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike"
+                + ("" if times else "; with accuracy: {gain: …} in the mapping a gain is estimated too"),
             }
         )[kind],
     ),

@@ -61,13 +61,19 @@ class Assessment:
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: by the residuals, or since an error of a sensor that explains
         them is beyond what is stated of it."""
-        spread, first = self.found.spread, next(iter(self.found.causes), None)
-        if spread.test.gross or spread.beyond or first is None:
-            return spread.test.gross or bool(spread.beyond)
+        spread = self.found.spread
+        return spread.test.gross or bool(spread.beyond) or self.times_stated > FAR
+
+    @cached_property
+    def times_stated(self) -> float:
+        """Size of the first cause of a misfit in standard uncertainties that are stated of it; 0 where none is."""
+        first = next(iter(self.found.causes), None)
+        if first is None:
+            return 0.0
         kind, own = first.kind, [one for one in self.problem.sensors if one.stated]
         alike = [max(map(abs, one.sizes)) for one in own if (one.kind, one.channel) == (kind, first.channel)]
         stated = max([one.angle for one in own] if kind == "shift" else alike, default=0.0)
-        return 0 < FAR * stated < abs(first.size)
+        return abs(first.size) / stated if stated else 0.0
 
     @cached_property
     def lost(self) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import shared_zero
+from trunnion.rig.identification.fit import FAR
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
 from trunnion.rig.identification.misfit import MisfitCause, OwnSize
 from trunnion.rig.identification.number_text import amount, share
@@ -178,6 +179,8 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     unit = {"shift": "rad", "delay": "s", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
     phrases = {
         "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
+        "times": f", {few_digits(judged.times_stated)} times its stated standard uncertainty,"
+        if judged.times_stated > FAR else "",
         "left": f", reduced χ² {_times(first.left.reduced)} remains" if first.left.misfit else "",
         "before": f"{LENGTHS}, then " if first.left.misfit and _moves(judged, first) else "",
         "odd": _joined(_odd(judged, first)), "files": _zeros(judged, first),

@@ -35,14 +35,16 @@ def spoken(where: str) -> str:
         if not inner:
             return f"points of {part}"
         point, *deeper = inner
-        inner, part = [key for key in deeper if key not in ("x", "y", "z", "at")], f"point {point} of {part}"
+        letters = dict(zip("012", "xyz", strict=True))  # "x of point P" where it is typed alone
+        inner = [letters.get(key, key) for key in deeper if key not in ("x", "y", "z", "at")]
+        part = f"point {point} of {part}"
     return f"{_plain(inner)} of {part}" if inner else part
 
 
 def remedied(remedy: str) -> str:
     """A remedy without the signs of the file: "state pin radius" where it says `state pin: {radius: …}`."""
-    if any("_" in name and name in remedy for name in VARIABLES):
-        return ""  # it names columns of the result, which the page does not show
+    if " --" in remedy or any("_" in name and name in remedy for name in VARIABLES):
+        return ""  # it names options of the command line, or columns of the result, neither of which the page has
     plain = STATED.sub(r"\1 ", NESTED.sub(r"\1 \2 \3", remedy))
     return plain.replace(": {…}", "").replace(" …", "")
 

@@ -213,6 +213,9 @@ def test_what_is_deleted_leaves_the_other_lines_as_they_are():
         ("add range: [0 mm, 50 mm]", "add range: [0 mm, 50 mm]"),
         ("the bounds are in drive_effort_lower and drive_effort_upper", ""),
         ("use more --steps", ""),
+        ("use more --steps: a peak between two positions is in the means, but not in the extremes", ""),
+        ("state another place, or analyse with --seat free", "state another place"),
+        ("`trunnion analyse --seat loaded` has the effect", "`trunnion analyse --seat loaded` has the effect"),
     ],
 )
 def test_remedies_are_in_the_words_of_the_sheet(remedy, words):

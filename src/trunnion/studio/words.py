@@ -43,8 +43,10 @@ def spoken(where: str) -> str:
 
 def remedied(remedy: str) -> str:
     """A remedy without the signs of the file: "state pin radius" where it says `state pin: {radius: …}`."""
-    if " --" in remedy or any("_" in name and name in remedy for name in VARIABLES):
-        return ""  # it names options of the command line, or columns of the result, neither of which the page has
+    if " --" in remedy and "trunnion " not in remedy:  # options: the page has none; whole commands stay
+        remedy = re.sub(r"[,;][^,;]* --.*", "", remedy)
+    if (" --" in remedy and "trunnion " not in remedy) or any("_" in name and name in remedy for name in VARIABLES):
+        return ""  # it names columns of the result, or is about an option alone
     plain = STATED.sub(r"\1 ", NESTED.sub(r"\1 \2 \3", remedy))
     return plain.replace(": {…}", "").replace(" …", "")
 

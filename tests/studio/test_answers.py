@@ -212,6 +212,10 @@ def test_what_is_deleted_leaves_the_other_lines_as_they_are():
         ("state options: {…} or a model", "state options or a model"),
         ("add range: [0 mm, 50 mm]", "add range: [0 mm, 50 mm]"),
         ("the bounds are in drive_effort_lower and drive_effort_upper", ""),
+        ("use more --steps", ""),
+        ("use more --steps: a peak between two positions is in the means, but not in the extremes", ""),
+        ("state another place, or analyse with --seat free", "state another place"),
+        ("`trunnion analyse --seat loaded` has the effect", "`trunnion analyse --seat loaded` has the effect"),
     ],
 )
 def test_remedies_are_in_the_words_of_the_sheet(remedy, words):
@@ -349,6 +353,9 @@ def test_a_step_says_what_a_value_was_set_to():
     path = ["links", "crank", "mass"]
     for value, said in (("2 kg", "Set mass of link crank to 2 kg"), (None, "Remove mass of link crank")):
         assert ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": value}])["says"] == said
+    path = ["links", "coupler", "points", "E", 0]
+    said = ask(ask="edit", text=text, gestures=[{"do": "set", "path": path, "value": "5 mm"}])["says"]
+    assert said == "Set x of point E of link coupler to 5 mm"
 
 
 def test_what_has_no_length_is_refused():

@@ -98,6 +98,21 @@ if CHROMIUM:  # not a skip: gestures are tested without a browser; this is the p
         scale = user.of("sheet", "m.sheet.view.frame.scale")
         assert np.hypot(ends[1] - ends[0], ends[3] - ends[2]) == pytest.approx(0.03 * scale, abs=0.2)
 
+    def test_a_link_is_pinned_in_its_middle(user):
+        user.new_sheet()
+        draw(user, ("l", (200, 300), (400, 240)))
+        (ax, ay), (bx, by) = user.handle("link1.A"), user.handle("link1.B")
+        draw(user, ("p", ((ax + bx) / 2 - user.box["x"], (ay + by) / 2 - user.box["y"])))
+        entries = entries_of(user.state("s.text.value"))[0]
+        assert entries["joints"]["C"]["links"] == ["ground", "link1"]
+        assert float(entries["links"]["link1"]["points"]["C"][0].split()[0]) > 0
+
+    def test_a_tool_is_left_from_a_choice_too(user):
+        user.keys("f")
+        user.page.focus("header select")
+        user.keys("Escape")
+        assert user.state("s.tool.value") == "select"
+
     def test_a_load_against_the_motion_is_put_on_a_pivot_and_on_its_link(user):
         user.box = {"x": 0, "y": 0}
         for spot in (user.handle("D"), None):

@@ -191,6 +191,16 @@ def test_lengths_are_written_no_finer_than_they_are_drawn(fine, written):
         assert entries_of(pinned["text"])[0]["links"]["ground"]["points"]["B"] == ["60 mm", "100 mm"]
 
 
+def test_a_link_is_pinned_where_it_has_no_point_yet():
+    text, places = edited("", {}, {"do": "link", "from": [0, 0], "to": [0.1, 0]})
+    text, places = edited(text, places, {"do": "pin", "point": {"on": "link1", "at": [0.04, 0]}})
+    entries = entries_of(text)[0]
+    assert entries["links"]["link1"]["points"]["C"] == entries["links"]["ground"]["points"]["C"] == ["40 mm", 0]
+    assert entries["joints"]["C"]["links"] == ["ground", "link1"]
+    ground = {"do": "pin", "point": {"on": "ground", "at": [0.2, 0]}}
+    assert "ground" in ask(ask="edit", text=text, places=places, gestures=[ground])["error"]
+
+
 def test_a_half_drawn_linkage_is_no_error():
     text, places, told = "", {}, []
     for gesture in WHITWORTH:

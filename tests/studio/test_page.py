@@ -120,11 +120,32 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.click("button:has-text('Open it')")
         user.until("s.fileName.value === 'lever.yaml'")
         assert user.state("s.text.value") == changed
+        assert user.page.locator(".message-card").count() == 0  # it was asked for: no second question
         assert user.state("s.variant.value.text") == variant != changed
         user.page.click("role=tab[name=Plots]")
         user.page.wait_for_selector(".changes td")
         user.of("actions", "m.save(given)", "lever.yaml")
         user.idle()
+
+    def test_an_unsaved_sheet_that_gives_way_is_told_with_how_it_comes_back(user):
+        notice = user.page.locator(".bottom .notice")
+        file = user.state("s.text.value")
+        user.of("actions", "m.typed(given)", file + "# mine\n")
+        user.new_sheet()
+        assert "Unsaved work on four-bar.yaml is kept: open it again." in notice.text_content()
+        user.of("actions", "m.typed(given)", "name: Mine\n")
+        user.idle()
+        user.new_sheet()
+        assert notice.text_content() == "New sheet. Undo brings the unsaved sheet back."
+        user.keys("Control+z")
+        assert user.state("s.text.value") == "name: Mine\n"
+        user.of("actions", "m.openFile('four-bar.yaml')")
+        user.idle()
+        assert notice.text_content() == "four-bar.yaml opened."
+        assert user.state("s.text.value") == file + "# mine\n"
+        user.page.click("button:has-text('Open it')")
+        user.idle()
+        assert user.state("s.text.value") == "name: Mine\n"
 
     def test_a_studio_that_has_stopped_says_so_and_answers_a_save(user, tmp_path):
         (tmp_path / "four-bar.yaml").write_text(EXAMPLES["durango-fourbar"], "utf-8")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from studio.whitworth import TEXT
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
+WHITWORTH = (Path(__file__).resolve().parents[2] / "examples" / "whitworth-quick-return.yaml").read_text("utf-8")
 TOLERANCED = TEXT.replace("crank: 30 mm", "crank: 30 mm ± 0.5 mm")
 
 
@@ -22,7 +25,7 @@ def cycle(crank):
 
 def test_worst_cases_are_those_of_the_numbers_at_their_limits():
     found = ask(ask="tolerances", text=TOLERANCED, steps=360)
-    torque, stroke = found["rows"]
+    torque, stroke, ratio = found["rows"]
     ends = [cycle(crank) for crank in (29.5, 30, 30.5)]
     peaks = [float(np.abs(one["drive_effort"]).max()) for one in ends]
     ways = [float(np.ptp(one["joint_slide"].sel(joint="G").values)) for one in ends]
@@ -32,6 +35,19 @@ def test_worst_cases_are_those_of_the_numbers_at_their_limits():
         assert row["deviation"] == pytest.approx((high - low) / 6, rel=0.03)  # limits at three standard deviations
     assert torque["label"] == "largest torque, drive A"
     assert stroke["texts"][0] == "135.0\u00a0mm"
+    assert ratio["label"] == "time ratio of G"
+
+
+def test_a_stroke_that_no_tolerance_changes_is_told_as_that():
+    """The stroke of a Whitworth in line with its lever is 2 s whatever the crank; its time ratio is (2π − φ)/φ."""
+    text = WHITWORTH.replace("r: 120 mm", "r: 120 mm ± 0.5 mm")
+    stroke, ratio = ask(ask="tolerances", text=text, steps=360)["rows"][1:]
+    assert stroke["texts"] == ["200.0\u00a0mm", "± 0\u00a0m", "0\u00a0m"]
+    assert stroke["worst"] == [0, 0]
+    short = [2 * np.arccos(60 / crank) for crank in (119.5, 120, 120.5)]
+    low, middle, high = ((2 * np.pi - one) / one for one in short)
+    assert ratio["nominal"] == pytest.approx(middle, rel=1e-7)
+    assert ratio["worst"] == pytest.approx([-(low - high) / 2, (low - high) / 2], rel=1e-4)
 
 
 def test_a_part_of_the_cycle_that_cannot_be_reached_is_told_with_the_rest():

@@ -18,6 +18,7 @@ from trunnion.studio.ends import (
     numbered,
     pin,
     place_of,
+    point_of,
     put,
     refused,
     vector,
@@ -53,8 +54,11 @@ def link(sketch: Sketch, given: Given) -> str:
 
 
 def pinned(sketch: Sketch, given: Given) -> str:
-    """A free point becomes a pin on the ground."""
-    own, point = free(sketch, given["point"])
+    """A free point becomes a pin on the ground; given {on: link, at: place} instead, a new point of that link."""
+    end = given["point"]
+    if isinstance(end, Mapping) and end["on"] == sketch.ground:
+        raise refused("is the ground", sketch.ground, "choose a link that moves")
+    own, point = point_of(sketch, end) if isinstance(end, Mapping) else free(sketch, end)
     begin(sketch)
     place = sketch.places[f"{own}.{point}"]
     put(sketch, sketch.ground, point, place)

@@ -13,10 +13,12 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.run import prepare
+from trunnion.studio.ways import ways
 
 __all__ = ["tolerated"]
 
 MOST = 4  # strokes that are told
+ROUNDING = 1e-10  # of a value: a smaller change of it is none
 
 
 def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
@@ -26,7 +28,7 @@ def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
     """
     from trunnion.studies.tolerance.study import tolerance  # not for the first picture
 
-    told = dict(_measures(mechanism))
+    told = dict(_measures(mechanism, steps))
     if not told:
         return {"rows": [], "why": []}
     study = tolerance(mechanism, list(told), methods=("linear",), steps=steps, jobs=1, engine="numpy")
@@ -34,6 +36,9 @@ def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
     values = (study[name].values for name in ("nominal", "worst_case_lower", "worst_case_upper", "deviation_linear"))
     rows = []
     for label, unit, nominal, lower, upper, deviation in zip(told.values(), units, *values, strict=True):
+        lower, upper, deviation = (
+            one if abs(one) > ROUNDING * abs(nominal) else 0.0 for one in (lower, upper, deviation)
+        )
         even = np.isclose(-lower, upper, rtol=1e-3)
         worst = f"± {quantity(float(upper), unit)}" if even else f"{_signed(lower, unit)} / {_signed(upper, unit)}"
         texts = [quantity(float(nominal), unit), worst, quantity(float(deviation), unit)]
@@ -47,9 +52,10 @@ def _signed(value: float, unit: str) -> str:
     return f"{'−' if value < 0 else '+'}{quantity(abs(float(value)), unit)}"
 
 
-def _measures(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
+def _measures(mechanism: Mechanism, steps: int) -> Iterator[tuple[str, str]]:
     """Measures by their names on the command line, with what they are called here."""
-    system = prepare(mechanism).system
+    run = prepare(mechanism)
+    system = run.system
     for driver in mechanism.drivers:
         yield f"largest:effort:{driver}", f"largest {'torque' if system.turns(driver) else 'force'}, drive {driver}"
     held = [
@@ -59,3 +65,6 @@ def _measures(mechanism: Mechanism) -> Iterator[tuple[str, str]]:
     ]
     for joint in held[:MOST]:
         yield f"stroke:{joint}", f"stroke of {joint}"
+    for way in ways(run, steps):
+        if way.ratio > 0 and way.joint in held[:MOST]:
+            yield f"time_ratio:{way.joint}", f"time ratio of {way.joint}"

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunnion.algebra.dual import primal
 from trunnion.measures.evaluation import figures_of
 from trunnion.measures.measures import Measure, coordinate_unit, outputs
 from trunnion.results.quantities import number, quantity
@@ -21,21 +22,22 @@ DEGREES = 180.0 / np.pi
 class Way(NamedTuple):
     """A joint on the ground that goes forth and back: its stroke, m or rad, and time ratio.
 
-    The ratio is NaN of a cycle that does not come again; short: the shorter of the two ways, between its dead centres.
+    The ratio is NaN of a cycle that does not come again; told: how far the driver goes while the joint moves in its
+    positive sense, forth, and back, and where the shorter of the two ways begins and ends.
     """
 
     joint: str
     stroke: float
     unit: str
     ratio: float
-    short: str
+    told: str
 
     @property
     def rows(self) -> list[list[str]]:
         """As figures of the page."""
-        told = [[f"stroke of {self.joint}", quantity(self.stroke, self.unit)]]
-        short = f" ({self.short})" if self.short else ""
-        return told + ([[f"time ratio of {self.joint}", f"{number(self.ratio)}{short}"]] if self.ratio > 0 else [])
+        rows = [[f"stroke of {self.joint}", quantity(self.stroke, self.unit)]]
+        told = f" ({self.told})" if self.told else ""
+        return rows + ([[f"time ratio of {self.joint}", f"{number(self.ratio)}{told}"]] if self.ratio > 0 else [])
 
 
 def ways(run: Run, steps: int) -> Iterator[Way]:
@@ -55,15 +57,23 @@ def ways(run: Run, steps: int) -> Iterator[Way]:
     for one in sliding or found:
         ratio, stroke, *ends = (figures[f"{kind}:{one.subject}"] for kind in kinds)
         if np.isfinite(ratio) or (sliding and stroke > 0):
-            short = _short(ends, unit) if ends and np.isfinite(ratio) else ""
-            yield Way(one.subject, stroke, one.unit(run.system), ratio, short)
+            told = _told(run, ends, unit) if ends and np.isfinite(ratio) else ""
+            yield Way(one.subject, stroke, one.unit(run.system), ratio, told)
 
 
-def _short(ends: list[float], unit: str) -> str:
-    """The shorter way between two places of the driver; those of one that slides as they come."""
-    if unit != "rad":
-        return " to ".join(quantity(end, unit) for end in sorted(ends))
-    first, last = sorted(end * DEGREES % 360.0 for end in ends)
-    if last - first > 180.0:
-        first, last = last, first
-    return f"{first:.1f}° to {last:.1f}°"
+def _told(run: Run, ends: list[float], unit: str) -> str:
+    """Both ways, between the places of the driver where the joint is farthest out and in, in the sense it runs."""
+    driver = next(iter(run.system.mechanism.drivers))
+    drive = np.ravel(primal(run.system.drive(run.values, driver, np.array([0.0, run.cycle.duration]))[0]))
+    period = drive[1] - drive[0]
+    out, back = ends
+    forth = (out - back) / period % 1.0
+    first, last = (back, out) if forth <= 0.5 else (out, back)
+    places = (_text(one % (2 * np.pi) if unit == "rad" else one, unit) for one in (first, last))
+    texts = [f"{way} {_text(share * abs(period), unit)}" for way, share in (("forth", forth), ("back", 1.0 - forth))]
+    texts[0 if forth <= 0.5 else 1] += f" from {' to '.join(places)}"
+    return ", ".join(texts)
+
+
+def _text(place: float, unit: str) -> str:
+    return f"{place * DEGREES:.1f}°" if unit == "rad" else quantity(place, unit)

@@ -35,14 +35,18 @@ def spoken(where: str) -> str:
         if not inner:
             return f"points of {part}"
         point, *deeper = inner
-        inner, part = [key for key in deeper if key not in ("x", "y", "z", "at")], f"point {point} of {part}"
+        letters = dict(zip("012", "xyz", strict=True))  # "x of point P" where it is typed alone
+        inner = [letters.get(key, key) for key in deeper if key not in ("x", "y", "z", "at")]
+        part = f"point {point} of {part}"
     return f"{_plain(inner)} of {part}" if inner else part
 
 
 def remedied(remedy: str) -> str:
     """A remedy without the signs of the file: "state pin radius" where it says `state pin: {radius: …}`."""
-    if any("_" in name and name in remedy for name in VARIABLES):
-        return ""  # it names columns of the result, which the page does not show
+    if " --" in remedy and "trunnion " not in remedy:  # options: the page has none; whole commands stay
+        remedy = re.sub(r"[,;][^,;]* --.*", "", remedy)
+    if (" --" in remedy and "trunnion " not in remedy) or any("_" in name and name in remedy for name in VARIABLES):
+        return ""  # it names columns of the result, or is about an option alone
     plain = STATED.sub(r"\1 ", NESTED.sub(r"\1 \2 \3", remedy))
     return plain.replace(": {…}", "").replace(" …", "")
 

@@ -208,13 +208,16 @@ export function openSheet({ name, saved, content, first = null }) {
 }
 
 /** Open the sheet that was left unsaved, or throw its work away. */
-export function takeWaiting(open) {
+export async function takeWaiting(open) {
   const { name } = state.waiting.value;
   state.waiting.value = null;
-  if (open) return name === null ? openSheet({ name: null, saved: "", content: "" }) : openFile(name);
+  if (open) {
+    await (name === null ? openSheet({ name: null, saved: "", content: "" }) : openFile(name));
+    state.recovered.value = null; // it was asked for
+    return;
+  }
   state.forget(name);
   if (name === null) forgetPhoto(null);
-  return null;
 }
 
 /** Go back from the recovered work to the file as it was saved, as a step to undo. */
@@ -229,10 +232,15 @@ export function openFile(name) {
 
 async function fetched(name) {
   const mine = (sheets += 1);
+  const left = mine > 1 && state.unsaved.value && state.fileName.value !== name ? { name: state.fileName.value, time: new Date().toISOString() } : null;
   const reply = await fetch(`/first/${encodeURIComponent(name)}`);
   if (!reply.ok) return state.say(`${name} could not be read.`, true);
   const first = decode(await reply.arrayBuffer());
-  if (mine === sheets) await openSheet({ name, saved: first.text, content: first.text, first });
+  if (mine !== sheets) return;
+  const opened = openSheet({ name, saved: first.text, content: first.text, first });
+  if (mine > 1) state.say(`${name} opened.`);
+  if (left) state.waiting.value = left;
+  await opened;
 }
 
 /** Draw a mechanism by where its points go, until its answer is there. */
@@ -241,8 +249,9 @@ function showFirst({ text, entries, numbers, tracks }) {
   state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };
 }
 
-/** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo. */
+/** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo, that on a file as the file is opened. */
 export function openText(content, words) {
+  const file = state.unsaved.value ? state.fileName.value : null;
   const kept = state.kept(null);
   const before = state.fileName.value === null && state.unsaved.value ? present() : kept?.text !== kept?.saved ? kept : null;
   const left = before && { name: words, text: before.text, places: before.places ?? {} };
@@ -250,7 +259,7 @@ export function openText(content, words) {
   forgetPhoto(null);
   const opened = openSheet({ name: null, saved: content, content });
   if (left) state.past.value = [left];
-  state.say(`${words}.`);
+  state.say(`${words}.${left ? " Undo brings the unsaved sheet back." : ""}${file ? ` Unsaved work on ${file} is kept: open it again.` : ""}`);
   return opened;
 }
 

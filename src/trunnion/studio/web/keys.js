@@ -40,7 +40,8 @@ function withControl(event) {
 /** Whether the key was one of ours. */
 function ordinary(event) {
   const { target, key } = event;
-  if (event.ctrlKey || event.metaKey || target.closest?.(WRITES)) return false;
+  const chooses = key === "Escape" && state.tool.value !== "select" && target.matches?.("select") && !target.closest("dialog");
+  if (event.ctrlKey || event.metaKey || (target.closest?.(WRITES) && !chooses)) return false;
   if (value(event)) return true;
   const onSheet = sheet.view?.root.contains(target);
   if (onSheet && (key in ARROWS || key === "Enter")) return key === "Enter" ? enter(event) : arrow(event);

@@ -23,7 +23,7 @@ export const pointer = signal(null);
 export const TOOLS = [
   { id: "select", label: "Select", key: "V", hint: ["Drag a joint: along its path the mechanism moves, off it lengths change."] },
   { id: "link", label: "Link", key: "L", hint: ["Click the first end: a joint, a place on a link, or a free place. Shift+click pins it to the ground.", "Click the second end, or type a length and press Enter. Shift+click pins it to the ground."], click: drawLink, tells: tellLength, begins: /[0-9.,]/, on: true },
-  { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link to pin it to the ground."], click: pin },
+  { id: "pin", label: "Pin", key: "P", hint: ["Click a free point of a link, or a place on a link, to pin it to the ground."], click: pin, on: true },
   { id: "slide", label: "Slide", key: "G", hint: ["Click what slides: a free end, a pin, or a link itself.", "Click the link it slides along, or the direction of a guide on the ground, or type an angle."], click: slide, tells: tellAngle, begins: /[0-9.,-]/, on: true },
   { id: "gear", label: "Gears", key: "E", hint: ["Click the pivot of the first gear, or its link.", "Click the pivot of the second gear. For a ratio type the teeth first, as 20:40."], click: gear, tells: tellRatio, begins: /[0-9.,+]/, on: true },
   { id: "driver", label: "Drive", key: "D", hint: ["Click the joint that is driven."], click: drive },
@@ -130,9 +130,9 @@ function tellLength(a, b, frame) {
   return `${lengthText(Math.hypot(dx, dy), unit, gridStep(frame.scale) / 10)}, ${angle}°${b.kind || b.on ? `, joined to ${b.kind ? b.name : b.on}` : ""}`;
 }
 
-function pin({ kind, name }) {
-  if (kind !== "points") return say("Only a free point of a link can be pinned to the ground.", true);
-  edit([{ do: "pin", point: name }]);
+function pin(spot) {
+  if (spot.kind !== "points" && !spot.on) return say("Click a free point of a link, or a place on a link: it is pinned to the ground there.", true);
+  edit([{ do: "pin", point: endOf(spot) }]);
 }
 
 function addPoint(spot) {

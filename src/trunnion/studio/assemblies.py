@@ -36,7 +36,7 @@ def other_assemblies(run: Run, entries: Mapping[str, Any], steps: int) -> Iterat
             other = prepare(Mechanism(**sketch.entries))
             with np.errstate(all="ignore"):
                 yield (
-                    f"{' and '.join(group.links)} put together the other way ({way.name})",
+                    f"{' and '.join(group.links)} assembled the other way ({way.name})",
                     gestures,
                     other.walk(other.cycle.times(steps)),
                 )

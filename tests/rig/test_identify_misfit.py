@@ -238,9 +238,9 @@ def test_the_legend_of_the_residuals_stands_above_the_name_of_the_condition(
     title = next(one for one in first.get_children() if isinstance(one, Text) and "600 rpm" in one.get_text())
     assert legend.get_window_extent().y0 >= title.get_window_extent().y1 - 1
     assert len(sheet.axes) == 2 * 2
-    assert "courses" not in sheet.get_suptitle()
+    assert "curves" not in sheet.get_suptitle()
     monkeypatch.setattr("trunnion.views.identify.figure.MOST_PANELS", 1)
-    assert "1 of 2 courses" in figure(result, "residuals").get_suptitle()
+    assert "1 of 2 curves" in figure(result, "residuals").get_suptitle()
 
 
 def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:

@@ -123,7 +123,7 @@ def residuals(result: xr.Dataset) -> Figure:
     if not every:
         return _figures(result)
     pairs = panels(every)
-    more = f", {len(pairs)} of {len(every)} courses" if len(pairs) < len(every) else ""
+    more = f", {len(pairs)} of {len(every)} curves" if len(pairs) < len(every) else ""
     sheet = new(f"Residuals, before and after{more}", result, height=1.0 + 1.75 * len(pairs))
     rows = sheet.subplots(len(pairs), 2, sharex=True, squeeze=False)
     drive = str(result.attrs.get("drive", ""))

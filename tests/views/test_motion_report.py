@@ -289,9 +289,9 @@ if NODE:
         told = seen["motion"]
         wanted = {
             "start": ["Speed", "Drive torque O", "Works and energies", "Joint reactions, magnitude",
-                      "Friction power by joint", "Power"],
+                      "Friction power by joint", "Power", "Slide of joints"],
             "run-down": ["Speed", "Works and energies", "Joint reactions, magnitude", "Friction power by joint",
-                         "Power"],
+                         "Power", "Slide of joints"],
             "stays": ["Speed", "Drive torque A", "Joint reactions, magnitude"],
             "swing": ["Speed", "Works and energies", "Joint reactions, magnitude"],
             "ends early": ["Speed", "Drive torque A", "Works and energies", "Joint reactions, magnitude", "Power"],

@@ -11,6 +11,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -140,7 +141,12 @@ class Processes(Generic[T]):
 
     def _end(self) -> str:
         """How the worker ended that ended the pool; the pool then terminates the others."""
-        codes = [one.exitcode for one in self._processes if one.exitcode]
+        codes: list[int] = []
+        for _ in range(20):  # while another thread has waited for it and not yet noted how it ended, there is no code
+            codes = [one.exitcode for one in self._processes if one.exitcode]
+            if any(code != -signal.SIGTERM for code in codes):
+                break
+            time.sleep(GRACE / 200)
         code = next((code for code in codes if code != -signal.SIGTERM), codes[0] if codes else None)
         if code is None or code >= 0:
             return f"exit status {code}"

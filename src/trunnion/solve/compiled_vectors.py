@@ -197,8 +197,6 @@ def inputs_of(values: Values, time: Array) -> _Inputs:
 
 def _parts(shape: tuple[int, ...], threads: int) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
     """Samples and positions of the parts of a job: first one to judge by, then as even as may be."""
-    from trunnion.engines.machine_code import vector_width
-
     samples, positions = shape
     if samples > 1:
         first = min(samples, max(1, PROBE // positions))
@@ -207,6 +205,6 @@ def _parts(shape: tuple[int, ...], threads: int) -> Iterator[tuple[tuple[int, in
         yield (0, first), (0, positions)
         yield from (((low, high), (0, positions)) for low, high in pairwise(edges))
         return
-    count = max(1, min(threads, positions // max(ALONE, vector_width())))
-    edges = np.linspace(0, positions, count + 1).astype(int).tolist()
-    yield from (((0, 1), (low, high)) for low, high in pairwise(edges))
+    count = min(threads, (positions - PROBE) // ALONE)
+    edges = np.linspace(PROBE, positions, count + 1).astype(int).tolist() if count > 1 else [positions]
+    yield from (((0, 1), (low, high)) for low, high in pairwise([0, *edges]))

@@ -15,8 +15,10 @@ from trunnion.cycle.holding import reverse_figure
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.means import MOST_SUPPOSED, Means
+from trunnion.cycle.model_measures import Watched, positions_told, watched
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scene import COURSE, DRAWN, courses
+from trunnion.cycle.variables import fill_of
 from trunnion.errors import Finding, Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -31,7 +33,7 @@ from trunnion.results.figure import Figure
 from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
-from trunnion.solve.loads import Stated, stated_walk
+from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.system import Dial, System, felt, rubbing
 
@@ -39,10 +41,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from trunnion.solve.run import Run
-
-from trunnion.cycle.model_measures import Watched, positions_told, watched
-from trunnion.cycle.variables import fill_of
-from trunnion.solve.loads import useful_loads, useful_springs
 
 __all__ = [
     "BALANCED",
@@ -415,8 +413,7 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
     margin = found.arrays["locking_margin"]
     if len(near.times) != len(found.time):
         with np.errstate(all="ignore"):
-            own = locking_margin(run.solve(near.times, method=found.method))
-        margin = np.broadcast_to(np.asarray(own, float), near.times.shape)
+            margin = np.zeros(len(near.times)) + locking_margin(run.solve(near.times, method=found.method))
     dial = _dial_of(near, run, found)
     rows = [
         {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),

@@ -142,6 +142,8 @@ class CompiledKernel(ABC):
 
     def decide(self, values: Values, time: Array, found: Lanes) -> None:
         """Compute the doubtful lanes with NumPy, a chunk at a time."""
+        if not found.doubtful.any():  # as a rule; to list them takes longer
+            return
         rows, columns = np.nonzero(found.doubtful)
         self.again += len(rows)
         for low in range(0, len(rows), CHUNK):

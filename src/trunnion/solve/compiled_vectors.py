@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from threading import Lock
+from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["VectorKernel", "arrays_of", "inputs_of", "literals"]
 
-PROBE = 4096  # lanes by which one judges whether the rest is worth while
-HOPELESS = 0.5  # share of doubtful lanes from which the rest is left to NumPy
 ALONE = 1 << 15  # lanes that one thread does in about the time that starting another takes
 STRUCTURAL = (0.0, 1.0, -1.0)  # numbers by which kernels save work: they are compiled in
 TIME = "time"
@@ -81,17 +79,15 @@ class VectorKernel(CompiledKernel):
 
     def _filled(self, values: Values, time: Array, found: Lanes) -> None:
         inputs = inputs_of(values, time)
-        from concurrent.futures import ThreadPoolExecutor  # takes long to import
-
         program, arrays = self.program(inputs), arrays_of(found)
-        with ThreadPoolExecutor(self.threads) as pool:
-            first, *rest = _parts(found.status.shape, self.threads)
-            program.run(inputs.numbers, arrays, *first)
-            probed = found.doubtful[slice(*first[0]), slice(*first[1])]
-            if rest and np.mean(probed) > HOPELESS:
-                found.doubtful[:] = True  # NumPy is quicker at once
-                return
-            list(pool.map(lambda part: program.run(inputs.numbers, arrays, *part), rest))
+        parts = _parts(found.status.shape, self.threads)
+        first, *others = [program.bound(inputs.numbers, arrays, *part) for part in parts]
+        threads = [Thread(target=part) for part in others]
+        for thread in threads:
+            thread.start()
+        first()
+        for thread in threads:
+            thread.join()
 
     def program(self, inputs: _Inputs) -> MachineCode:
         """The machine code for numbers of this structure."""
@@ -164,12 +160,16 @@ def arrays_of(found: Lanes) -> list[NDArray[Any]]:
     return [*found.curves.values(), found.status, found.doubtful]
 
 
+def _single(value: Any) -> bool:
+    return isinstance(value, float) or not np.ndim(value)  # asked of each number in each call: floats first
+
+
 def literals(values: Values) -> dict[str, Any]:
     """What is compiled in, by path: texts, and numbers by which kernels save work."""
     return {
         path: value
         for path, value in values.items()
-        if isinstance(value, str) or (not np.ndim(value) and float(value) in STRUCTURAL)
+        if isinstance(value, str) or (_single(value) and float(value) in STRUCTURAL)
     }
 
 
@@ -183,12 +183,12 @@ def inputs_of(values: Values, time: Array) -> _Inputs:
     for path, value in values.items():
         if path in literal:
             continue
-        if np.ndim(value) == 2 and np.shape(value)[1] > 1:
+        if _single(value) or np.size(value) == 1:
+            numbers[path], differs[path] = np.array(value, float).reshape(1), 0
+        elif np.ndim(value) == 2 and np.shape(value)[1] > 1:
             numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), POSITION
-        elif np.size(value) > 1:
-            numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), SAMPLE
         else:
-            numbers[path], differs[path] = np.array([float(np.ravel(value)[0])]), 0
+            numbers[path], differs[path] = np.ascontiguousarray(value, float).ravel(), SAMPLE
     one = time.ndim == 1 or len(time) == 1
     numbers[TIME] = np.ascontiguousarray(time, float) if not one else np.ascontiguousarray(time, float).ravel()
     differs[TIME] = POSITION if one else BOTH
@@ -196,15 +196,10 @@ def inputs_of(values: Values, time: Array) -> _Inputs:
 
 
 def _parts(shape: tuple[int, ...], threads: int) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Samples and positions of the parts of a job: first one to judge by, then as even as may be."""
+    """Samples and positions of the parts of a job, one for each thread that pays, as even as may be."""
     samples, positions = shape
-    if samples > 1:
-        first = min(samples, max(1, PROBE // positions))
-        count = max(1, min(threads, (samples - first) * positions // ALONE))
-        edges = np.linspace(first, samples, count + 1).astype(int).tolist() if samples > first else [first]
-        yield (0, first), (0, positions)
-        yield from (((low, high), (0, positions)) for low, high in pairwise(edges))
-        return
-    count = min(threads, (positions - PROBE) // ALONE)
-    edges = np.linspace(PROBE, positions, count + 1).astype(int).tolist() if count > 1 else [positions]
-    yield from (((0, 1), (low, high)) for low, high in pairwise([0, *edges]))
+    divided = samples if samples > 1 else positions
+    count = max(1, min(threads, samples * positions // ALONE, divided))
+    edges = np.linspace(0, divided, count + 1).astype(int).tolist()
+    for part in pairwise(edges):
+        yield (part, (0, positions)) if samples > 1 else ((0, 1), part)

@@ -222,6 +222,25 @@ def test_effort_with_friction_against_brute_force() -> None:
         assert float(back.efforts["A"].item()) - base == pytest.approx(most, rel=2e-3)
 
 
+def test_where_the_link_of_the_seat_counts_all_figures_are_of_the_one_that_does_more() -> None:
+    """Worst case, deviation and sensitivity of an effort: the larger of both `seat_on`, and of one link together."""
+    data = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml").model_dump(mode="json", exclude_unset=True)
+    found = {}
+    for link in ("", "crank", "rod"):
+        joint = data["joints"]["P"] | ({"seat_on": link} if link else {})
+        model = trunnion.Mechanism(**{**data, "joints": {**data["joints"], "P": joint}})
+        found[link] = trunnion.play(model, ["effort:O"], steps=24).sel(measure="effort:O", joint="P")
+    either = found[""]
+    on = [found[link]["worst_case"].values for link in ("crank", "rod")]
+    assert np.all(on[0] > 2 * on[1])  # the hole is on the rod
+    for name in ("worst_case", "deviation"):
+        expected = np.maximum(*(found[link][name].values for link in ("crank", "rod")))
+        np.testing.assert_allclose(either[name], expected, rtol=1e-9, atol=1e-12)
+    load = np.sqrt((either["sensitivity"].sel(end="1") ** 2).sum("axis", skipna=True))
+    np.testing.assert_allclose(float(either["radius"].sel(end="1")) * load, either["worst_case"], rtol=1e-12)
+    np.testing.assert_allclose(either["deviation"], either["worst_case"] / 2, rtol=1e-12)  # of a disc
+
+
 def test_end_float() -> None:
     """A rocker that can shift along its axis by half the float either way, against brute force."""
     mechanism = rssr(clearance=1e-9, float_=1e-4)

@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
     worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position), others: the same
-    with seats on the other links, where the model does not say which carry them; status. extremes: of each measure
+    with seats on the other links, where the model does not say which carry them; on_others (measure, joint, position):
+    where these do more, and so count; status. extremes: of each measure
     whose figure is a maximum or minimum, or at a stated place, by name, what play does to it alone there; corner: of
     such an effect at a corner of its course, the figure and what the positions have of it. figure: of a maximum or
     minimum the extreme itself, (sample,), with pins at offsets, (sample, 1), by path.
@@ -39,6 +40,7 @@ class Effect:
     deviation: Array
     loads: Array
     others: Array
+    on_others: NDArray[np.bool_]
     status: NDArray[np.int8]
     extremes: Mapping[str, Effect] = field(default_factory=dict)
     corner: tuple[float, float] | None = None
@@ -48,6 +50,11 @@ class Effect:
         """Where the figure of a measure is looked for, and its number there: at its extreme, or over the cycle."""
         there = self.extremes.get(self.measures[i].name)
         return (self, i) if there is None else (there, 0)
+
+    @property
+    def sensitivity(self) -> Array:
+        """Loads that count, (measure, joint, end, axis, position)."""
+        return np.where(self.on_others[:, :, None, None], self.others, self.loads)
 
     @property
     def total(self) -> Array:

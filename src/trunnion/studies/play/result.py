@@ -38,7 +38,9 @@ VARIABLES: dict[str, Variable] = {
     "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
     "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
     "sensitivity": Variable(
-        ("measure", "joint", "end", "axis", "position"), "/m", "change of the measure for an offset of 1 m at an end"
+        ("measure", "joint", "end", "axis", "position"),
+        "/m",
+        "change of the measure for an offset of 1 m at an end, of the link on which the worst case is larger",
     ),
     "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
     "extreme_worst_case": Variable(
@@ -76,7 +78,7 @@ class PlayEffects(Protocol):
     @property
     def total(self) -> Array: ...
     @property
-    def loads(self) -> Array: ...
+    def sensitivity(self) -> Array: ...
     @property
     def status(self) -> NDArray[np.int8]: ...
     @property
@@ -86,7 +88,8 @@ class PlayEffects(Protocol):
 def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
     """The arrays with all that is said of them."""
     system, mechanism = found.run.system, found.run.system.mechanism
-    ends = found.loads.shape[2]
+    sensitivity = found.sensitivity
+    ends = sensitivity.shape[2]
     arrays: dict[str, Array | NDArray[np.int8]] = {
         "value": found.value,
         "worst_case": found.worst_case,
@@ -94,7 +97,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "worst_case_total": found.total,
         "rss": np.sqrt(np.sum(found.worst_case**2, axis=1)),
         "deviation_total": np.sqrt(np.sum(found.deviation**2, axis=1)),
-        "sensitivity": found.loads,
+        "sensitivity": sensitivity,
         "radius": _radii(found.plays, ends),
         "status": found.status,
         **_at_extremes(found),

@@ -266,7 +266,7 @@ def _over(
     loads, others = np.full((2, len(measures), len(known), ends, 3, steps), np.nan)
     effect = Effect(
         run, measures, known, time, np.zeros((len(measures), steps)), np.zeros(shape), np.zeros(shape), loads, others,
-        np.zeros(steps, np.int8),
+        np.zeros(shape, bool), np.zeros(steps, np.int8),
     )  # fmt: skip
     rates = np.zeros((len(measures), steps))
     for low in range(0, steps, CHUNK):
@@ -323,12 +323,19 @@ def _both(run: Run, known: Mapping[str, Play], loads_of: Callable[..., Loads]) -
 
 
 def _put(effect: Effect, i: int, loads: Loads, window: slice, known: NDArray[np.bool_], others: Loads) -> None:
-    """Worst case and deviation of one measure; others: loads with seats on the other links, for the worst case."""
+    """Worst case and deviation of one measure; others: loads with seats on the other links, which count where they do
+    more."""
     for j, (name, one) in enumerate(effect.plays.items()):
-        most = worst_case(loads[name], one.radii)
-        most = np.maximum(most, worst_case(others[name], one.radii)) if name in others else most
+        most, scatter = worst_case(loads[name], one.radii), variance(loads[name], one.radii)
+        if name in others:
+            other = worst_case(others[name], one.radii)
+            effect.on_others[i, j, window] = elsewhere = other > most
+            most, scatter = (
+                np.where(elsewhere, other, most),
+                np.where(elsewhere, variance(others[name], one.radii), scatter),
+            )
         effect.worst_case[i, j, window] = np.where(known, most, np.nan)
-        effect.deviation[i, j, window] = np.where(known, np.sqrt(variance(loads[name], one.radii)), np.nan)
+        effect.deviation[i, j, window] = np.where(known, np.sqrt(scatter), np.nan)
         for of, kept in ((loads, effect.loads), (others, effect.others)):
             for k, (end, load) in enumerate(zip(one.model.ends, of.get(name, ()), strict=False)):
                 for key, part in zip(end, load, strict=True):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
-import yaml
+from ruamel.yaml import YAML
 
 from manual.conftest import Run
 from timed import LINEAR, two_wheels
@@ -61,7 +62,7 @@ def test_tables_and_figures_that_a_motion_has_not_are_refused_before_it_is_found
 
 
 def test_several_drivers_that_may_stick_have_no_steady_cycle(program: Run, tmp_path: Path) -> None:
-    (tmp_path / "two.yaml").write_text(yaml.safe_dump(two_wheels(LINEAR).data()))
+    (tmp_path / "two.yaml").write_text(json.dumps(two_wheels(LINEAR).data()))
     code, _, err = program("simulate", "two.yaml", "--steady", "--time=1s")
     assert code == 2
     assert "joints.A: it may stick while others slide" in err
@@ -69,14 +70,14 @@ def test_several_drivers_that_may_stick_have_no_steady_cycle(program: Run, tmp_p
 
 
 def play_and_clutch() -> dict[str, object]:
-    data = yaml.safe_load((EXAMPLES / "worn-gudgeon-pin.yaml").read_text())
+    data = YAML(typ="safe").load(EXAMPLES / "worn-gudgeon-pin.yaml")
     motor = {"kind": "constant", "effort": 9, "inertia": 0.01, "clutch": 5}
     data["drivers"]["O"]["motor"] = motor
     return dict(data)
 
 
 def test_a_clutch_beside_joints_in_play_is_refused_with_what_to_remove(program: Run, tmp_path: Path) -> None:
-    (tmp_path / "played.yaml").write_text(yaml.safe_dump(play_and_clutch()))
+    (tmp_path / "played.yaml").write_text(json.dumps(play_and_clutch()))
     code, _, err = program("simulate", "played.yaml", "--time=1ms")
     assert code == 2
     assert "remove it, or the contact of the joints in play" in err

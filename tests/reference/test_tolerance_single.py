@@ -15,6 +15,7 @@ import trunnion
 from measured import references
 from mechanisms_parts import Data
 from toleranced import alone, sampler, varied
+from trunnion.measures.evaluation import figures_of
 from trunnion.measures.figures import figure
 from trunnion.measures.measures import coordinate_unit
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -107,6 +108,10 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
             own = float(np.ravel(figure(measure.curve(back), nominal[measure.name]))[0])
             known = nominal[measure.name]
             scale = max(abs(own), abs(known.figure), *(np.max(np.abs(part), initial=0.0) for part in known.parts))
+            if found.references[measure.name].corner and measure.rule not in EXTREMES:  # a mean of what jumps
+                own = figures_of(run, [measure], STEPS, FrictionMethod())[measure.name]
+                assert figures[k, i] == pytest.approx(own, rel=0, abs=1e-6 * scale, nan_ok=True), measure.name
+                continue
             if found.references[measure.name].corner:
                 course = measure.curve(run.solve(run.cycle.times(DENSE), None, FrictionMethod(margin_up_to=MARGIN)))
                 own = float(EXTREMES[measure.rule](np.asarray(course[0], float)))

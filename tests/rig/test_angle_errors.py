@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from ruamel.yaml import YAML
 
 import trunnion
 from measured_data.four_bar import FOUR_BAR, rocker
@@ -51,7 +52,7 @@ def mapping(folder: Path, zeros: dict[str, float]) -> dict[str, Any]:
 
 
 def findings(folder: Path, stated: dict[str, Any], channel: str | None = None) -> list[Any]:
-    (folder / "mapping.yaml").write_text(yaml.safe_dump(stated))
+    (folder / "mapping.yaml").write_text(json.dumps(stated))
     result = trunnion.rig.compare(MODEL, read_measured(folder / "mapping.yaml"), [channel] if channel else None)
     return [one for one in result.trunnion.findings if one.severity == "error"]
 
@@ -63,7 +64,7 @@ def test_each_file_has_its_own_zero_and_the_entries_can_be_pasted(tmp_path: Path
     assert found.code == "compare.angle_shifted"
     sizes = np.degrees(list(found.figures["sizes"].values()))
     assert sizes == pytest.approx(list(zeros.values()), abs=0.02)
-    entries = yaml.safe_load(found.remedy.partition("files: ")[2])
+    entries = YAML(typ="safe").load(found.remedy.partition("files: ")[2])
     assert [{**one, "angle": None} for one in entries] == [{**one, "angle": None} for one in stated["files"]]
     assert not findings(tmp_path, {**stated, "files": entries})
 
@@ -81,7 +82,7 @@ def test_one_channel_alone_gives_entries_for_the_files_too(tmp_path: Path) -> No
     assert (found.code, found.figures["cause"]) == ("compare.not_within", "shift")
     sizes = [float(one) for one in re.findall(r": ([+-][\d.]+) deg", found.what)]
     assert sizes == pytest.approx([12.35, -47.55], abs=0.02)
-    entries = yaml.safe_load(found.remedy.partition("files: ")[2])
+    entries = YAML(typ="safe").load(found.remedy.partition("files: ")[2])
     assert not findings(tmp_path, {**stated, "files": entries}, "psi")
 
 
@@ -181,7 +182,7 @@ def in_steps(folder: Path, zero: float = 0.0, noise: float = 0.05) -> Any:
         "angle": {"from": "column", "column": "a", "unit": "deg", "resolution": "0.1 deg"},
         "channels": {"M": RATES["M"]},
     }
-    (folder / "mapping.yaml").write_text(yaml.safe_dump(stated))
+    (folder / "mapping.yaml").write_text(json.dumps(stated))
     model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
     return trunnion.rig.identify(model, read_measured(folder / "mapping.yaml"), ["brake.resisting_torque"])
 

@@ -56,10 +56,10 @@ class Nodes(NamedTuple):
 
 
 def nodes(edges: Array) -> Nodes:
-    """The nodes of all panels between edges."""
-    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
-    length = edges[-1] - edges[0]
-    return Nodes(*(part.ravel() for part in (middle + half * NODES, half * KRONROD / length, half * GAUSS / length)))
+    """The nodes of all panels between edges, (…, edge); (…, node)."""
+    half, middle = 0.5 * np.diff(edges)[..., None], 0.5 * (edges[..., 1:] + edges[..., :-1])[..., None]
+    share, shape = half / (edges[..., -1:] - edges[..., :1])[..., None], (*edges.shape[:-1], -1)
+    return Nodes(*(part.reshape(shape) for part in (middle + half * NODES, share * KRONROD, share * GAUSS)))
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,9 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
     value, held = min(delivered / given, 1.0), states <= {LockingState.SELF_LOCKING}
     if value <= 0 and held:
         return Figure(name, subject, value, note="self-locking" if _by_friction(run, back) else "held without friction")
-    differ = value <= 0 or (len(states) > 1 and felt(run.system, run.values))
+    if value <= 0:
+        return Figure(name, subject, value, note="it takes work to run it backward; the ranges of `locking` differ")
+    differ = len(states) > 1 and felt(run.system, run.values)
     return Figure(name, subject, value, note="a mean: the ranges of `locking` differ" * bool(differ))
 
 

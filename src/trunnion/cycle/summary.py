@@ -14,7 +14,6 @@ from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.holding import reverse_figure
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
-from trunnion.cycle.means import MOST_SUPPOSED, Means
 from trunnion.cycle.model_measures import Watched, positions_told, watched
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scene import COURSE, DRAWN, courses
@@ -311,7 +310,8 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
         yield from _reaction_figures(run.system, arrays, dial, sound)
         if rubbing(run.system):
             yield from _friction_figures(run, found, near, dial, sound)
-        yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=_why(means, arrays))
+        note = uncounted.meaning(run.system.mechanism, means, status)
+        yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=note)
         yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
         if found.ideal is not None:
             yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
@@ -429,24 +429,6 @@ def _states(found: Positions, near: near_locking.Locking) -> NDArray[np.int8]:
     if len(near.times) == len(found.time):
         known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     return in_order(near.ahead, near.back, known)
-
-
-def _why(means: Means, arrays: Arrays) -> str:
-    """What an efficiency of 0, or none, means."""
-    value = means.efficiency
-    if value == 0:
-        return "the useful loads do no net work"
-    if np.isfinite(value):
-        return ""
-    if np.any(arrays["status"] >= Status.NOT_CONVERGED):
-        return "not every position is solved"
-    if means.supposed > MOST_SUPPOSED:
-        return f"pins do not settle, which may change {means.supposed:.0%} of the work"
-    if not np.isfinite(means.drive_power.value):
-        return "not every position between the steps is solved"
-    if means.drive_power.net < 0:
-        return "the loads drive, the driver absorbs work"
-    return "the driver does no net work"
 
 
 # the power balance: what is left over, and what that is held against

@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import integrals
-from trunnion.cycle.means import Means
-from trunnion.errors import Finding
+from trunnion.cycle.means import MOST_SUPPOSED, Means
+from trunnion.errors import Finding, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.results.sentences import finding_for
 from trunnion.solve.loads import useful_loads, useful_springs
 from trunnion.solve.run import Run
 
-__all__ = ["beside_the_drive", "findings"]
+__all__ = ["beside_the_drive", "findings", "meaning"]
 
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
+
+
+def meaning(mechanism: Mechanism, means: Means, status: NDArray[Any]) -> str:
+    """What an efficiency of 0, or below it, or none, means. status: of the positions."""
+    value = means.efficiency
+    if value == 0:
+        purpose = useful_loads(mechanism) or useful_springs(mechanism)
+        return "the useful loads do no net work" if purpose else "no load or spring is marked useful"
+    if np.isfinite(value):
+        return "the useful loads supply work" * bool(value < 0)
+    if np.any(status >= Status.NOT_CONVERGED):
+        return "not every position is solved"
+    if means.supposed > MOST_SUPPOSED:
+        return f"pins do not settle, which may change {means.supposed:.0%} of the work"
+    if not np.isfinite(means.drive_power.value):
+        return "not every position between the steps is solved"
+    return "the loads drive, the driver absorbs work" if means.drive_power.net < 0 else "the driver does no net work"
 
 
 def beside_the_drive(mechanism: Mechanism) -> list[str]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
+from trunnion.measures.averages import averaged, own_edges, with_jumps
 from trunnion.measures.corners import extreme, raised, sides_of, with_corner
 from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
@@ -22,14 +23,26 @@ from trunnion.solve.compiled_seats import CompiledLooks
 from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, tracked
 
-__all__ = ["Courses", "Kernel", "NumpyKernel", "at_corner", "courses_of", "figures_of", "looking", "where_known"]
+__all__ = [
+    "Courses",
+    "Kernel",
+    "NumpyKernel",
+    "at_corner",
+    "courses_of",
+    "figures_of",
+    "looking",
+    "sharpened",
+    "where_known",
+]
 
 Courses = dict[str, tuple[Number, ...]]
+NODES_OF_A_PANEL = 15
 
 
 class Kernel(Protocol):
@@ -138,9 +151,41 @@ def at_corner(
     """
     run, look = plan.run, looking(kernel, plan, values, known.measure)
     of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle] * len(course))
+    if known.window.edges is not None:
+        return _averaged(kernel, plan, known, of)
     times = tracked(of, known.bends, lambda own, time: replace(plan, times=time).moved(own))
     beside = sides_of(known, times, run.cycle)
     return extreme(known, course, look, beside) if known.corner else raised(known, course, look, beside, figures)
+
+
+def _averaged(kernel: Kernel, plan: PositionPlan, known: Reference, of: Mechanisms) -> NDArray[np.float64]:
+    """Means of a course that jumps, (sample,), so many samples at a time that their arrays stay in cache."""
+    edges = own_edges(known, of, plan)
+    found = []
+    for rows in np.array_split(np.arange(len(edges)), -(-edges.size * NODES_OF_A_PANEL // CHUNK)):
+        look = _parts_at(kernel, plan, of.picked(rows), known.measure)
+        found.append(averaged(known, look, edges[rows]))
+    return np.concatenate(found)
+
+
+def _parts_at(
+    kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number], measure: Measure
+) -> Callable[[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """The parts of the course of a measure, at times as of `looking`."""
+
+    def look(time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        time = time % plan.run.cycle.duration if plan.run.cycle.periodic else time
+        courses, _ = kernel.courses(values, replace(plan, times=time).moved(values))
+        return [np.broadcast_to(np.asarray(primal(part), float), time.shape) for part in courses[measure.name]]
+
+    return look
+
+
+def sharpened(known: Reference, kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number]) -> Reference:
+    """The nominal mechanism with what is to be known of corners and jumps of its course."""
+    if known.window.edges is not None:
+        return with_jumps(known, _parts_at(kernel, plan, values, known.measure), plan)
+    return with_corner(known, looking(kernel, plan, values, known.measure), plan.run)
 
 
 def looking(

@@ -3,9 +3,9 @@
 A course is what `Measure.curve` gives at the positions of a `positions.Plan`; `reference` keeps that of the
 nominal mechanism once, `figure` makes the numbers of many samples. Angles follow those of the nominal mechanism, from
 which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁷), place by
-O(h⁶), h the step, where the course is smooth); means over the cycle are integrals between the places where the nominal
-mechanism switches (`quadrature`), those over part of it are off by O(h⁴) where the course is smooth. A figure is NaN
-where a position that it needs has no answer, and a dead centre that is not within its range is NaN.
+O(h⁶), h the step, where the course is smooth); means are integrals between the places where the mechanism switches
+(`quadrature`, `averages`). A figure is NaN where a position that it needs has no answer, and a dead centre that is not
+within its range is NaN.
 
 With dual numbers a figure has its exact derivatives. That of a largest |deviation| or of a distance from the nominal
 place has none at the nominal mechanism itself, where it is 0 whatever way one goes: take those of the course there.
@@ -186,13 +186,6 @@ class Reference:
         return self.measure.of.against or self.attitude or self.measure.rule == "deviation"
 
     @property
-    def share(self) -> float:
-        """Of the cycle, that of the window of an energy."""
-        window, duration = self.window, float(self.parts[1][0])
-        whole = window.period is not None or window.weights is not None or not duration
-        return 1.0 if whole else float(window.time[-1] - window.time[0]) / duration
-
-    @property
     def opened(self) -> bool:
         """Whether the course gains whole turns in a period, so that its end is another value than its start."""
         return bool(self.window.period is not None and self.turns and not self.against)
@@ -366,7 +359,7 @@ def _figure(nominal: Reference, parts: Sequence[Number]) -> Number:
     if rule == "work":
         course = course_of(nominal, parts[0])
         mean, duration = (total(part, course.grid.weights) for part in parts)
-        return mean * duration * nominal.share
+        return mean * duration * nominal.window.share
     number = _single(nominal, parts)
     return RULES[rule](course_of(nominal, number))
 

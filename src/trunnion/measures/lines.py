@@ -102,7 +102,9 @@ def _wide(number: Number) -> Number:
 
 
 def total(number: Number, weights: Array) -> Number:
-    """Weighted sum over the positions, the last axis."""
+    """Weighted sum over the positions, the last axis. weights: (position,), or those of each row, (row, position)."""
     if isinstance(number, Dual):
         return Dual(total(number.real, weights), total(number.dual, weights))
+    if weights.ndim > 1:
+        return np.sum(number * weights, axis=-1)
     return (np.asarray(number) if np.shape(number)[-1:] == weights.shape else number + 0.0 * weights) @ weights

@@ -29,6 +29,7 @@ __all__ = ["PositionPlan", "Window", "place_of", "plan"]
 
 Array = NDArray[np.float64]
 
+ALIKE = 1e-10  # of the cycle: times that are one
 CLOSE = 0.25  # of a step: a position of the grid that is closer to the end of a window gives way to it
 NEWTONS = 4  # steps to a time, one of which is exact at a constant speed, before it is looked for by bisection
 BISECTIONS = 60
@@ -41,7 +42,8 @@ class Window:
     index: into the times of the plan, in order; time: theirs, s, rising (beyond the end of the cycle where the window
     runs over it); coordinate: of the first driver if it runs one way (else the time), in the same way; period: after
     which they repeat, s, None for a range; gain: of the coordinate in a period; weights: of the positions in a mean,
-    and those of a rougher rule, where they are the places of a rule.
+    and those of a rougher rule, where they are the places of a rule; edges: times, s, between which the rule's places
+    lie; share: of the cycle.
     """
 
     index: NDArray[np.intp]
@@ -50,6 +52,8 @@ class Window:
     period: float | None = None
     gain: float = 0.0
     weights: tuple[Array, Array] | None = None
+    edges: Array | None = None
+    share: float = 1.0
 
     @cached_property
     def everything(self) -> bool:
@@ -117,18 +121,49 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
             findings += error.findings
     if findings:
         raise MechanismError(findings)
-    averaged = {measure.name for measure in measures if not ends[measure.name] and _averages(run, measure)}
-    rule = nodes(run.edges) if averaged else Nodes(*(np.zeros(0),) * 3)
+    averaging = [measure.name for measure in measures if len(ends[measure.name]) != 1 and _averages(run, measure)]
+    averaged = {name: _edges_within(run, ends[name]) for name in averaging}
+    rules = {name: nodes(edges) for name, edges in averaged.items()}
     asked = [found for name, found in ends.items() if name not in averaged]
     grid = run.cycle.times(steps) if any(len(found) != 1 for found in asked) else np.zeros(0)
-    extra = [moment % duration if run.cycle.periodic else moment for found in ends.values() for moment in found]
-    times = np.unique(np.concatenate([grid, extra, rule.at]))
+    extra = [np.array(found) for name, found in ends.items() if name not in averaged]
+    extra = [_within(run, at) for at in (*extra, *(rule.at for rule in rules.values()))]
+    times = np.unique(np.concatenate([grid, *extra]))
     known = _path(run, times), _gain(run)
     windows = {name: _window(run, found, times, grid, known) for name, found in ends.items() if name not in averaged}
-    index = np.searchsorted(times, rule.at)
-    period = duration if run.cycle.periodic else None
-    whole = Window(index, rule.at, known[0][index], period, known[1], (rule.weights, rule.inside))
-    return _with_dead_centres(PositionPlan(run, times, windows | dict.fromkeys(averaged, whole)), measures)
+    windows |= {name: _of_rule(run, ends[name], edges, rules[name], times, known) for name, edges in averaged.items()}
+    return _with_dead_centres(PositionPlan(run, times, windows), measures)
+
+
+def _within(run: Run, times: Array) -> Array:
+    """Times within the cycle, s, of such as may run over its end."""
+    return times % run.cycle.duration if run.cycle.periodic else times
+
+
+def _edges_within(run: Run, ends: tuple[float, ...]) -> Array:
+    """The edges of the run, s, within a window and its ends; all of them if it has none."""
+    if not ends:
+        return run.edges
+    duration = run.cycle.duration
+    laps = np.arange(ends[0] // duration, ends[1] // duration + 1) if run.cycle.periodic else np.zeros(1)
+    found = (laps[:, None] * duration + run.edges).ravel()
+    apart = ALIKE * duration
+    inner = found[(found > ends[0] + apart) & (found < ends[1] - apart)]
+    inner = inner[np.append(np.diff(inner) > apart, True)] if len(inner) else inner  # the end of a lap starts the next
+    return np.concatenate([ends[:1], inner, ends[1:]])
+
+
+def _of_rule(
+    run: Run, ends: tuple[float, ...], edges: Array, rule: Nodes, times: Array, known: tuple[Array, float]
+) -> Window:
+    """The places of the rule of a mean: over the cycle, or between two times."""
+    (coordinates, gain), duration = known, run.cycle.duration
+    within = _within(run, rule.at)
+    index, laps = np.searchsorted(times, within), np.rint((rule.at - within) / duration)
+    period = duration if run.cycle.periodic and not ends else None
+    coordinate, share = coordinates[index] + laps * gain, (edges[-1] - edges[0]) / duration
+    gained = gain if not ends else 0.0
+    return Window(index, rule.at, coordinate, period, gained, (rule.weights, rule.inside), edges, share)
 
 
 def _with_dead_centres(plan: PositionPlan, measures: Sequence[Measure]) -> PositionPlan:
@@ -172,10 +207,9 @@ def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
 
 
 def _averages(run: Run, measure: Measure) -> bool:
-    """Whether a figure is a mean over the cycle; that of an angle which gains turns needs the end of the cycle too.
+    """Whether a figure is a mean; that of an angle which gains turns needs the end of the cycle too.
 
-    Samples are taken at the nodes of the nominal mechanism: where one turns round elsewhere, its mean is off by the
-    jump there times the way from the nominal place, as a share of the cycle.
+    Samples are taken at the nodes of the nominal mechanism, but where its course jumps, see `averages`.
     """
     return measure.rule in ("mean", "rms", "ratio", "work") and not measure.turning(run.system)
 
@@ -198,7 +232,8 @@ def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known:
         between_laps = np.repeat(reach, len(grid))[inside]
     index = np.concatenate([found[:1], between, found[1:]]).astype(np.intp)
     lap = np.concatenate([laps[:1], between_laps, laps[1:]])
-    return Window(index, times[index] + lap * duration, coordinates[index] + lap * gain)
+    share = (ends[-1] - ends[0]) / duration
+    return Window(index, times[index] + lap * duration, coordinates[index] + lap * gain, share=share)
 
 
 # ---- places and windows as they are stated --------------------------------------------------------------------

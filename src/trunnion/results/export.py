@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.names import guarded
+from trunnion.results.attributes import KEPT
 from trunnion.results.model_units import in_model_units
 from trunnion.results.tables import KINDS, Column, kind_of, table_of
 from trunnion.results.tables import columns as flat_columns
@@ -133,6 +134,9 @@ def _netcdf(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> It
 
     def add(result: xr.Dataset) -> None:
         nonlocal begun
+        if engine == "scipy" and KEPT in result.attrs:  # SciPy's writer takes this name for its own variables
+            result = result.copy(deep=False)
+            result.attrs[f"kept_{KEPT}"] = result.attrs.pop(KEPT)
         if begun:
             _append(result, path)
         elif in_parts:

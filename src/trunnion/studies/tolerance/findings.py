@@ -260,7 +260,7 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
 def _corner(outcome: Outcome, of: Of) -> Iterator[Finding]:
     """An extreme at a corner, with what the positions have of it, as `analyse` tabulates them."""
     known, unit = of.reference, of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
-    if known.corner:
+    if known.corner and known.window.edges is None:
         coarse = float(RULES[of.measure.rule](course_of(known, known.parts[0])))
         where = f"measures.{of.measure.name}"
         yield finding_for("tolerance.corner", where, figure=known.figure, coarse=coarse, unit=unit)

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.corners import with_corner
-from trunnion.measures.evaluation import Courses, Kernel, NumpyKernel, looking, where_known
+from trunnion.measures.evaluation import Courses, Kernel, NumpyKernel, sharpened, where_known
 from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
@@ -135,5 +134,5 @@ def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[
         turns = measure.of_motion and measure.turning(system)
         rate = measure.coordinate(system).rate(walk) if turns else None
         one = reference(measure, courses[measure.name], plan.windows[measure.name], system, rate)
-        found[measure.name] = with_corner(one, looking(kernel, plan, values, measure), run)
+        found[measure.name] = sharpened(one, kernel, plan, values)
     return found

@@ -221,7 +221,7 @@ def _place(found: ToleranceStudy, of: Of) -> float:
     """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
     run, known = found.run, of.reference
     time = known.window.time[of.place] if of.place >= 0 else moment(known)
-    if known.corner:
+    if known.corner and np.isfinite(time):
         time = switch(known, looking(found.kernel, found.plan, run.values, known.measure), run, time)
     if not np.isfinite(time) or run.cycle.duration <= 0:
         return float("nan")

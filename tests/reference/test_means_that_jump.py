@@ -1,0 +1,113 @@
+"""Means of loads that begin with a jump, in samples and to first order, against closed forms.
+
+A slider-crank presses over the last of its stroke: the useful work of a turn is F (r + l − touch), whatever the way
+there, and 0 where the slider does not come so far.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import trunnion
+from trunnion.measures.evaluation import NumpyKernel, at_corner, figures_of, sharpened
+from trunnion.measures.figures import reference
+from trunnion.measures.measures import named
+from trunnion.measures.positions import plan
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import prepare
+
+Array = NDArray[np.float64]
+
+FORCE, R, ROD, TOUCH, TIME = 800.0, 0.05, 0.2, 0.24, 0.5
+PRESS: dict[str, Any] = {
+    "trunnion": 1,
+    "name": "Press",
+    "gravity": [0, 0],
+    "dimensions": {"r": R, "rod": ROD, "touch": TOUCH},
+    "links": {
+        "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        "crank": {"points": {"O": [0, 0], "A": ["r", 0]}},
+        "rod": {"points": {"A": [0, 0], "B": ["rod", 0]}},
+        "ram": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+    },
+    "joints": {
+        "O": {"type": "revolute", "links": ["ground", "crank"]},
+        "A": {"type": "revolute", "links": ["crank", "rod"]},
+        "B": {"type": "revolute", "links": ["rod", "ram"]},
+        "S": {"type": "prismatic", "links": ["ground", "ram"]},
+    },
+    "drivers": {"O": {"speed": "120 rpm"}},
+    "loads": {
+        "press": {"joint": "S", "resisting_force": f"{FORCE} N * between(ram.B.x, touch, 1 m)", "only": "positive"}
+    },
+    "assembly": {"B": [0.25, 0]},
+}
+
+
+FIGURES: dict[str, dict[str, Any]] = {
+    "power": {"power": "press", "as": "mean"},
+    "within": {"power": "press", "as": "mean", "over": ["290 deg", "350 deg"]},
+    "torque": {"effort": "O", "as": "rms"},
+    "turned": {"effort": "O", "as": "mean", "over": ["300 deg", "60 deg"]},
+}
+
+
+def of(**numbers: float) -> trunnion.Mechanism:
+    """The press with other dimensions, m."""
+    return trunnion.Mechanism(**{**PRESS, "dimensions": {**PRESS["dimensions"], **numbers}, "measures": FIGURES})
+
+
+def sampled(**numbers: Array) -> dict[str, Array]:
+    """The figures of many presses at once, as a study has them."""
+    run = prepare(of())
+    measures = named(run.system.mechanism, FIGURES, run.values)
+    places = plan(run, measures, 24)
+    kernel = NumpyKernel(run, measures, FrictionMethod())
+    courses, _ = kernel.courses(run.values, places.times)
+    spread = {f"dimensions.{name}": value[:, None] for name, value in numbers.items()}
+    values = run.system.mechanism.parameter_set.evaluate(spread)
+    count, found = len(next(iter(numbers.values()))), {}
+    for measure in measures:
+        nominal = reference(measure, courses[measure.name], places.windows[measure.name], run.system)
+        known = sharpened(nominal, kernel, places, run.values)
+        assert known.corner
+        found[measure.name] = at_corner(kernel, places, values, known, np.zeros((count, 1)), np.zeros(count))
+    return found
+
+
+def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form() -> None:
+    """Near the nominal place, far from it, and where the ram does not come to the load, or is at it throughout."""
+    touch = TOUCH + np.array([0.0, 2e-5, -3e-4, 4e-3, -2e-2, 9.9e-3, 0.0101, 0.03])
+    rod = np.full(len(touch), ROD)
+    found = sampled(touch=touch, rod=rod)
+    way = np.maximum(R + ROD - touch, 0.0)
+    np.testing.assert_allclose(found["power"], -FORCE * way / TIME, rtol=1e-9, atol=1e-9)
+    angle = np.radians([290.0, 350.0])
+    ram = R * np.cos(angle) + np.sqrt(ROD**2 - (R * np.sin(angle)) ** 2)
+    pressed = np.clip(ram[1] - np.maximum(touch, ram[0]), 0.0, None)
+    np.testing.assert_allclose(found["within"], -FORCE * pressed / (TIME / 6), rtol=1e-9, atol=1e-9)
+    for k in range(len(touch)):
+        alone = prepare(of(touch=float(touch[k])))
+        exact = figures_of(alone, named(alone.system.mechanism, FIGURES, alone.values), 24, FrictionMethod())
+        for name in FIGURES:
+            assert found[name][k] == pytest.approx(exact[name], rel=2e-7, abs=1e-9), (name, k)
+
+
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
+def test_a_study_has_the_part_of_the_place_at_which_the_load_begins(engine: str) -> None:
+    half, numbers = 2e-4, ("r", "rod", "touch")
+    model = trunnion.Mechanism(
+        **{**PRESS, "tolerances": dict.fromkeys(numbers, half), "measures": {"up": FIGURES["power"]}}
+    )
+    found = trunnion.tolerance(model, samples=2000, seed=5, steps=24, engine=engine).sel(measure="up")
+    for name, sign in zip(numbers, (-1, -1, 1), strict=True):
+        slope = float(found["sensitivity"].sel(parameter=f"dimensions.{name}"))
+        assert slope == pytest.approx(sign * FORCE / TIME, rel=1e-6)
+    whole = 3 * FORCE / TIME * half
+    assert float(found["worst_case_upper"]) == pytest.approx(whole, rel=1e-6)
+    assert float(found["searched_upper"]) == pytest.approx(whole, rel=1e-6)
+    assert float(found["deviation"]) == pytest.approx(float(found["deviation_linear"]), rel=0.06)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -168,6 +168,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     figures += _turning(found)
     state = found["locking_state"].values
     figures += holding_figures(run, found["holding_multiple"].values, state, dial)
+    figures += _run_backward(found, dial)
     backward = reverse_figure(run, _reverse(found), state)
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
@@ -183,6 +184,16 @@ def _turning(found: xr.Dataset) -> list[Figure]:
     where = ", ".join(places[:MOST_PLACES]) + (f" and {len(places) - MOST_PLACES} more" * (len(places) > MOST_PLACES))
     centred = ", pins centred," * ("seat_offset" in found)
     return [Figure("drive_effort_sign", f"the drive effort changes sign{centred} at", where)]
+
+
+def _run_backward(found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
+    """The largest effort that it takes to run each driver backward, as to open a clamp."""
+    for name, unit in zip(found["driver"].values.tolist(), attribute(found, "driver_units"), strict=True):
+        effort = found["drive_effort_reverse"].sel(driver=name).values
+        if np.any(np.isfinite(effort)):
+            k = int(np.nanargmax(np.abs(effort)))
+            subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} when run backward"
+            yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", f"at {dial.at(k)}")
 
 
 def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[Figure]:

@@ -300,7 +300,7 @@ def test_work_that_other_springs_supply_backward_is_named() -> None:
 
 @pytest.mark.parametrize(("first", "last", "note"), [
     (0.2, 1.2, ""), (1.3, 1.5, "self-locking"), (0.2, 1.5, "a mean: the ranges of `locking` differ"),
-    (0.2, 2.3, "it takes work to run it backward; the ranges of `locking` differ"),
+    (0.2, 2.3, "the reversed motion takes work; the ranges of `locking` differ"),
 ])  # fmt: skip
 def test_a_mean_is_called_self_locking_only_where_it_holds_all_along(first: float, last: float, note: str) -> None:
     """Whatever its sign; in `analyse` as in `locking`."""

@@ -50,7 +50,7 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
     if value <= 0 and held:
         return Figure(name, subject, value, note="self-locking" if _by_friction(run, back) else "held without friction")
     if value <= 0:
-        return Figure(name, subject, value, note="it takes work to run it backward; the ranges of `locking` differ")
+        return Figure(name, subject, value, note="the reversed motion takes work; the ranges of `locking` differ")
     differ = len(states) > 1 and felt(run.system, run.values)
     return Figure(name, subject, value, note="a mean: the ranges of `locking` differ" * bool(differ))
 

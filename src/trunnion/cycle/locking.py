@@ -187,12 +187,12 @@ def _turning(found: xr.Dataset) -> list[Figure]:
 
 
 def _run_backward(found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
-    """The largest effort that it takes to run each driver backward, as to open a clamp."""
+    """The largest effort of each driver in the reversed motion, as to open a clamp."""
     for name, unit in zip(found["driver"].values.tolist(), attribute(found, "driver_units"), strict=True):
         effort = found["drive_effort_reverse"].sel(driver=name).values
         if np.any(np.isfinite(effort)):
             k = int(np.nanargmax(np.abs(effort)))
-            subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} when run backward"
+            subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}, reversed motion"
             yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", f"at {dial.at(k)}")
 
 

@@ -162,28 +162,51 @@ def test_a_channel_that_is_not_used_is_judged_by_its_shape(tmp_path: Path, lengt
         assert np.degrees(one.figures["expected"]) == pytest.approx(scatter, rel=0.1)
 
 
-def in_steps(folder: Path, zero: float = 0.0, noise: float = 0.05) -> Any:
-    """Three files whose angle, cut off to 0.1°, reads so much too little, deg; noise of the torque, N m."""
+def in_steps(
+    folder: Path, zero: float = 0.0, noise: float = 0.05, *, length: str = "", delay: float | None = None
+) -> Any:
+    """Three files whose angle, cut off to 0.1°, reads so much too little, deg; noise of the torque, N m.
+
+    length: of the rocker in a model whose angle is measured too; delay: of both channels, stated as uncertain, s.
+    """
     files = []
     for name, rpm in (("a", 61.3), ("b", 122.7), ("c", 203.9)):
         random = np.random.default_rng(round(rpm))
         time = np.arange(int(12.5 * 60 / rpm * 1000)) / 1000
         crank = 2 * np.pi * rpm / 60 * time
-        slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
         read = np.floor(10 * (np.degrees(crank) - zero)) / 10
-        columns = np.column_stack([time, read, 20 * np.abs(slope) + random.normal(0, noise, time.size)])
-        np.savetxt(folder / f"{name}.csv", columns, "%.5f", ",", header="t,a,M", comments="")
+        crank -= 2 * np.pi * rpm / 60 * (delay or 0.0)
+        slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
+        torque = 20 * np.abs(slope) + random.normal(0, noise, time.size)
+        psi = np.degrees(rocker(crank)) + random.normal(0, 0.02, time.size)
+        columns = np.column_stack([time, read, torque, psi])
+        np.savetxt(folder / f"{name}.csv", columns, "%.5f", ",", header="t,a,M,psi", comments="")
         files.append({"file": f"{name}.csv", "set": {"A.speed": f"{rpm} rpm"}})
     stated = {
         "trunnion-data": 1,
         "files": files,
         "time": {"column": "t", "unit": "s"},
         "angle": {"from": "column", "column": "a", "unit": "deg", "resolution": "0.1 deg"},
-        "channels": {"M": RATES["M"]},
+        "channels": RATES if length else {"M": RATES["M"]},
     }
     (folder / "mapping.yaml").write_text(yaml.safe_dump(stated))
-    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
-    return trunnion.rig.identify(model, read_measured(folder / "mapping.yaml"), ["brake.resisting_torque"])
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": length or "85 mm"})
+    data = read_measured(folder / "mapping.yaml")
+    return trunnion.rig.identify(model, data, ["brake.resisting_torque"], delay=delay)
+
+
+@pytest.mark.parametrize("delay", [None, 2e-4])
+@pytest.mark.parametrize("length", ["85 mm", "84.7 mm"])
+def test_half_a_step_that_the_fit_has_found_holds_for_a_channel_that_is_not_used(
+    tmp_path: Path, length: str, delay: float | None
+) -> None:
+    """Half a step moves the rocker by many times its uncertainty, 0.02° over the root of twelve turns."""
+    result = in_steps(tmp_path, length=length, delay=delay)
+    found = [one for one in result.trunnion.findings if one.code == "fit.unused_missed"]
+    assert bool(found) == (length != "85 mm")
+    for one in found:
+        true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.0847)))
+        assert np.degrees(one.figures["rms"]) == pytest.approx(true, rel=0.25)
 
 
 @pytest.mark.parametrize("noise", [0.05, 1.0])

@@ -130,7 +130,8 @@ def _unused(judged: Assessment) -> Iterator[Finding]:
     unused = judged.found.unused
     if unused is None or not unused.blocks:
         return
-    missing = unused.missing(judged.told) if not judged.found.causes else {}  # which hold for it too
+    ahead = any(one.kind in ("shift", "delay") for one in judged.found.causes)  # which holds for it too
+    missing = {} if ahead else unused.missing(judged.told, judged.late)
     fine = [name for name in dict.fromkeys(block.channel for block in unused.blocks) if name not in missing]
     if fine:
         yield finding_for("fit.unused", "channels", channels=fine)

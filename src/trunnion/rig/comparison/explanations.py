@@ -186,12 +186,15 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
     """What would explain it, with its size, and what to do about it."""
     first, pair = members[0]
     unit, values = pair.course.unit, [one.size for one in sizes]
+    gains = {"gain": values, "zero and gain": [one.gain for one in sizes]}.get(kind, [])
+    as_of = read_as([1 + one for one in gains], *pair.course.shown)
     subject = measures.removeprefix("rate:")
     driver = first.model.run.system.mechanism.drivers.get(subject)
     if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
         shown, size = pair.course.shown
         speed = float(np.nanmean(pair.course.mean)) / size
         story = extent([one / size for one in values], shown) if kind == "zero" else _percent(values)
+        story += f", {as_of}" * bool(as_of)
         remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping uses the measured speed"
         return f"another speed of the driver, measured {said(speed, shown)} ({KINDS[kind]} of {story})", remedy
     if kind == "sign":
@@ -202,7 +205,7 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
         story = f"a constant offset of {offset}{_remarks(_beyond(sizes, members), _friction(sizes, members))}"
     elif kind == "gain":
         story = f"a gain {_times(values)}" if _times(values) else f"a gain error of {_percent(values)}"
-        story += _remarks(read_as([1 + one for one in values], *pair.course.shown), _beyond(sizes, members))
+        story += _remarks(as_of, _beyond(sizes, members))
     elif kind == "flat":
         story = f"a constant reading of {extent(values, unit, False)}"
     elif kind == "shift":
@@ -213,7 +216,7 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
     elif kind == "mirror":
         story = KINDS[kind]
     else:
-        story = f"an offset of {extent(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
+        story = f"an offset of {extent(values, unit)} and a gain error of {_percent(gains)}{_remarks(as_of)}"
     if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members):
         remedy = MODEL
     elif kind == "zero" and _of_motion(name, members):

@@ -217,6 +217,29 @@ def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
         read(volts, tmp_path, {"channels/speed-in/unit": None})
 
 
+@pytest.mark.parametrize(
+    "stated", [{"range": "20 N m"}, {"accuracy": {"zero": "0.02 N m"}}, {"resolution": "0.01 N m"}]
+)
+@pytest.mark.parametrize("unit", [None, "N"])
+def test_a_column_of_forces_taken_for_torques_is_told_as_such(
+    tmp_path: Path, columns: Columns, stated: dict[str, Any], unit: str | None
+) -> None:
+    """Whether in the file or in the mapping the unit stands; of two files it is told once."""
+    named = {("T2 [N]" if name == "T2" else name): values for name, values in columns.items()}
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for file in files:
+        file.write_text(text_of(named), "utf-8")
+    changes = {f"channels/brake/{key}": value for key, value in {**stated, "unit": unit}.items()}
+    with pytest.raises(MechanismError) as failure:
+        read_measured(mapping(changes), files)
+    (one,) = failure.value.findings
+    (key, value), *_ = stated.items()
+    told, value = (f"{key}.zero", value["zero"]) if isinstance(value, dict) else (key, value)
+    assert f"the column 'T2' is in N, {told} in {value.partition(' ')[2]}; load:brake is in N m or N" in one.what
+    assert one.remedy.startswith("name another column")
+    assert ("a.csv, b.csv" in one.what) == (unit is None)
+
+
 def test_forces_and_slides(tmp_path: Path, columns: Columns) -> None:
     """What is measured may be a force or a speed along a line; the unit tells."""
     changes = {

@@ -24,7 +24,7 @@ from trunnion.rig.identification.start_signals import StartModel, check_starts
 from trunnion.rig.identification.uncertainty import left_over, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.identification.unused import UnusedChannels
-from trunnion.rig.modelled import apart, check_settings, refuse_backwards, told_at
+from trunnion.rig.modelled import apart, check_settings, refuse_backwards, refuse_unit, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -218,6 +218,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block], of_starts
             raise MechanismError(
                 Finding(what, f"channel {name}", "effort:DRIVER, load:LOAD, rate:JOINT or link.point.x is")
             )
+        refuse_unit(run, measure, name, next(block.course for block in blocks if block.channel == name))
     return found
 
 

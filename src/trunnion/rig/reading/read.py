@@ -28,7 +28,7 @@ from trunnion.rig.reading.channels import (
 )
 from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
-from trunnion.rig.reading.log import Account, counted, told
+from trunnion.rig.reading.log import Account, counted, gathered, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
 from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
@@ -80,7 +80,7 @@ def read_measured(
     conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
     findings = mapped.placed([*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])])
     if failed or not conditions:
-        raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
+        raise MechanismError(gathered(one for one in findings if one.severity is not Severity.NOTE))
     name = mapped.mapping.name or Path(mapped.file).stem
     return Measurement(
         name,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded, text_of
@@ -238,6 +239,25 @@ def test_a_column_of_forces_taken_for_torques_is_told_as_such(
     assert f"the column 'T2' is in N, {told} in {value.partition(' ')[2]}; load:brake is in N m or N" in one.what
     assert one.remedy.startswith("name another column")
     assert ("a.csv, b.csv" in one.what) == (unit is None)
+
+
+@pytest.mark.parametrize(("gain", "warned"), [(0.2, "write 0.2 % if that is meant"), ("20 %", "check it"), (0.04, "")])
+@pytest.mark.parametrize("place", ["channels/brake", "files/0/channels/brake"])
+def test_a_gain_that_is_hardly_known_is_a_warning(
+    tmp_path: Path, columns: Columns, gain: float | str, warned: str, place: str
+) -> None:
+    own = {"file": "a.csv", "channels": {"brake": {"accuracy": {"gain": gain}}}}
+    changes = {"files": [own]} if place.startswith("files") else {f"{place}/accuracy": {"gain": gain}}
+    (tmp_path / "a.csv").write_text(text_of(columns), "utf-8")
+    entries = mapping({"files": [{"file": "a.csv"}], **changes})
+    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(entries), "utf-8")
+    found = [one for one in read_measured(tmp_path / "mapping.yaml").findings if one.code == "data.accuracy.gain"]
+    assert len(found) == bool(warned)
+    for one in found:
+        assert (one.severity, one.where) == (Severity.WARNING, f"{place.replace('/', '.')}.accuracy.gain")
+        assert "of the gain is 20 %" in one.what
+        assert one.remedy.startswith(warned)
+        assert one.line
 
 
 def test_forces_and_slides(tmp_path: Path, columns: Columns) -> None:

@@ -30,7 +30,7 @@ from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
 from trunnion.rig.reading.log import Account, counted, gathered, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
-from trunnion.rig.reading.mapping_file import read_mapping
+from trunnion.rig.reading.mapping_file import read_mapping, vague_gains
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
@@ -78,7 +78,8 @@ def read_measured(
         accounts.append(account)
     starts = [(k, one) for k, one in enumerate(mapped.mapping.starts) if not one.file]
     conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
-    findings = mapped.placed([*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])])
+    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
+    findings = mapped.placed(findings)
     if failed or not conditions:
         raise MechanismError(gathered(one for one in findings if one.severity is not Severity.NOTE))
     name = mapped.mapping.name or Path(mapped.file).stem
@@ -309,11 +310,14 @@ class _File:
             if passed < FEW_HARMONICS:
                 what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
                 account.note("data.filter.harmonics", where, what, "state a higher cut-off")
-        dense = all(turns.density >= DENSE for _, turns in cuts)
-        account.say(
-            "values at a position: mean of the samples within half a position to either side"
-            if dense else "values at a position: interpolated by a cubic between four samples"
-        )  # fmt: skip
+        most = int(min(turns.density for _, turns in cuts) * mapping.positions / DENSE)
+        if most >= mapping.positions:
+            account.say("values at a position: mean of the samples within half a position to either side")
+            return
+        told = most // (size := 10 ** max(len(str(most)) - 2, 0)) * size  # to the two digits that are told
+        cubic = "values at a position: interpolated by a cubic between four samples"
+        tail = "; of at most {} positions each has four samples, which are averaged"
+        account.say(f"{cubic}{tail * (most > 1)}", told if most > 1 else None)
 
     def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]], share: Array) -> None:
         """Tell of unloaded stretches in which the sensor is loaded."""

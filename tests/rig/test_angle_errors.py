@@ -162,6 +162,56 @@ def test_a_channel_that_is_not_used_is_judged_by_its_shape(tmp_path: Path, lengt
         assert np.degrees(one.figures["expected"]) == pytest.approx(scatter, rel=0.1)
 
 
+@pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "60 Hz"}}])
+@pytest.mark.parametrize("rate", [250.0, 4000.0])  # a cubic between samples, and means of them
+def test_angles_that_begin_anew_or_count_on_have_the_same_course_in_every_turn(
+    tmp_path: Path, rate: float, low_pass: dict[str, Any]
+) -> None:
+    """That of the rocker passes its zero twice a turn, that of the crank jumps from 360° to 0, or counts all turns."""
+    random = np.random.default_rng(2)
+    time = np.arange(int(8.5 * rate)) / rate
+    crank, start = 2 * np.pi * time + 1.0, float(np.degrees(rocker(np.zeros(1) + 0.5))[0])
+    psi = (np.degrees(rocker(crank)) - start + random.normal(0, 0.02, time.size)) % 360
+    columns = np.column_stack([time, np.degrees(crank) % 360, np.degrees(crank), psi])
+    np.savetxt(tmp_path / "a.csv", columns, "%.4f", ",", header="t,a,n,psi", comments="")
+    of_crank = {"measures": "rotation:A", "unit": "deg"}
+    channels = {"psi": {**CHANNELS["psi"], "zero": f"{-start} deg"}, "anew": {"column": "a", **of_crank},
+                "on": {"column": "n", **of_crank}}  # fmt: skip
+    stated = {
+        "trunnion-data": 1,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg"},
+        "channels": channels,
+        "set": {"A.speed": "60 rpm"},
+        **low_pass,
+    }
+    data = read_measured(stated, [tmp_path / "a.csv"])
+    for name, true in (("psi", rocker(TURN)), ("anew", TURN), ("on", TURN)):
+        turns = data.conditions[0].courses[name].turns
+        assert np.nanmax(np.ptp(turns, axis=0)) < np.radians(0.2)
+        gap = (turns - true + np.pi) % (2 * np.pi) - np.pi
+        assert np.nanmax(np.abs(gap)) < np.radians(0.2)
+    result = trunnion.rig.compare(MODEL, data)
+    assert np.degrees(result["rms"].values).max() < 0.05
+
+
+@pytest.mark.parametrize("column", ["a", "psi"])
+def test_readings_of_the_drive_in_place_of_another_angle_are_told_as_such(tmp_path: Path, column: str) -> None:
+    stated = mapping(tmp_path, {"a": 0.0}) | {"channels": {"psi": {**CHANNELS["psi"], "column": column}}}
+    told = [(one.what, one.remedy) for one in findings(tmp_path, stated)]
+    assert len(told) == (column == "a")
+    assert all("angle of the drive in its place explains" in what and "the column" in remedy for what, remedy in told)
+    (one,) = (data := braked(tmp_path, 0.0)).conditions
+    drive = replace(one.courses["psi"], turns=one.courses["psi"].turns * 0 + 2 * np.pi * one.phase)
+    courses = {**one.courses, "psi": drive if column == "a" else one.courses["psi"]}
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
+    data = replace(data, conditions=(replace(one, courses=courses),))
+    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    missed = [one.remedy for one in result.trunnion.findings if one.code == "fit.unused_missed"]
+    assert len(missed) == (column == "a")
+    assert all("are the angle of the drive: check the column" in remedy for remedy in missed)
+
+
 def in_steps(
     folder: Path, zero: float = 0.0, noise: float = 0.05, *, length: str = "", delay: float | None = None
 ) -> Any:

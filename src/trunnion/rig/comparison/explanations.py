@@ -164,6 +164,7 @@ ACT = "dimensions, friction and loads"
 REMEDIES = {
     "flat": "check the sensor, its cable, and the column in the mapping",
     "mirror": "state angle: {sign: -1} in the mapping, or remove it, and check the zero of the angle",
+    "drive": "check the column of the channel",
     "sign": "state sign: -1 for the channel in the mapping, or remove it",
     "zero": "check the zero of the channel, and whether the model lacks a load",
     "gain": f"check gain and unit of the channel, and {ACT} of the model",
@@ -213,7 +214,7 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
     elif kind == "friction":
         low, high = f"{min(values):.3g}", f"{max(values):.3g}"
         story = f"friction {low if low == high else f'{low} to {high}'} times that of the model"
-    elif kind == "mirror":
+    elif kind in ("mirror", "drive"):
         story = KINDS[kind]
     else:
         story = f"an offset of {extent(values, unit)} and a gain error of {_percent(gains)}{_remarks(as_of)}"

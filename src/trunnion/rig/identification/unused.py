@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.rig.comparison.error_sources import ENOUGH, drive_angle
 from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.signals import Model
 
@@ -25,12 +26,14 @@ FLAT = 1e-6  # of a course of the model, that it has to vary to have a shape
 class Missed(NamedTuple):
     """A channel that the model misses: RMS of its residual and what is expected of it.
 
-    shape: of what is left once zero and gain are fitted, against the scatter alone.
+    shape: of what is left once zero and gain are fitted, against the scatter alone; drive: whether it is the
+    angle of the drive.
     """
 
     rms: float
     expected: float
     shape: bool
+    drive: bool
 
 
 @dataclass(frozen=True)
@@ -109,8 +112,19 @@ class UnusedChannels:
                 rms, known = figures(at, block, 0.0, (mean, float(np.hypot(wide, self.delay))))
                 before = found.get(block.channel)
                 if rms > MISSES * known and (before is None or (before.shape == shape and rms > before.rms)):
-                    found[block.channel] = Missed(rms, known, shape)
+                    found[block.channel] = Missed(rms, known, shape, self._of_drive(at, block))
         return found
+
+    def _of_drive(self, at: Array, block: Block) -> bool:
+        """Whether the readings of an angle are those of the drive."""
+        model, k = self.model, block.condition
+        first, last, _ = model.driven(k, at)
+        there = np.isfinite(block.mean)
+        if not np.isfinite(first) or there.size != len(model.phases[k]):
+            return False
+        said, drive = block.mean - self._gap(at, block, 0.0)[2], first + (last - first) * model.phases[k]
+        there &= np.isfinite(said) & model.measures[block.channel].turning(model.run.system)
+        return any(one.explains >= ENOUGH for one in drive_angle(block.mean[there], said[there], drive[there]))
 
     def refute(self, at: Array, ahead: Array) -> bool:
         """Whether a channel on which shifts of the angle act, rad by condition, neither agrees with them nor better."""

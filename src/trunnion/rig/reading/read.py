@@ -39,7 +39,7 @@ from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, s
 from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
-from trunnion.rig.reading.turns import DENSE, Turns, cut, resampled, time_mean
+from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
 from trunnion.rig.reading.unloaded import check_unloaded
 
 __all__ = ["read_measured"]
@@ -358,10 +358,12 @@ class _File:
         faults.signal(where, readings, line.seconds, span, own.limit, account, speed, self.beyond[name])
         step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
         values = own.quantity(readings, zero, channel.sign, line.seconds)
+        angle = values if own.scale.unit == "rad" else None
+        values = values if angle is None else joined(angle)
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
-            part.courses[name] = resampled(part.turns, values)
+            part.courses[name] = resampled(part.turns, values, angle)
         scatters = [float(np.median(between_turns(part.courses[name]))) / abs(own.scale.factor) for part in parts]
         if mapping.filter is None:
             rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
@@ -388,7 +390,7 @@ class _File:
             remedy,
         )
         for part in parts:
-            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
+            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), angle)
         return found
 
     def _check_repeated(

@@ -241,6 +241,21 @@ def test_a_column_of_forces_taken_for_torques_is_told_as_such(
     assert ("a.csv, b.csv" in one.what) == (unit is None)
 
 
+@pytest.mark.parametrize("alike", [True, False])
+def test_an_error_of_several_files_is_told_once_where_it_says_the_same(
+    tmp_path: Path, columns: Columns, alike: bool
+) -> None:
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for file in files:
+        other = {} if alike or file.name == "a.csv" else {"more": columns["t"]}
+        file.write_text(text_of({**columns, **other}), "utf-8")
+    with pytest.raises(MechanismError) as failure:
+        read_measured(mapping({"channels/brake/column": "T3"}), files)
+    found = failure.value.findings
+    assert [Path(one.file).name for one in found] == ([""] if alike else ["a.csv", "b.csv"])
+    assert ("2 such findings: a.csv, b.csv" in found[0].what) == alike
+
+
 @pytest.mark.parametrize(("gain", "warned"), [(0.2, "write 0.2 % if that is meant"), ("20 %", "check it"), (0.04, "")])
 @pytest.mark.parametrize("place", ["channels/brake", "files/0/channels/brake"])
 def test_a_gain_that_is_hardly_known_is_a_warning(

@@ -15,6 +15,7 @@ from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
 from trunnion.model.units import Kind, dimension_text
+from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal
 from trunnion.rig.reading.signal_checks import backward_finding
 from trunnion.solve.friction_method import FrictionMethod
@@ -214,7 +215,7 @@ def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> No
     found = [backward_finding(driver, one.speed, speed, next(iter(one.files), "")) for one, speed in rows
              if one.speed * speed < 0]  # fmt: skip
     if found:
-        raise MechanismError(found)
+        raise MechanismError(gathered(found))
 
 
 def _refuse_followed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:

@@ -66,11 +66,15 @@ def told(accounts: Sequence[Account]) -> list[str]:
     return found
 
 
-def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings about data files, those of one code and place only told once, with the files they are of."""
+def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
+    """Findings about data files, those of one code and place only told once, with the files they are of.
+
+    same: only those that say the same; else the first speaks for all.
+    """
     alike: dict[tuple[str, ...], list[Finding]] = {}
     for one in findings:
-        alike.setdefault((one.severity, one.where.partition(" ")[0], one.code, one.remedy), []).append(one)
+        key = one.severity, one.where.partition(" ")[0], one.code, one.remedy, one.what if same else ""
+        alike.setdefault(key, []).append(one)
     found = []
     for rows in alike.values():
         first, files = rows[0], list(dict.fromkeys(Path(one.file).name for one in rows if one.file))

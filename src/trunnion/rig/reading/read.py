@@ -81,7 +81,7 @@ def read_measured(
     findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
     findings = mapped.placed(findings)
     if failed or not conditions:
-        raise MechanismError(gathered(one for one in findings if one.severity is not Severity.NOTE))
+        raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))
     name = mapped.mapping.name or Path(mapped.file).stem
     return Measurement(
         name,

@@ -155,6 +155,17 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
     assert sound.resolution == pytest.approx(0.2)
 
 
+def test_up_to_how_many_positions_samples_are_averaged(tmp_path: Path) -> None:
+    """500 samples a turn are four at each of 125 positions, in two digits 120: there the scatter falls."""
+    columns = recorded()
+    rows = {count: read(columns, tmp_path, {"positions": count}) for count in (130, 120)}
+    told = {count: next(one for one in found.done if one.startswith("values at")) for count, found in rows.items()}
+    assert "of at most 120 positions each has four samples" in told[130]
+    assert "mean of the samples" in told[120]
+    scatter = {count: np.median(found.conditions[0].courses["brake"].scatter) for count, found in rows.items()}
+    assert scatter[120] < 0.7 * scatter[130]
+
+
 @pytest.mark.parametrize("rate", [400.0, 5000.0])  # a cubic between samples, and means of them
 @pytest.mark.parametrize("changes", [{}, {"channels/torque-in/range": "30 N m"}], ids=["spikes", "range"])
 @pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "100 Hz", "order": 2}}], ids=["plain", "filtered"])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded, text_of
@@ -215,6 +216,63 @@ def test_units_of_the_file(tmp_path: Path, columns: Columns) -> None:
     volts = {("n1 [V]" if name == "n1" else name): values for name, values in columns.items()}
     with pytest.raises(MechanismError, match="readings in 'V' do not give rate:input"):
         read(volts, tmp_path, {"channels/speed-in/unit": None})
+
+
+@pytest.mark.parametrize(
+    "stated", [{"range": "20 N m"}, {"accuracy": {"zero": "0.02 N m"}}, {"resolution": "0.01 N m"}]
+)
+@pytest.mark.parametrize("unit", [None, "N"])
+def test_a_column_of_forces_taken_for_torques_is_told_as_such(
+    tmp_path: Path, columns: Columns, stated: dict[str, Any], unit: str | None
+) -> None:
+    """Whether in the file or in the mapping the unit stands; of two files it is told once."""
+    named = {("T2 [N]" if name == "T2" else name): values for name, values in columns.items()}
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for file in files:
+        file.write_text(text_of(named), "utf-8")
+    changes = {f"channels/brake/{key}": value for key, value in {**stated, "unit": unit}.items()}
+    with pytest.raises(MechanismError) as failure:
+        read_measured(mapping(changes), files)
+    (one,) = failure.value.findings
+    (key, value), *_ = stated.items()
+    told, value = (f"{key}.zero", value["zero"]) if isinstance(value, dict) else (key, value)
+    assert f"the column 'T2' is in N, {told} in {value.partition(' ')[2]}; load:brake is in N m or N" in one.what
+    assert one.remedy.startswith("name another column")
+    assert ("a.csv, b.csv" in one.what) == (unit is None)
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_an_error_of_several_files_is_told_once_where_it_says_the_same(
+    tmp_path: Path, columns: Columns, alike: bool
+) -> None:
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for file in files:
+        other = {} if alike or file.name == "a.csv" else {"more": columns["t"]}
+        file.write_text(text_of({**columns, **other}), "utf-8")
+    with pytest.raises(MechanismError) as failure:
+        read_measured(mapping({"channels/brake/column": "T3"}), files)
+    found = failure.value.findings
+    assert [Path(one.file).name for one in found] == ([""] if alike else ["a.csv", "b.csv"])
+    assert ("2 such findings: a.csv, b.csv" in found[0].what) == alike
+
+
+@pytest.mark.parametrize(("gain", "warned"), [(0.2, "write 0.2 % if that is meant"), ("20 %", "check it"), (0.04, "")])
+@pytest.mark.parametrize("place", ["channels/brake", "files/0/channels/brake"])
+def test_a_gain_that_is_hardly_known_is_a_warning(
+    tmp_path: Path, columns: Columns, gain: float | str, warned: str, place: str
+) -> None:
+    own = {"file": "a.csv", "channels": {"brake": {"accuracy": {"gain": gain}}}}
+    changes = {"files": [own]} if place.startswith("files") else {f"{place}/accuracy": {"gain": gain}}
+    (tmp_path / "a.csv").write_text(text_of(columns), "utf-8")
+    entries = mapping({"files": [{"file": "a.csv"}], **changes})
+    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(entries), "utf-8")
+    found = [one for one in read_measured(tmp_path / "mapping.yaml").findings if one.code == "data.accuracy.gain"]
+    assert len(found) == bool(warned)
+    for one in found:
+        assert (one.severity, one.where) == (Severity.WARNING, f"{place.replace('/', '.')}.accuracy.gain")
+        assert "of the gain is 20 %" in one.what
+        assert one.remedy.startswith(warned)
+        assert one.line
 
 
 def test_forces_and_slides(tmp_path: Path, columns: Columns) -> None:

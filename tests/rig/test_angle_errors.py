@@ -163,28 +163,101 @@ def test_a_channel_that_is_not_used_is_judged_by_its_shape(tmp_path: Path, lengt
         assert np.degrees(one.figures["expected"]) == pytest.approx(scatter, rel=0.1)
 
 
-def in_steps(folder: Path, zero: float = 0.0, noise: float = 0.05) -> Any:
-    """Three files whose angle, cut off to 0.1°, reads so much too little, deg; noise of the torque, N m."""
+@pytest.mark.parametrize("low_pass", [{}, {"filter": {"cut_off": "60 Hz"}}])
+@pytest.mark.parametrize("rate", [250.0, 4000.0])  # a cubic between samples, and means of them
+def test_angles_that_begin_anew_or_count_on_have_the_same_course_in_every_turn(
+    tmp_path: Path, rate: float, low_pass: dict[str, Any]
+) -> None:
+    """That of the rocker passes its zero twice a turn, that of the crank jumps from 360° to 0, or counts all turns."""
+    random = np.random.default_rng(2)
+    time = np.arange(int(8.5 * rate)) / rate
+    crank, start = 2 * np.pi * time + 1.0, float(np.degrees(rocker(np.zeros(1) + 0.5))[0])
+    psi = (np.degrees(rocker(crank)) - start + random.normal(0, 0.02, time.size)) % 360
+    columns = np.column_stack([time, np.degrees(crank) % 360, np.degrees(crank), psi])
+    np.savetxt(tmp_path / "a.csv", columns, "%.4f", ",", header="t,a,n,psi", comments="")
+    of_crank = {"measures": "rotation:A", "unit": "deg"}
+    channels = {"psi": {**CHANNELS["psi"], "zero": f"{-start} deg"}, "anew": {"column": "a", **of_crank},
+                "on": {"column": "n", **of_crank}}  # fmt: skip
+    stated = {
+        "trunnion-data": 1,
+        "time": {"column": "t", "unit": "s"},
+        "angle": {"from": "column", "column": "a", "unit": "deg"},
+        "channels": channels,
+        "set": {"A.speed": "60 rpm"},
+        **low_pass,
+    }
+    data = read_measured(stated, [tmp_path / "a.csv"])
+    for name, true in (("psi", rocker(TURN)), ("anew", TURN), ("on", TURN)):
+        turns = data.conditions[0].courses[name].turns
+        assert np.nanmax(np.ptp(turns, axis=0)) < np.radians(0.2)
+        gap = (turns - true + np.pi) % (2 * np.pi) - np.pi
+        assert np.nanmax(np.abs(gap)) < np.radians(0.2)
+    result = trunnion.rig.compare(MODEL, data)
+    assert np.degrees(result["rms"].values).max() < 0.05
+
+
+@pytest.mark.parametrize("column", ["a", "psi"])
+def test_readings_of_the_drive_in_place_of_another_angle_are_told_as_such(tmp_path: Path, column: str) -> None:
+    stated = mapping(tmp_path, {"a": 0.0}) | {"channels": {"psi": {**CHANNELS["psi"], "column": column}}}
+    told = [(one.what, one.remedy) for one in findings(tmp_path, stated)]
+    assert len(told) == (column == "a")
+    assert all("angle of the drive in its place explains" in what and "the column" in remedy for what, remedy in told)
+    (one,) = (data := braked(tmp_path, 0.0)).conditions
+    drive = replace(one.courses["psi"], turns=one.courses["psi"].turns * 0 + 2 * np.pi * one.phase)
+    courses = {**one.courses, "psi": drive if column == "a" else one.courses["psi"]}
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
+    data = replace(data, conditions=(replace(one, courses=courses),))
+    result = trunnion.rig.identify(model, data, ["brake.resisting_torque"])
+    missed = [one.remedy for one in result.trunnion.findings if one.code == "fit.unused_missed"]
+    assert len(missed) == (column == "a")
+    assert all("are the angle of the drive: check the column" in remedy for remedy in missed)
+
+
+def in_steps(
+    folder: Path, zero: float = 0.0, noise: float = 0.05, *, length: str = "", delay: float | None = None
+) -> Any:
+    """Three files whose angle, cut off to 0.1°, reads so much too little, deg; noise of the torque, N m.
+
+    length: of the rocker in a model whose angle is measured too; delay: of both channels, stated as uncertain, s.
+    """
     files = []
     for name, rpm in (("a", 61.3), ("b", 122.7), ("c", 203.9)):
         random = np.random.default_rng(round(rpm))
         time = np.arange(int(12.5 * 60 / rpm * 1000)) / 1000
         crank = 2 * np.pi * rpm / 60 * time
-        slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
         read = np.floor(10 * (np.degrees(crank) - zero)) / 10
-        columns = np.column_stack([time, read, 20 * np.abs(slope) + random.normal(0, noise, time.size)])
-        np.savetxt(folder / f"{name}.csv", columns, "%.5f", ",", header="t,a,M", comments="")
+        crank -= 2 * np.pi * rpm / 60 * (delay or 0.0)
+        slope = (rocker(crank + 1e-6) - rocker(crank - 1e-6)) / 2e-6
+        torque = 20 * np.abs(slope) + random.normal(0, noise, time.size)
+        psi = np.degrees(rocker(crank)) + random.normal(0, 0.02, time.size)
+        columns = np.column_stack([time, read, torque, psi])
+        np.savetxt(folder / f"{name}.csv", columns, "%.5f", ",", header="t,a,M,psi", comments="")
         files.append({"file": f"{name}.csv", "set": {"A.speed": f"{rpm} rpm"}})
     stated = {
         "trunnion-data": 1,
         "files": files,
         "time": {"column": "t", "unit": "s"},
         "angle": {"from": "column", "column": "a", "unit": "deg", "resolution": "0.1 deg"},
-        "channels": {"M": RATES["M"]},
+        "channels": RATES if length else {"M": RATES["M"]},
     }
     (folder / "mapping.yaml").write_text(json.dumps(stated))
-    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": "85 mm"})
-    return trunnion.rig.identify(model, read_measured(folder / "mapping.yaml"), ["brake.resisting_torque"])
+    model = trunnion.Mechanism.model_validate(LOADED).with_values({"CD": length or "85 mm"})
+    data = read_measured(folder / "mapping.yaml")
+    return trunnion.rig.identify(model, data, ["brake.resisting_torque"], delay=delay)
+
+
+@pytest.mark.parametrize("delay", [None, 2e-4])
+@pytest.mark.parametrize("length", ["85 mm", "84.7 mm"])
+def test_half_a_step_that_the_fit_has_found_holds_for_a_channel_that_is_not_used(
+    tmp_path: Path, length: str, delay: float | None
+) -> None:
+    """Half a step moves the rocker by many times its uncertainty, 0.02° over the root of twelve turns."""
+    result = in_steps(tmp_path, length=length, delay=delay)
+    found = [one for one in result.trunnion.findings if one.code == "fit.unused_missed"]
+    assert bool(found) == (length != "85 mm")
+    for one in found:
+        true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.0847)))
+        assert np.degrees(one.figures["rms"]) == pytest.approx(true, rel=0.25)
 
 
 @pytest.mark.parametrize("noise", [0.05, 1.0])

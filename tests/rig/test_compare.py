@@ -17,8 +17,8 @@ from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
 from trunnion.rig.comparison.assessment import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.rig.comparison.error_sources import best, causes
-from trunnion.rig.comparison.findings import gathered
 from trunnion.rig.comparison.result import VARIABLES
+from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -584,3 +584,14 @@ def test_units_of_what_is_set_are_those_of_the_model(verb):
         assert finding.where == "set.A.speed"
         assert "such as 1500 rpm" in finding.remedy
         assert finding.file == "run-1.csv"
+
+
+@pytest.mark.parametrize(
+    "verb", [trunnion.rig.compare, lambda model, data: trunnion.rig.identify(model, data, ["A.friction"])]
+)
+def test_a_force_in_place_of_a_torque_is_refused(verb):
+    data = measured(rocker())
+    torque = replace(data.conditions[0].courses["torque"], unit="N")
+    one = replace(data.conditions[0], courses={**data.conditions[0].courses, "torque": torque})
+    with pytest.raises(MechanismError, match=r"is in N, and effort:A is in N m — name another column"):
+        verb(rocker(), replace(data, conditions=(one,)))

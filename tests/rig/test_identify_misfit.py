@@ -243,6 +243,27 @@ def test_the_legend_of_the_residuals_stands_above_the_name_of_the_condition(
     assert "1 of 2 curves" in figure(result, "residuals").get_suptitle()
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_residuals_of_cycles_driven_forward_and_backward_are_drawn_over_the_angles_of_each(
+    tmp_path: Path, order: int
+) -> None:
+    both = {**RIG, "schedule": {"over": {"O.speed": ["600 rpm", "-600 rpm"][::order]}, "turns": 8}}
+    trunnion.rig.observe(trunnion.read(MODEL), both, seed=3).write(tmp_path)
+    result = identified(tmp_path)
+    assert [np.sign(last - first) for first, last in json.loads(result.attrs["drive_range"])] == [order, -order]
+    for drawn, ranges in ((result, {(0, 359), (-359, 0)}), (_over_time(result), {(0, 1), (0, 3)})):
+        axes = figure(drawn, "residuals").axes
+        assert {tuple(float(end) for end in np.rint(one.get_xlim())) for one in axes} == ranges
+        for one in axes:
+            low, high = one.get_xlim()
+            assert all(low - 1e-9 <= x <= high + 1e-9 for line in one.get_lines()[1:] for x in line.get_xdata())
+
+
+def _over_time(result: Any) -> Any:
+    """The same as of a drive whose turns name no position, with conditions of 1 s and of 3 s."""
+    return result.assign_attrs(drive_range="[null, null]", durations="[1.0, 3.0]")
+
+
 def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:
     result = identified(folder)
     model = report(result).partition("<h2>Model</h2>")[2]

@@ -91,12 +91,29 @@ def test_friction_fits_by_its_share_of_the_model() -> None:
         (0.7376, "N m", 1.0, "lbf ft"), (0.75, "N m", 1.0, "lbf ft"), (1.3558, "lbf ft", 1.3558179, "N m"),
         (8.85, "N m", 1.0, "lbf in"), (0.10197, "N m", 1.0, "kgf m"), (100.0, "N m", 1.0, "N cm"),
         (0.2248, "N", 1.0, "lbf"), (9.5493, "rad/s", 1.0, "rpm"), (1.05, "N m", 1.0, ""), (0.6, "N m", 1.0, ""),
+        (3.6, "m/s", 1.0, "km/h"), (1.111, "deg", np.pi / 180, "gon"), (25.4, "in", 0.0254, "mm"), (30.0, "N", 1.0, ""),
         (0.7376, "V", 1.0, ""),
     ],
 )  # fmt: skip
 def test_a_gain_near_a_ratio_of_units(gain: float, unit: str, size: float, other: str) -> None:
     found = read_as([gain], unit, size)
     assert (f"as of {other} read as {unit}" in found) if other else not found
+
+
+@pytest.mark.parametrize(
+    ("gains", "unit", "told"),
+    [
+        ([9.81, 9.84], "N m", "near 9.807, as of N m read as kgf m"),
+        ([1.37], "N m", "near 1.356, as of N m read as lbf ft"),
+        ([9.9, 9.91], "N", "near 9.807, as of N read as kgf"), ([0.01], "N m", "near 0.01, as of N m read as N cm"),
+        ([4.5], "N", "near 4.448, as of N read as lbf"), ([0.1047], "rad/s", "near 0.1047, as of rad/s read as rpm"),
+        ([1011.0], "N", "near 1000, as of mN read as N"), ([57.3], "rad/s", "near 57.3, as of deg/s read as rad/s"),
+    ],
+)  # fmt: skip
+def test_the_opposite_mistake_is_told_too_whatever_gain_the_sensor_has(
+    gains: list[float], unit: str, told: str
+) -> None:
+    assert told in read_as(gains, unit, 1.0)
 
 
 def test_a_gain_of_pound_feet_is_told_as_such() -> None:

@@ -124,8 +124,8 @@ def identify(
 
     Estimates, 95 % confidence intervals, and which parameters the data do not separate.
     """
-    from trunnion.rig.comparison.findings import gathered
     from trunnion.rig.identification import identify as run
+    from trunnion.rig.reading.log import gathered
     from trunnion.rig.reading.read import read_measured
 
     check_files(out or [], report, of="identification", kind=kind)

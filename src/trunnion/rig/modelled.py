@@ -15,12 +15,23 @@ from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
 from trunnion.model.units import Kind, dimension_text
-from trunnion.rig.reading.measurement import Condition, Measurement
+from trunnion.rig.reading.log import gathered
+from trunnion.rig.reading.measurement import Condition, Measurement, Signal
 from trunnion.rig.reading.signal_checks import backward_finding
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
-__all__ = ["Modelled", "apart", "check_settings", "measure_of", "modelled", "prepared", "refuse_backwards", "told_at"]
+__all__ = [
+    "Modelled",
+    "apart",
+    "check_settings",
+    "measure_of",
+    "modelled",
+    "prepared",
+    "refuse_backwards",
+    "refuse_unit",
+    "told_at",
+]
 
 Array = NDArray[np.float64]
 FAR = 0.05  # of a speed: an error of the settings
@@ -124,11 +135,17 @@ def modelled(
 def _checked(run: Run, condition: Condition, channel: str, name: str) -> Measure:
     """What a channel measures; MechanismError if the model has no such course, or has it in another unit."""
     measure = measure_of(run.system.mechanism, run, channel, name)
-    unit, own = measure.unit(run.system), condition.courses[channel].unit
+    refuse_unit(run, measure, channel, condition.courses[channel])
+    return measure
+
+
+def refuse_unit(run: Run, measure: Measure, channel: str, course: Signal) -> None:
+    """MechanismError where a channel has another unit than what it measures of the model, such as N in place of N m."""
+    unit, own, name = measure.unit(run.system), course.unit, course.measures
     if own != unit:
         what = f"is in {own}, and {name} is in {unit}"
-        raise MechanismError(Finding(what, f"channels.{channel}", "state its unit and gain, or what else it measures"))
-    return measure
+        remedy = "name another column, or state unit and gain, or what else it measures"
+        raise MechanismError(Finding(what, f"channels.{channel}", remedy))
 
 
 def prepared(mechanism: Mechanism, condition: Condition) -> Run:
@@ -198,7 +215,7 @@ def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> No
     found = [backward_finding(driver, one.speed, speed, next(iter(one.files), "")) for one, speed in rows
              if one.speed * speed < 0]  # fmt: skip
     if found:
-        raise MechanismError(found)
+        raise MechanismError(gathered(found))
 
 
 def _refuse_followed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:

@@ -219,7 +219,7 @@ IDENTIFY = {
         WARNING,
         "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} {of}, where its {by} is "
         "{known_told}",
-        "check the lengths of the model and the zero of the angle, or identify a length that acts on it",
+        "{remedy}",
     ),
     "fit.doubtful": Sentence(
         NOTE,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ENOUGH", "KINDS", "STATED", "Cause", "best", "beyond_stated", "causes"]
+__all__ = ["ENOUGH", "KINDS", "STATED", "Cause", "best", "beyond_stated", "causes", "drive_angle"]
 
 Array = NDArray[np.float64]
 ENOUGH = 0.8  # of the mean square of the residual that a cause has to explain
@@ -22,6 +22,7 @@ BOTH = 4.0  # an offset and a gain together are to leave so much less than one o
 FLAT = 0.05  # of the variation of the model: a reading that varies less, and not like it, is flat
 STATED = 3.0  # standard uncertainties: an error of zero or gain beyond so many of those stated is hardly the sensor's
 ACTS = 1e-6  # of the model, that its friction has to amount to
+OTHER = np.radians(5.0)  # standard deviation from the angle of the drive, from which an angle is another one
 FEWEST = 12  # positions from which a shift is looked for
 GRID = 180
 
@@ -33,6 +34,7 @@ KINDS = {
     "gain": "a wrong gain",
     "shift": "a shift of the crank angle",
     "mirror": "a crank angle with the wrong sign",
+    "drive": "the angle of the drive in its place",
     "friction": "other friction than the model's",
     "zero and gain": "an offset and a wrong gain",
 }
@@ -40,8 +42,9 @@ KINDS = {
 
 class Cause(NamedTuple):
     """One explanation. size: of a zero in the unit of the course, of a gain the relative error, of a shift the share of
-    the cycle by which the measured course is ahead, of a mirror too, run backwards, of what is flat the reading, of
-    friction how many times that of the model; gain: that of a zero and gain; explains: share of the mean square.
+    the cycle by which the measured course is ahead, of a mirror too, run backwards, of what is flat the reading, of the
+    angle of the drive by how much the readings are ahead of it, rad, of friction how many times that of the model;
+    gain: that of a zero and gain; explains: share of the mean square.
     """
 
     kind: str
@@ -80,11 +83,13 @@ def causes(
     closed: bool,
     turning: bool = False,
     without: Array | None = None,
+    drive: Array | None = None,
 ) -> list[Cause]:
     """Every explanation that can be fitted, in the order of KINDS; finite values only.
 
     closed: the cycle ends where it starts; turning: the course is an angle, of which neither sign nor gain is tried,
-    nor a shift if it turns right round; without: the model without its friction, if that is to be among them.
+    nor a shift if it turns right round; without: the model without its friction, if that is to be among them; drive:
+    its angle, rad, which may have been read in place of another.
     """
     pair, found = _Pair(measured, model), []
     square = float(np.sum(model**2))
@@ -103,7 +108,7 @@ def causes(
     if closed and len(phase) >= FEWEST:
         found += [*_shift(pair, phase, 1), *_shift(pair, phase, -1)]
     if turning:
-        return found
+        return found + drive_angle(measured, model, drive)
     found += _friction(pair, without)
     around = model - np.mean(model)
     if float(np.sum(around**2)) > 1e-6 * square:  # of a flat course the two cannot be told apart
@@ -127,6 +132,22 @@ def _friction(pair: _Pair, without: Array | None) -> list[Cause]:
         return []
     size = float(np.sum((pair.measured - without) * part)) / square
     return [Cause("friction", size, pair.explained(without + size * part))] if size > 0 else []
+
+
+def drive_angle(measured: Array, model: Array, drive: Array | None) -> list[Cause]:
+    """That an angle is the drive's, but for its zero; none where the model's is that too. In rad, to whole turns."""
+    if drive is None or not drive.size:
+        return []
+
+    def apart(angle: Array) -> tuple[float, Array]:
+        ahead = float(np.angle(np.mean(np.exp(1j * (angle - drive)))))
+        return ahead, np.asarray((angle - drive - ahead + np.pi) % (2 * np.pi) - np.pi)
+
+    before = float(np.mean(((measured - model + np.pi) % (2 * np.pi) - np.pi) ** 2))
+    if before == 0 or float(np.std(apart(model)[1])) < OTHER:
+        return []
+    ahead, gap = apart(measured)
+    return [Cause("drive", ahead, 1 - float(np.mean(gap**2)) / before)]
 
 
 def beyond_stated(one: Cause, zero: float, gain: float) -> float:

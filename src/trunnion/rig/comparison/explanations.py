@@ -164,6 +164,7 @@ ACT = "dimensions, friction and loads"
 REMEDIES = {
     "flat": "check the sensor, its cable, and the column in the mapping",
     "mirror": "state angle: {sign: -1} in the mapping, or remove it, and check the zero of the angle",
+    "drive": "check the column of the channel",
     "sign": "state sign: -1 for the channel in the mapping, or remove it",
     "zero": "check the zero of the channel, and whether the model lacks a load",
     "gain": f"check gain and unit of the channel, and {ACT} of the model",
@@ -186,12 +187,15 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
     """What would explain it, with its size, and what to do about it."""
     first, pair = members[0]
     unit, values = pair.course.unit, [one.size for one in sizes]
+    gains = {"gain": values, "zero and gain": [one.gain for one in sizes]}.get(kind, [])
+    as_of = read_as([1 + one for one in gains], *pair.course.shown)
     subject = measures.removeprefix("rate:")
     driver = first.model.run.system.mechanism.drivers.get(subject)
     if driver is not None and driver.speed is not None and kind in ("zero", "gain"):  # not one that swings
         shown, size = pair.course.shown
         speed = float(np.nanmean(pair.course.mean)) / size
         story = extent([one / size for one in values], shown) if kind == "zero" else _percent(values)
+        story += f", {as_of}" * bool(as_of)
         remedy = f"set: {{{subject}.speed: {{mean: {name}}}}} in the mapping uses the measured speed"
         return f"another speed of the driver, measured {said(speed, shown)} ({KINDS[kind]} of {story})", remedy
     if kind == "sign":
@@ -202,7 +206,7 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
         story = f"a constant offset of {offset}{_remarks(_beyond(sizes, members), _friction(sizes, members))}"
     elif kind == "gain":
         story = f"a gain {_times(values)}" if _times(values) else f"a gain error of {_percent(values)}"
-        story += _remarks(read_as([1 + one for one in values], *pair.course.shown), _beyond(sizes, members))
+        story += _remarks(as_of, _beyond(sizes, members))
     elif kind == "flat":
         story = f"a constant reading of {extent(values, unit, False)}"
     elif kind == "shift":
@@ -210,10 +214,10 @@ def _story(name: str, measures: str, kind: str, sizes: Sequence[Cause], members:
     elif kind == "friction":
         low, high = f"{min(values):.3g}", f"{max(values):.3g}"
         story = f"friction {low if low == high else f'{low} to {high}'} times that of the model"
-    elif kind == "mirror":
+    elif kind in ("mirror", "drive"):
         story = KINDS[kind]
     else:
-        story = f"an offset of {extent(values, unit)} and a gain error of {_percent([one.gain for one in sizes])}"
+        story = f"an offset of {extent(values, unit)} and a gain error of {_percent(gains)}{_remarks(as_of)}"
     if kind in ("zero", "gain", "zero and gain") and _differ(kind, sizes, members):
         remedy = MODEL
     elif kind == "zero" and _of_motion(name, members):

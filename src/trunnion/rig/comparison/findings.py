@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
     from trunnion.rig.comparison.error_sources import Cause
     from trunnion.rig.reading.measurement import Condition
 
-__all__ = ["findings_of", "gathered", "other_speed", "units_set"]
+__all__ = ["findings_of", "other_speed", "units_set"]
 
 SIGNIFICANT = 3.5  # standard deviations: of a correlation of turns that is none, in 1 of 4000 channels
 SLOWER = 0.01  # of a speed: a difference to speak of
@@ -72,23 +70,6 @@ def units_set(
         units.append(row["unit"])
         written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))
     return units, written
-
-
-def gathered(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings about data files, those of one code and place only told once, with the files they are of."""
-    alike: dict[tuple[str, ...], list[Finding]] = {}
-    for one in findings:
-        alike.setdefault((one.severity, one.where.partition(" ")[0], one.code, one.remedy), []).append(one)
-    found = []
-    for rows in alike.values():
-        first, files = rows[0], list(dict.fromkeys(Path(one.file).name for one in rows if one.file))
-        if len(rows) > 1:
-            where = first.where if len({one.where for one in rows}) == 1 else f"{first.where.partition(' ')[0]}s"
-            some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
-            what = f"{first.what} — {len(rows)} such findings" + (f": {some}" if files else "")
-            first = replace(first, what=what, where=where, file="", line=None)
-        found.append(first)
-    return found
 
 
 def _cases(name: str, found: Sequence[Compared]) -> list[tuple[Compared, ChannelComparison]]:

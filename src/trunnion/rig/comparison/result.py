@@ -17,7 +17,8 @@ from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.comparison.assessment import Verdict, difference, expanded, probability, uncertainty_of
 from trunnion.rig.comparison.comparison import ChannelComparison, Compared
-from trunnion.rig.comparison.findings import findings_of, gathered, units_set
+from trunnion.rig.comparison.findings import findings_of, units_set
+from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
 

@@ -89,6 +89,24 @@ class Assessment:
         return np.asarray(np.where(self.lost, self.start, self.found.x)[: self.problem.count])
 
     @cached_property
+    def late(self) -> dict[int, tuple[float, float]]:
+        """By condition, how far all its channels are behind the model by errors of the angle that the fit has found,
+        and the standard uncertainty of that, s."""
+        first, sensors = self.problem.count, self.problem.sensors
+        common = [
+            s for s, one in enumerate(sensors) if one.kind == "delay" and not one.channel and not self.lost[first + s]
+        ]
+        at = [first + s for s in common]
+        found = {}
+        for k, block in enumerate(self.problem.blocks):
+            sizes = np.array([sensors[s].sizes[k] for s in common])
+            if np.any(sizes):
+                variance = float(sizes @ self.found.spread.covariance[np.ix_(at, at)] @ sizes)
+                stated = float(sizes @ sizes)  # which a misfit does not widen
+                found[block.condition] = float(sizes @ self.found.x[at]), min(max(variance, 0.0), stated) ** 0.5
+        return found
+
+    @cached_property
     def deviation(self) -> Array:
         """Standard uncertainty, (unknown and sensor,)."""
         found = np.sqrt(np.maximum(np.diagonal(self.found.spread.covariance), 0.0))

@@ -36,6 +36,8 @@ SMALL = 0.2  # of the largest: what a condition has of an error to be named with
 MOST_TOLD = 4
 FEW = 5.0  # degrees of freedom
 DOUBTFUL = 0.05  # a chance below which a misfit is spoken of
+OF_DRIVE = "its readings are the angle of the drive: check the column of the channel"
+LENGTH = "check the lengths of the model and the zero of the angle, or identify a length that acts on it"
 FACTOR = 0.5  # of a gain: told as a factor from here on
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
@@ -130,7 +132,8 @@ def _unused(judged: Assessment) -> Iterator[Finding]:
     unused = judged.found.unused
     if unused is None or not unused.blocks:
         return
-    missing = unused.missing(judged.told) if not judged.found.causes else {}  # which hold for it too
+    ahead = any(one.kind in ("shift", "delay") for one in judged.found.causes)  # which holds for it too
+    missing = {} if ahead else unused.missing(judged.told, judged.late)
     fine = [name for name in dict.fromkeys(block.channel for block in unused.blocks) if name not in missing]
     if fine:
         yield finding_for("fit.unused", "channels", channels=fine)
@@ -141,6 +144,7 @@ def _unused(judged: Assessment) -> Iterator[Finding]:
             "rms_told": said(one.rms / size, unit), "known_told": said(one.expected / size, unit),
             "of": "once its zero and gain are fitted" if one.shape else "about the mean",
             "by": "scatter" if one.shape else "standard uncertainty",
+            "remedy": OF_DRIVE if one.drive else LENGTH,
         }  # fmt: skip
         yield finding_for("fit.unused_missed", f"channels.{name}", phrases=phrases, rms=one.rms, expected=one.expected)
 

@@ -24,7 +24,7 @@ from trunnion.rig.identification.start_signals import StartModel, check_starts
 from trunnion.rig.identification.uncertainty import left_over, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.identification.unused import UnusedChannels
-from trunnion.rig.modelled import apart, check_settings, refuse_backwards, told_at
+from trunnion.rig.modelled import apart, check_settings, refuse_backwards, refuse_unit, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -96,7 +96,7 @@ def identify(
         model = StartModel.of(model, measurement.conditions)
     unused = UnusedChannels(model, [])
     if channels is None:
-        model, blocks, unused = _telling(model, blocks, measurement)
+        model, blocks, unused = _telling(model, blocks, measurement, delay or 0.0)
     at = np.array([one.start for one in model.unknowns])
     speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(measurement.conditions)]
     refuse_backwards(next(iter(stated.drivers), ""), speeds)
@@ -137,7 +137,9 @@ def _check(sensors: str, delay: float | None, guard: int | None, starts: int | N
         raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
 
 
-def _telling(model: Model, blocks: list[Block], measurement: Measurement) -> tuple[Model, list[Block], UnusedChannels]:
+def _telling(
+    model: Model, blocks: list[Block], measurement: Measurement, delay: float
+) -> tuple[Model, list[Block], UnusedChannels]:
     """Only the channels that an unknown acts on, as far as the start tells, all if there are none; then the others."""
     courses = model.courses(np.array([one.start for one in model.unknowns]))
     sizes = np.array([one.size or 1.0 for one in model.unknowns])
@@ -150,7 +152,9 @@ def _telling(model: Model, blocks: list[Block], measurement: Measurement) -> tup
     kept = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
     others = {name: measure for name, measure in model.measures.items() if name not in kept}
     late = [float(np.hypot(one.cut / (one.speed or np.inf), one.lag)) for one in measurement.conditions]
-    unused = UnusedChannels(replace(model, measures=others), [one for one in blocks if one.channel in others], late)
+    unused = UnusedChannels(
+        replace(model, measures=others), [one for one in blocks if one.channel in others], late, delay
+    )
     return replace(model, measures=kept), [block for block in blocks if block.channel in kept], unused
 
 
@@ -214,6 +218,7 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block], of_starts
             raise MechanismError(
                 Finding(what, f"channel {name}", "effort:DRIVER, load:LOAD, rate:JOINT or link.point.x is")
             )
+        refuse_unit(run, measure, name, next(block.course for block in blocks if block.channel == name))
     return found
 
 

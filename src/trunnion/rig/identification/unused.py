@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.rig.comparison.error_sources import ENOUGH, drive_angle
 from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.signals import Model
 
@@ -25,24 +26,27 @@ FLAT = 1e-6  # of a course of the model, that it has to vary to have a shape
 class Missed(NamedTuple):
     """A channel that the model misses: RMS of its residual and what is expected of it.
 
-    shape: of what is left once zero and gain are fitted, against the scatter alone.
+    shape: of what is left once zero and gain are fitted, against the scatter alone; drive: whether it is the
+    angle of the drive.
     """
 
     rms: float
     expected: float
     shape: bool
+    drive: bool
 
 
 @dataclass(frozen=True)
 class UnusedChannels:
     """The channels that are not fitted, with the model of what they measure.
 
-    late: standard uncertainty, s, of when the angle is passed, by condition.
+    late: standard uncertainty, s, of when the angle is passed, by condition; delay: of by how much a channel lags.
     """
 
     model: Model
     blocks: Sequence[Block]
     late: Sequence[float] = ()
+    delay: float = 0.0
 
     def _gap(self, at: Array, block: Block, ahead: float) -> tuple[Model, Array, Array]:
         """The model, what it says and the residual, where the angle of a condition is ahead of it by so much, rad."""
@@ -58,27 +62,33 @@ class UnusedChannels:
             gap = (gap + np.pi) % (2 * np.pi) - np.pi
         return model, said, gap
 
-    def off(self, at: Array, block: Block, ahead: float = 0.0) -> tuple[float, float]:
+    def off(
+        self, at: Array, block: Block, ahead: float = 0.0, late: tuple[float, float] = (0.0, 0.0)
+    ) -> tuple[float, float]:
         """RMS of a residual without its mean, which may be the sensor's zero, and of its standard uncertainty.
 
-        at: the unknowns; ahead: by which the angle of the condition is ahead of the model, rad.
+        at: the unknowns; ahead: by which the angle of the condition is ahead of the model, rad; late: by how much the
+        channel is behind it, and the standard uncertainty of that, s: f − τ df/dt is there to be read.
         """
-        gap, course = self._gap(at, block, ahead)[2], block.course
+        model, said, gap = self._gap(at, block, ahead)
+        rate, course = model.rate(block.condition, said), block.course
+        gap = gap + late[0] * rate
         random = (course.scatter**2 / np.maximum(course.count, 1))[np.isfinite(course.scatter)]
         gap = gap[np.isfinite(gap)]
         if not gap.size or not random.size:
             return np.nan, np.nan
-        gain = course.accuracy.gain * float(np.nanstd(course.mean))
-        return float(np.std(gap)), float(np.sqrt(np.mean(random) + course.unresolved**2 + gain**2))
+        gain, moved = course.accuracy.gain * float(np.nanstd(course.mean)), late[1] * float(np.nanstd(rate))
+        return float(np.std(gap)), float(np.sqrt(np.mean(random) + course.unresolved**2 + gain**2 + moved**2))
 
-    def shape(self, at: Array, block: Block, ahead: float = 0.0) -> tuple[float, float]:
+    def shape(self, at: Array, block: Block, ahead: float, late: tuple[float, float]) -> tuple[float, float]:
         """RMS of a residual once zero, gain and the angle within its uncertainty are fitted, and of the scatter.
 
         What is left tells of an error of the model that the stated accuracy hides; of an angle no gain is fitted. NaN
         if not known.
         """
         model, said, gap = self._gap(at, block, ahead)
-        slope = model.rate(block.condition, said) * self.late[block.condition]
+        rate = model.rate(block.condition, said)
+        gap, slope = gap + late[0] * rate, rate * late[1]
         there = np.isfinite(gap) & np.isfinite(slope)
         said, slope, gap = said[there], slope[there], gap[there]
         if not block.repeats or said.size < FEWEST or np.ptp(said) <= FLAT * np.max(np.abs(said)):
@@ -90,16 +100,31 @@ class UnusedChannels:
         best = np.linalg.lstsq(np.vstack([columns, [0.0, 0.0, expected]]), np.append(gap, 0.0), rcond=None)[0]
         return float(np.sqrt(np.mean((gap - columns @ best) ** 2))), float(expected)
 
-    def missing(self, at: Array) -> dict[str, Missed]:
-        """By channel that does not agree, the worst condition: as it is stated, else by its shape."""
+    def missing(self, at: Array, late: Mapping[int, tuple[float, float]]) -> dict[str, Missed]:
+        """By channel that does not agree, the worst condition: as it is stated, else by its shape.
+
+        late: by condition, how far behind the angle is as the fit has it, and the standard uncertainty of that, s.
+        """
         found: dict[str, Missed] = {}
         for shape, figures in ((False, self.off), (True, self.shape)):
             for block in self.blocks:
-                rms, known = figures(at, block)
+                mean, wide = late.get(block.condition, (0.0, self.late[block.condition]))
+                rms, known = figures(at, block, 0.0, (mean, float(np.hypot(wide, self.delay))))
                 before = found.get(block.channel)
                 if rms > MISSES * known and (before is None or (before.shape == shape and rms > before.rms)):
-                    found[block.channel] = Missed(rms, known, shape)
+                    found[block.channel] = Missed(rms, known, shape, self._of_drive(at, block))
         return found
+
+    def _of_drive(self, at: Array, block: Block) -> bool:
+        """Whether the readings of an angle are those of the drive."""
+        model, k = self.model, block.condition
+        first, last, _ = model.driven(k, at)
+        there = np.isfinite(block.mean)
+        if not np.isfinite(first) or there.size != len(model.phases[k]):
+            return False
+        said, drive = block.mean - self._gap(at, block, 0.0)[2], first + (last - first) * model.phases[k]
+        there &= np.isfinite(said) & model.measures[block.channel].turning(model.run.system)
+        return any(one.explains >= ENOUGH for one in drive_angle(block.mean[there], said[there], drive[there]))
 
     def refute(self, at: Array, ahead: Array) -> bool:
         """Whether a channel on which shifts of the angle act, rad by condition, neither agrees with them nor better."""
@@ -109,7 +134,7 @@ class UnusedChannels:
             (before, known), (after, _) = self.off(at, block), self.off(at, block, float(ahead[block.condition]))
             acts = abs(after**2 - before**2) > ACTS * before**2
             if acts and after**2 > HALF * before**2:
-                left, scatter = self.shape(at, block, float(ahead[block.condition]))
+                left, scatter = self.shape(at, block, float(ahead[block.condition]), (0.0, self.late[block.condition]))
                 if after > MISSES * known or left > MISSES * scatter:
                     return True
         return False

@@ -15,7 +15,7 @@ from trunnion.rig.reading.columns import Column
 from trunnion.rig.reading.faults import outliers
 from trunnion.rig.reading.log import Account, counted, few_digits, runs, times
 from trunnion.rig.reading.mapping import Channel, Filter, Zero
-from trunnion.rig.reading.scale import SensorScale, default_unit, scale
+from trunnion.rig.reading.scale import OTHER_COLUMN, SensorScale, default_unit, scale
 from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimensions
 from trunnion.rig.reading.timebase import Timeline
 
@@ -92,7 +92,7 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Ch
             f"state {where}.unit",
         )
     try:
-        found = scale(channel.measures, unit, channel.gain)
+        found = scale(channel.measures, unit, channel.gain, channel.column)
         if not MOST > abs(found.factor) > 1 / MOST:
             what = f"a reading of 1 is {found.factor:.3g} {found.unit}, which no sensor has"
             raise MechanismError(Finding(what, f"{where}.gain", "check unit and gain", file=account.file))
@@ -102,7 +102,7 @@ def reading(name: str, channel: Channel, column: Column, account: Account) -> Ch
         return ChannelReading(found, unit, limit, zero, float(channel.accuracy.gain.evaluate()), step)
     except UnitError as error:
         remedy = error.remedy
-        if not channel.unit and column.unit:  # a file of a logger is not written anew
+        if not channel.unit and column.unit and not remedy.startswith(OTHER_COLUMN):  # no logger's file is written anew
             remedy = f"state {where}.unit in the mapping; in the file, {remedy}"
         raise MechanismError(Finding(error.what, where, remedy, file=account.file)) from None
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, Severity, counted
 
-__all__ = ["Account", "counted", "few_digits", "places", "runs", "times", "told"]
+__all__ = ["Account", "counted", "few_digits", "gathered", "places", "runs", "times", "told"]
 
 FILES = 4  # named in a sentence
 
@@ -63,6 +63,27 @@ def told(accounts: Sequence[Account]) -> list[str]:
         names = [Path(one.file).name for one in said]
         most = ", ".join(names[:FILES]) + (f" and {len(names) - FILES} more" if len(names) > FILES else "")
         found.append(text if len(said) == len(accounts) else f"{most}: {text}")
+    return found
+
+
+def gathered(findings: Iterable[Finding], same: bool = False) -> list[Finding]:
+    """Findings about data files, those of one code and place only told once, with the files they are of.
+
+    same: only those that say the same; else the first speaks for all.
+    """
+    alike: dict[tuple[str, ...], list[Finding]] = {}
+    for one in findings:
+        key = one.severity, one.where.partition(" ")[0], one.code, one.remedy, one.what if same else ""
+        alike.setdefault(key, []).append(one)
+    found = []
+    for rows in alike.values():
+        first, files = rows[0], list(dict.fromkeys(Path(one.file).name for one in rows if one.file))
+        if len(rows) > 1:
+            where = first.where if len({one.where for one in rows}) == 1 else f"{first.where.partition(' ')[0]}s"
+            some = ", ".join(files[:4]) + (", …" if len(files) > 4 else "")
+            what = f"{first.what} — {len(rows)} such findings" + (f": {some}" if files else "")
+            first = replace(first, what=what, where=where, file="", line=None)
+        found.append(first)
     return found
 
 

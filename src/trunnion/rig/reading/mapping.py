@@ -220,7 +220,7 @@ class Channel(Part):
     def scale(self, unit: str) -> SensorScale:
         """How readings in a unit become the quantity; an error of pydantic if they cannot."""
         try:
-            found = scale(self.measures, unit, self.gain)
+            found = scale(self.measures, unit, self.gain, self.column)
             stated = {"zero": self.zero, "range": self.range, "resolution": self.resolution}
             for key, amount in {**stated, "accuracy.zero": self.accuracy.zero}.items():
                 if isinstance(amount, Amount):

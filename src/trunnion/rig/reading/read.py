@@ -28,9 +28,9 @@ from trunnion.rig.reading.channels import (
 )
 from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
-from trunnion.rig.reading.log import Account, counted, told
+from trunnion.rig.reading.log import Account, counted, gathered, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
-from trunnion.rig.reading.mapping_file import read_mapping
+from trunnion.rig.reading.mapping_file import read_mapping, vague_gains
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
@@ -39,7 +39,7 @@ from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, s
 from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
-from trunnion.rig.reading.turns import DENSE, Turns, cut, resampled, time_mean
+from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
 from trunnion.rig.reading.unloaded import check_unloaded
 
 __all__ = ["read_measured"]
@@ -78,9 +78,10 @@ def read_measured(
         accounts.append(account)
     starts = [(k, one) for k, one in enumerate(mapped.mapping.starts) if not one.file]
     conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
-    findings = mapped.placed([*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])])
+    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
+    findings = mapped.placed(findings)
     if failed or not conditions:
-        raise MechanismError([one for one in findings if one.severity is not Severity.NOTE])
+        raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))
     name = mapped.mapping.name or Path(mapped.file).stem
     return Measurement(
         name,
@@ -309,11 +310,14 @@ class _File:
             if passed < FEW_HARMONICS:
                 what = f"the filter leaves the first {passed:.2g} harmonics of a turn"
                 account.note("data.filter.harmonics", where, what, "state a higher cut-off")
-        dense = all(turns.density >= DENSE for _, turns in cuts)
-        account.say(
-            "values at a position: mean of the samples within half a position to either side"
-            if dense else "values at a position: interpolated by a cubic between four samples"
-        )  # fmt: skip
+        most = int(min(turns.density for _, turns in cuts) * mapping.positions / DENSE)
+        if most >= mapping.positions:
+            account.say("values at a position: mean of the samples within half a position to either side")
+            return
+        told = most // (size := 10 ** max(len(str(most)) - 2, 0)) * size  # to the two digits that are told
+        cubic = "values at a position: interpolated by a cubic between four samples"
+        tail = "; of at most {} positions each has four samples, which are averaged"
+        account.say(f"{cubic}{tail * (most > 1)}", told if most > 1 else None)
 
     def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]], share: Array) -> None:
         """Tell of unloaded stretches in which the sensor is loaded."""
@@ -354,10 +358,12 @@ class _File:
         faults.signal(where, readings, line.seconds, span, own.limit, account, speed, self.beyond[name])
         step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
         values = own.quantity(readings, zero, channel.sign, line.seconds)
+        angle = values if own.scale.unit == "rad" else None
+        values = values if angle is None else joined(angle)
         if mapping.filter is not None:
             values = filtered(values, line, mapping.filter, account, where)
         for part in parts:
-            part.courses[name] = resampled(part.turns, values)
+            part.courses[name] = resampled(part.turns, values, angle)
         scatters = [float(np.median(between_turns(part.courses[name]))) / abs(own.scale.factor) for part in parts]
         if mapping.filter is None:
             rows = [one * max(part.turns.density, 1.0) ** 0.5 for one, part in zip(scatters, parts, strict=True)]
@@ -384,7 +390,7 @@ class _File:
             remedy,
         )
         for part in parts:
-            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since))
+            part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), angle)
         return found
 
     def _check_repeated(

@@ -167,9 +167,8 @@ def backwards(
 def backward_finding(driver: str, measured: float, stated: float, file: str = "") -> Finding:
     """An error of an angle that runs against the driver; speeds in rad/s."""
     what = f"the angle runs backwards: {measured / RPM:.4g} rpm measured, {stated / RPM:.4g} rpm stated of {driver}"
-    remedy = (
-        f"add sign: -1 to angle:, or remove it there; set {as_key(f'{driver}.speed')} below zero if it does turn so"
-    )
+    speed = as_key(f"{driver}.speed")
+    remedy = f"if it does turn so, set {speed} below zero; else add sign: -1 to angle:, or remove it there"
     figures = {"measured": measured, "stated": stated, "driver": driver}
     return Finding(what, "angle", remedy, file=file, code="data.angle.backwards", figures=figures)
 

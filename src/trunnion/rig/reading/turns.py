@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from trunnion.rig.reading.log import Account, counted, times
 from trunnion.rig.reading.timebase import GAP, Timeline
 
-__all__ = ["Turns", "cut", "resampled", "time_mean", "turn_means"]
+__all__ = ["Turns", "cut", "joined", "resampled", "time_mean", "turn_means"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+TURN = 2 * np.pi
 DENSE = 4.0  # samples a position from which they are averaged
 STANDING = 0.2  # of the usual speed, below which the drive is taken to stand
 APART = 0.5  # of the usual length of a turn, by which one may differ from it
@@ -171,14 +172,40 @@ def _rows_of(
     return np.asarray(rows & ~(moved < STANDING / usual))
 
 
-def resampled(turns: Turns, channel: Array) -> Array:
-    """Values of a channel, which has one a row of the file, as (turn, position); NaN where no sample has one."""
+def resampled(turns: Turns, channel: Array, angle: Array | None = None) -> Array:
+    """Values of a channel, which has one a row of the file, as (turn, position); NaN where no sample has one.
+
+    angle: readings of a channel that is an angle, rad, before they were `joined`: they tell its whole turns.
+    """
+    if angle is not None:
+        return _counted_alike(resampled(turns, channel), resampled(turns, angle))
     values = channel[turns.window]
     if not turns.numbers.size:
         return np.empty((0, turns.positions))
     if turns.density >= DENSE:
         return _averaged(turns, values)
     return _interpolated(turns, values, turns.line)
+
+
+def joined(angle: Array) -> Array:
+    """An angle by row, rad, without the jumps of readings that begin anew after a turn; NaN stay."""
+    known, found = np.isfinite(angle), angle.copy()
+    found[known] = np.unwrap(angle[known])
+    return found
+
+
+def _counted_alike(course: Array, raw: Array) -> Array:
+    """A course of a joined angle, (turn, position), rad, with as many whole turns at a position in every turn: those of
+    the readings, raw, in the fullest one."""
+    known = np.isfinite(course)
+    if not known.any():
+        return course
+    first = int(np.argmax(np.count_nonzero(known, axis=1)))
+    at = np.flatnonzero(known[first])
+    near = np.interp(np.arange(course.shape[1]), at, course[first, at])
+    off = float(np.nan_to_num(np.nanmedian(raw[first, at] - near[at])))
+    near += TURN * np.round(off / TURN)
+    return np.asarray(course - TURN * np.nan_to_num(np.round((course - near) / TURN)))
 
 
 def _averaged(turns: Turns, values: Array) -> Array:

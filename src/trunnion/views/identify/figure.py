@@ -27,6 +27,7 @@ SUBTITLE = 12.0  # points: height of the name of a condition above its axes
 FEW = 5  # conditions whose names stand side by side
 MOST_TOLD = 12  # parameters whose correlations have room for their numbers
 COVERED = 2.0  # standard uncertainties of the band
+ALIKE = 1e-6  # of the range of the drive: by which it may differ between conditions that share an axis
 BEFORE, AFTER = PALETTE[4], PALETTE[0]
 
 
@@ -125,13 +126,18 @@ def residuals(result: xr.Dataset) -> Figure:
     pairs = panels(every)
     more = f", {len(pairs)} of {len(every)} curves" if len(pairs) < len(every) else ""
     sheet = new(f"Residuals, before and after{more}", result, height=1.0 + 1.75 * len(pairs))
-    rows = sheet.subplots(len(pairs), 2, sharex=True, squeeze=False)
     drive = str(result.attrs.get("drive", ""))
-    angles = [_angles(result, condition) for _, condition in pairs]
-    turned, durations = all(one is not None for one in angles), attribute(result, "durations") or []
-    for (left, right), angle, (channel, condition) in zip(rows, angles, pairs, strict=True):
+    angles = {condition: _angles(result, condition) for _, condition in pairs}
+    turned, durations = all(one is not None for one in angles.values()), attribute(result, "durations") or []
+    over: dict[int, Array] = {}
+    for condition, angle in angles.items():
         phase = np.asarray(result["phase"].values[condition], float)
-        x = angle if turned and angle is not None else phase * (durations[condition] if durations else 1.0)
+        over[condition] = angle if turned and angle is not None else phase * (durations[condition] if durations else 1)
+    ends = np.array([(np.nanmin(x), np.nanmax(x)) for x in over.values()])
+    alike = bool(np.all(np.ptp(ends, axis=0) <= ALIKE * np.ptp(ends)))  # not of cycles driven forward and backward
+    rows = sheet.subplots(len(pairs), 2, sharex=True if alike else "row", squeeze=False)
+    for (left, right), (channel, condition) in zip(rows, pairs, strict=True):
+        x = over[condition]
         _residual(left, result, (channel, condition), x, before=True)
         _residual(right, result, (channel, condition), x, before=False)
     for axes in rows[-1]:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from manual.conftest import Run, program
 from measured_data.recording import Columns, mapping, off, read, recorded, text_of
@@ -265,7 +264,7 @@ def test_a_gain_that_is_hardly_known_is_a_warning(
     changes = {"files": [own]} if place.startswith("files") else {f"{place}/accuracy": {"gain": gain}}
     (tmp_path / "a.csv").write_text(text_of(columns), "utf-8")
     entries = mapping({"files": [{"file": "a.csv"}], **changes})
-    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(entries), "utf-8")
+    (tmp_path / "mapping.yaml").write_text(json.dumps(entries), "utf-8")
     found = [one for one in read_measured(tmp_path / "mapping.yaml").findings if one.code == "data.accuracy.gain"]
     assert len(found) == bool(warned)
     for one in found:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import trunnion
 from toleranced import alone, sampler
@@ -126,3 +127,28 @@ def test_play_moves_the_jump(force: str) -> None:
     assert found.severity == "note"
     assert found.figures["figure"] == pytest.approx(peak("seats.P.1.x", 0.0), rel=1e-4)
     assert found.figures["coarse"] == pytest.approx(told(force, 180)[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("steps", [24, 720])
+def test_the_drive_of_a_press_whose_load_jumps(steps: int) -> None:
+    """Power in = power out: T = F x'(θ) from 320.3° to 350°, else 0, whatever the steps."""
+    r, rod, force, begin, end = 0.03, 0.2, 50e3, np.radians(320.3), np.radians(350)
+
+    def place(angle: float) -> float:
+        return float(r * np.cos(angle) + np.sqrt(rod**2 - (r * np.sin(angle)) ** 2))
+
+    def torque(angle: float) -> float:
+        arm = -r * np.sin(angle) * (1 + r * np.cos(angle) / np.sqrt(rod**2 - (r * np.sin(angle)) ** 2))
+        return float(force * arm)
+
+    data = {**PRESS, "drivers": {"O": {"speed": "60 rpm"}}}
+    found = trunnion.design(trunnion.Mechanism.model_validate(data), steps)
+    work = force * (place(end) - place(begin))
+    assert found.mean_power == pytest.approx(work, rel=1e-9)  # in one second
+    square = quad(lambda angle: torque(angle) ** 2, begin, end, epsrel=1e-12)[0]
+    assert found.rms_effort == pytest.approx(np.sqrt(square / (2 * np.pi)), rel=1e-7)
+    assert found.peak_power == pytest.approx(2 * np.pi * torque(begin), rel=1e-6)
+    assert torque(end) * 2 * np.pi > work  # above the mean to the end of the cut
+    swing = work * (1 - (end - begin) / (2 * np.pi))
+    assert found.energy_swing == pytest.approx(swing, rel=1e-7)
+    assert found.flywheel(0.05) == pytest.approx(swing / (0.05 * (2 * np.pi) ** 2), rel=1e-7)

@@ -14,6 +14,7 @@ from trunnion.measures.measures import named
 from trunnion.solve.run import prepare
 from trunnion.solve.shifts import CARRIERS
 from trunnion.studies.tolerance.first_order import study
+from trunnion.views.play.figure import figure
 
 PRESS: dict[str, Any] = {
     "trunnion": 1,
@@ -171,6 +172,8 @@ def test_play_moves_the_jump(force: str) -> None:
         gradients.append(np.hypot(*((peak(path, step) - peak(path, -step)) / (2 * step) for path in paths)))
     assert float(result["extreme_worst_case"][0, 0]) == pytest.approx(20e-6 * max(gradients), rel=1e-3)
     (found,) = (one for one in result.trunnion.findings if one.code == "play.beside_jump")
+    (entry,) = (text.get_text() for text in figure(result).axes[0].get_legend().get_texts() if "extreme" in str(text))
+    assert "corner" in entry
     assert found.severity == "note"
     assert found.figures["figure"] == pytest.approx(peak("seats.P.1.x", 0.0), rel=1e-4)
     assert found.figures["coarse"] == pytest.approx(coarse_and_fine(force, 180)[0], rel=1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -99,12 +100,33 @@ def test_every_point_of_a_sweep_has_it(steps: int) -> None:
     assert not [one for one in swept.trunnion.findings if one.code == "effort.beside_jump"]
 
 
+def seated(clearance: str) -> trunnion.Mechanism:
+    """With the pin of P held to one side; the cut begins at a place of the ram."""
+    pin = {"radius": "25 mm", "clearance": clearance}
+    joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": pin, "seat": {"xi": "0 deg"}}}
+    loads = {"cut": {**PRESS["loads"]["cut"], "force": [f"{SLIDING} * between(drive, 200 deg, 360 deg)", 0]}}
+    return trunnion.Mechanism.model_validate({**PRESS, "joints": joints, "loads": loads})
+
+
+def test_a_jump_that_the_seats_move_is_told_with_both_places() -> None:
+    """Without errors by the law of cosines, with them where dense positions jump; elsewhere as dense positions say."""
+    result, fine = (trunnion.analyse(seated("1 mm"), steps) for steps in (720, 36_000))
+    (one,) = (found for found in result.trunnion.findings if found.code == "errors.jump_moved")
+    meant, built = ([float(place) for place in re.findall(r"[\d.]+", one.figures[key])] for key in ("meant", "built"))
+    begin = 360 - np.degrees(np.arccos((0.03**2 + 0.2179**2 - 0.2**2) / (2 * 0.03 * 0.2179)))
+    assert meant[0] < begin < meant[1]
+    effort, drive = fine["drive_effort"].values[0], fine["drive"].values
+    jump = drive[int(np.argmax(np.diff(effort)))] % 360
+    assert built[0] <= jump <= built[1]
+    change, away = np.abs(fine["drive_effort_change"].values[0]), np.abs(drive % 360 - begin) > abs(jump - begin) + 1
+    assert one.figures["rest"] == pytest.approx(np.max(change[away]), rel=0.05)
+    tight = trunnion.analyse(seated("1 um"), 180).trunnion.findings
+    assert not [found for found in tight if found.code == "errors.jump_moved"]
+
+
 def test_with_a_pin_in_its_seat_a_bound_is_said() -> None:
     """The seat moves the jump; every point of a sweep is looked at."""
-    pin = {"radius": "25 mm", "clearance": "1 mm"}
-    joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": pin, "seat": {"xi": "0 deg"}}}
-    loads = {"cut": {**PRESS["loads"]["cut"], "force": [SLIDING, 0]}}
-    model = trunnion.Mechanism.model_validate({**PRESS, "joints": joints, "loads": loads})
+    model = seated("1 mm")
     result, fine = (trunnion.analyse(model, steps) for steps in (180, 7200))
     (one,) = (found for found in result.trunnion.findings if found.code == "effort.beside_jump")
     low, high = (float(np.abs(each["drive_effort"]).max()) for each in (result, fine))

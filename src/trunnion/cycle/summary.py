@@ -129,6 +129,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *_over_the_cycle(run, at, near),
         *_missed_peaks(run.system, at),
         *jumps.findings(run, at.time, at.arrays, effort_units(run.system)),
+        *jumps.moved(run, at, effort_units(run.system)),
         *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near

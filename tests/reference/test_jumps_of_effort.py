@@ -58,7 +58,7 @@ def coarse_and_fine(force: str, steps: int) -> tuple[float, float]:
     return coarse, fine
 
 
-@pytest.mark.parametrize("steps", [45, 180, 720])
+@pytest.mark.parametrize("steps", [12, 45, 180, 720])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_an_extreme_is_that_at_the_jump(steps: int, sign: int) -> None:
     """Of effort and reaction alike, with its place; a load that pulls makes the least effort."""

@@ -41,8 +41,8 @@ def dropping(courses: Array, status: NDArray[Any], closed: bool) -> NDArray[np.b
     top = np.argmax(np.where(np.isnan(known), -np.inf, known), axis=-1)[..., None]
     before, value, after = (np.take_along_axis(known, (top + k) % count, -1) for k in (-1, 0, 1))
     scale = JUMP * np.fmax.reduce(np.abs(known), axis=-1, initial=0.0)[..., None]
-    for low, drop, other in ((top - 1, value - before, value - after), (top, value - after, value - before)):
-        there = (drop > scale) & (drop > other) & (closed | ((top > 0) & (top < count - 1)))
+    for low, beyond in ((top - 1, before), (top, after)):
+        there = (value - beyond > scale) & (closed | ((low >= 0) & (low < count - 1)))
         for index in np.argwhere(there[..., 0]):
             gaps[(*index[1:], int(low[(*index, 0)]) % count)] = True
     return gaps
@@ -88,7 +88,8 @@ def findings(run: Run, time: Array, arrays: Mapping[str, NDArray[Any]], units: l
             away = np.mod(run.edges - time[low] + MOVED * step, run.cycle.duration)
             k, rest = (low, low - 1) if size[0, low] > size[0, (low + 1) % len(time)] else (low + 1, low + 2)
             more = size[0, k % len(time)] - size[0, rest % len(time)]
-            if np.any(away <= (2 * MOVED + 1) * step):
+            drop = abs(size[0, low] - size[0, (low + 1) % len(time)])
+            if more < drop and np.any(away <= (2 * MOVED + 1) * step):
                 at = run.system.dial(run.values, time).at(int(k) % len(time))
                 yield finding_for("effort.beside_jump", f"drivers.{name}", at=at, more=float(more), unit=unit)
 

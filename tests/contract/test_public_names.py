@@ -24,7 +24,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 # where a default is another for a reason
 OTHERWISE = {
-    ("design", "steps"),  # extremes and means are taken at the positions alone: 720 of them
+    ("design", "steps"),  # most extremes are taken at the positions alone: 720 of them
     ("simulate", "steps"),  # many turns, where the others have one
     ("simulate", "progress"),  # told a time
 }

@@ -96,6 +96,17 @@ def test_options_of_the_model_come_first(run: Run, tmp_path: Path) -> None:
     assert {row["friction_power_mean"] for row in found} == {"0.0"}
 
 
+@pytest.mark.parametrize(
+    ("measures", "meant"), [([], "rocker-angle, torque are not in this sweep — add them"), (["torque"], "add it")]
+)
+def test_measures_that_are_left_out_are_named(run: Run, measures: list[str], meant: str) -> None:
+    done = run(
+        EXAMPLES / "toleranced-fourbar.yaml", "--over", "l1=100mm,101mm", "--steps", 24,
+        *(f"--measure={one}" for one in measures),
+    )  # fmt: skip
+    assert meant in done.err
+
+
 def test_a_measure_of_choice(run: Run) -> None:
     done = run(FOUR_BAR, "--over", "AB=2m,2.1m", "--steps", 12, "--measure", "B.reaction_max", "--out", "b.svg")
     assert done.code == 0

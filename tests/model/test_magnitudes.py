@@ -107,6 +107,7 @@ def test_a_plain_number_among_others_with_a_unit(
     assert all(figures in one.what for one in told)
 
 
+STATED = "measures: {end: {point: ram.C, axis: x, as: maximum, "
 BOUGHT = """tolerances: {AB: ±0.05 mm, BC: {limits: ±0.05 mm, shift: 0.01 mm}}
 costs:
   AB: {model: power, B: 1, k: 1, unit: mm, least: 0.01 mm}
@@ -124,6 +125,9 @@ costs:
         ("least: 0.01 mm", "least: 1e-5", Severity.NOTE, "costs.AB.least", "is 1e-05 m, "),
         ("AB: ±0.05 mm", "AB: 0.05", Severity.WARNING, "tolerances.AB", "is 0.05 m, "),
         (", unit: mm", "", Severity.NOTE, "costs.AB", "B is what a half width of 1 m costs"),
+        ("costs:", f"{STATED}limit: 0.1}}}}\ncosts:", Severity.WARNING, "measures.end.limit.upper", "1.11 times"),
+        ("costs:", f"{STATED}limit: 1e-4}}}}\ncosts:", Severity.NOTE, "measures.end.limit.upper", "is 0.0001 m, "),
+        ("costs:", f"{STATED}at_least: 0.05}}}}\ncosts:", Severity.NOTE, "measures.end.at_least", "is 0.05 m, "),
     ],
 )
 def test_a_plain_tolerance_or_cost_among_lengths_with_a_unit(

@@ -1,11 +1,13 @@
-"""A largest effort beside a jump of a load: it depends on where the positions are, and that is said with a bound."""
+"""A largest effort beside a jump of a load: it is that at the jump, wherever the positions are."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import trunnion
 from toleranced import alone, sampler
@@ -13,6 +15,7 @@ from trunnion.measures.measures import named
 from trunnion.solve.run import prepare
 from trunnion.solve.shifts import CARRIERS
 from trunnion.studies.tolerance.first_order import study
+from trunnion.views.play.figure import figure
 
 PRESS: dict[str, Any] = {
     "trunnion": 1,
@@ -36,38 +39,108 @@ PRESS: dict[str, Any] = {
 }
 
 
-def told(force: str, steps: int) -> tuple[float, list[Any]]:
-    """The largest effort, and what is said of it."""
+FORCE, BEGIN = 50e3, np.radians(320.3)
+
+
+def arm(angle: float, r: float = 0.03, rod: float = 0.2) -> float:
+    """Power in = power out: torque over the force on the ram, −x'(θ), m."""
+    return float(-r * np.sin(angle) * (1 + r * np.cos(angle) / np.sqrt(rod**2 - (r * np.sin(angle)) ** 2)))
+
+
+def analysed(force: str, steps: int) -> Any:
     data = {**PRESS, "loads": {"cut": {**PRESS["loads"]["cut"], "force": [force, 0]}}}
-    result = trunnion.analyse(trunnion.Mechanism.model_validate(data), steps)
-    found = [one for one in result.trunnion.findings if one.code == "effort.beside_jump"]
-    return float(np.abs(result["drive_effort"]).max()), found
+    return trunnion.analyse(trunnion.Mechanism.model_validate(data), steps)
 
 
-@pytest.mark.parametrize("steps", [45, 180])
-def test_the_bound_holds(steps: int) -> None:
-    force = PRESS["loads"]["cut"]["force"][0]
-    coarse, (finding,) = told(force, steps)
-    fine, _ = told(force, 36_000)
-    assert 0 < fine - coarse <= 1.05 * finding.figures["more"]
+def coarse_and_fine(force: str, steps: int) -> tuple[float, float]:
+    """The largest effort at some positions, and at very many."""
+    coarse, fine = (float(np.abs(analysed(force, count)["drive_effort"]).max()) for count in (steps, 36_000))
+    return coarse, fine
 
 
-def test_a_load_that_rises_is_no_jump() -> None:
-    assert told("-50 kN * max(sin(drive), 0)", 180)[1] == []
+@pytest.mark.parametrize("steps", [12, 45, 180, 720])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_extreme_is_that_at_the_jump(steps: int, sign: int) -> None:
+    """Of effort and reaction alike, with its place; a load that pulls makes the least effort."""
+    force = PRESS["loads"]["cut"]["force"][0].replace("-50", f"{-sign * 50}")
+    result = analysed(force, steps)
+    figures = {one.name: one for one in result.trunnion.summary}
+    effort = figures["O.effort_max" if sign > 0 else "O.effort_min"]
+    assert effort.value == pytest.approx(sign * FORCE * arm(BEGIN), rel=1e-6)
+    assert effort.place == "at 320.3°"
+    rod = FORCE / np.sqrt(1 - (0.03 * np.sin(BEGIN) / 0.2) ** 2)  # the force along it
+    assert figures["P.reaction_max"].value == pytest.approx(rod, rel=1e-6)
+    assert not [one for one in result.trunnion.findings if one.code == "effort.beside_jump"]
+    assert float(np.abs(result["drive_effort"]).max()) < 0.999 * abs(effort.value)  # the positions stay as they are
 
 
-def test_sweeps_tell_it_too() -> None:
-    """With the bound that `analyse` has."""
-    _, (one,) = told(PRESS["loads"]["cut"]["force"][0], 180)
-    model = trunnion.Mechanism.model_validate(PRESS)
-    swept = trunnion.sweep(model, {"rod.points.Q.x": [0.2, 0.201]}, steps=180).trunnion.findings
-    assert [found.figures for found in swept if found.code == "effort.beside_jump"] == [one.figures]
+def test_the_start_of_a_cycle_is_beside_its_end() -> None:
+    """A load that ends with the cycle has its jump behind the last position."""
+    data = {**PRESS, "drivers": {"O": {"speed": "60 rpm"}}}
+    data["loads"] = {"cut": {**PRESS["loads"]["cut"], "force": ["50 kN * between(drive, 0 deg, 39.7 deg)", 0]}}
+    data["drivers"] = {"O": {"speed": "60 rpm", "start": "39.6 deg"}}
+    found = {one.name: one for one in trunnion.analyse(trunnion.Mechanism.model_validate(data), 90).trunnion.summary}
+    assert found["O.effort_max"].value == pytest.approx(FORCE * arm(BEGIN), rel=1e-6)
+
+
+def test_a_load_that_rises_has_its_extreme_at_a_position() -> None:
+    result = analysed("-50 kN * max(sin(drive), 0)", 180)
+    figures = {one.name: one.value for one in result.trunnion.summary}
+    assert figures["O.effort_min"] == float(result["drive_effort"].min())
+
+
+@pytest.mark.parametrize("steps", [20, 180])
+def test_every_point_of_a_sweep_has_it(steps: int) -> None:
+    """Solved in one pass or, of few positions, each by itself."""
+    model, rods = trunnion.Mechanism.model_validate(PRESS), np.linspace(0.15, 0.3, 7)
+    swept = trunnion.sweep(model, {"rod.points.Q.x": rods}, steps=steps, measures=["maximum:effort:O"])
+    meant = [FORCE * arm(BEGIN, rod=rod) for rod in rods]
+    assert swept["drive_effort_max"].values[0] == pytest.approx(meant, rel=1e-6)
+    assert swept["drive_effort_max"].values[0] == pytest.approx(swept["maximum:effort:O"].values, rel=1e-6)
+    assert not [one for one in swept.trunnion.findings if one.code == "effort.beside_jump"]
+
+
+def seated(clearance: str) -> trunnion.Mechanism:
+    """With the pin of P held to one side; the cut begins at a place of the ram."""
+    pin = {"radius": "25 mm", "clearance": clearance}
+    joints = {**PRESS["joints"], "P": {**PRESS["joints"]["P"], "pin": pin, "seat": {"xi": "0 deg"}}}
+    loads = {"cut": {**PRESS["loads"]["cut"], "force": [f"{SLIDING} * between(drive, 200 deg, 360 deg)", 0]}}
+    return trunnion.Mechanism.model_validate({**PRESS, "joints": joints, "loads": loads})
+
+
+def test_a_jump_that_the_seats_move_is_told_with_both_places() -> None:
+    """Without errors by the law of cosines, with them where dense positions jump; elsewhere as dense positions say."""
+    result, fine = (trunnion.analyse(seated("1 mm"), steps) for steps in (720, 36_000))
+    (one,) = (found for found in result.trunnion.findings if found.code == "errors.jump_moved")
+    meant, built = ([float(place) for place in re.findall(r"[\d.]+", one.figures[key])] for key in ("meant", "built"))
+    begin = 360 - np.degrees(np.arccos((0.03**2 + 0.2179**2 - 0.2**2) / (2 * 0.03 * 0.2179)))
+    assert meant[0] < begin < meant[1]
+    effort, drive = fine["drive_effort"].values[0], fine["drive"].values
+    jump = drive[int(np.argmax(np.diff(effort)))] % 360
+    assert built[0] <= jump <= built[1]
+    change, away = np.abs(fine["drive_effort_change"].values[0]), np.abs(drive % 360 - begin) > abs(jump - begin) + 1
+    assert one.figures["rest"] == pytest.approx(np.max(change[away]), rel=0.05)
+    tight = trunnion.analyse(seated("1 um"), 180).trunnion.findings
+    assert not [found for found in tight if found.code == "errors.jump_moved"]
+
+
+def test_with_a_pin_in_its_seat_a_bound_is_said() -> None:
+    """The seat moves the jump; every point of a sweep is looked at."""
+    model = seated("1 mm")
+    result, fine = (trunnion.analyse(model, steps) for steps in (180, 7200))
+    (one,) = (found for found in result.trunnion.findings if found.code == "effort.beside_jump")
+    low, high = (float(np.abs(each["drive_effort"]).max()) for each in (result, fine))
+    assert 0 < high - low <= 1.05 * one.figures["more"]
+    swept = trunnion.sweep(model, {"rod.points.Q.x": [0.2, 0.2001]}, steps=180).trunnion.findings
+    (told,) = (found for found in swept if found.code == "effort.beside_jump")
+    assert "of 2 points" in told.what
+    assert told.figures["more"] >= one.figures["more"]
 
 
 def test_a_tolerance_tells_the_figures_of_the_positions_and_between_them() -> None:
     """Of an extreme of the effort alone."""
     model = trunnion.Mechanism.model_validate({**PRESS, "tolerances": {"rod.points.Q.x": "±0.05 mm"}})
-    coarse, fine = (told(PRESS["loads"]["cut"]["force"][0], steps)[0] for steps in (180, 36_000))
+    coarse, fine = coarse_and_fine(PRESS["loads"]["cut"]["force"][0], 180)
     for measure, count in (("effort:O", 0), ("maximum:effort:O", 1)):
         found = trunnion.tolerance(model, [measure], methods=("linear",), steps=180).trunnion.findings
         figures = [one.figures for one in found if one.code == "tolerance.corner"]
@@ -94,9 +167,7 @@ def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
         tops.append(float(np.max(np.asarray(found.measures[0].curve(run.solve(run.cycle.times(100_000)))[0]))))
     assert figures == pytest.approx(tops, rel=7e-5)  # what a step of 100,000 may leave out
     assert figures[-1] > 1.005 * known.figure > 1.004 * figures[0]
-    r, rod, at = 0.03, 0.2, np.radians(320.3)  # power in = power out at the beginning of the cut
-    arm = -r * np.sin(at) * (1 + r * np.cos(at) / np.sqrt(rod**2 - (r * np.sin(at)) ** 2))
-    assert figures[-1] == pytest.approx(50e3 * wide[-1] / 0.02 * arm, rel=1e-7)
+    assert figures[-1] == pytest.approx(FORCE * wide[-1] / 0.02 * arm(BEGIN), rel=1e-7)
 
 
 SLIDING = "-50 kN * between(S.slide, 217.9 mm, 229 mm)"  # a load whose place moves with the pins
@@ -123,6 +194,32 @@ def test_play_moves_the_jump(force: str) -> None:
         gradients.append(np.hypot(*((peak(path, step) - peak(path, -step)) / (2 * step) for path in paths)))
     assert float(result["extreme_worst_case"][0, 0]) == pytest.approx(20e-6 * max(gradients), rel=1e-3)
     (found,) = (one for one in result.trunnion.findings if one.code == "play.beside_jump")
+    (entry,) = (text.get_text() for text in figure(result).axes[0].get_legend().get_texts() if "extreme" in str(text))
+    assert "corner" in entry
     assert found.severity == "note"
     assert found.figures["figure"] == pytest.approx(peak("seats.P.1.x", 0.0), rel=1e-4)
-    assert found.figures["coarse"] == pytest.approx(told(force, 180)[0], rel=1e-12)
+    assert found.figures["coarse"] == pytest.approx(coarse_and_fine(force, 180)[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("steps", [24, 720])
+def test_the_drive_of_a_press_whose_load_jumps(steps: int) -> None:
+    """Power in = power out: T = F x'(θ) from 320.3° to 350°, else 0, whatever the steps."""
+    r, rod, begin, end = 0.03, 0.2, BEGIN, np.radians(350)
+
+    def place(angle: float) -> float:
+        return float(r * np.cos(angle) + np.sqrt(rod**2 - (r * np.sin(angle)) ** 2))
+
+    def torque(angle: float) -> float:
+        return FORCE * arm(angle)
+
+    data = {**PRESS, "drivers": {"O": {"speed": "60 rpm"}}}
+    found = trunnion.design(trunnion.Mechanism.model_validate(data), steps)
+    work = FORCE * (place(end) - place(begin))
+    assert found.mean_power == pytest.approx(work, rel=1e-9)  # in one second
+    square = quad(lambda angle: torque(angle) ** 2, begin, end, epsrel=1e-12)[0]
+    assert found.rms_effort == pytest.approx(np.sqrt(square / (2 * np.pi)), rel=1e-7)
+    assert found.peak_power == pytest.approx(2 * np.pi * torque(begin), rel=1e-6)
+    assert torque(end) * 2 * np.pi > work  # above the mean to the end of the cut
+    swing = work * (1 - (end - begin) / (2 * np.pi))
+    assert found.energy_swing == pytest.approx(swing, rel=1e-7)
+    assert found.flywheel(0.05) == pytest.approx(swing / (0.05 * (2 * np.pi) ** 2), rel=1e-7)

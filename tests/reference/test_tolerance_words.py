@@ -127,6 +127,17 @@ def test_units_of_the_columns(result: Any, tmp_path: Path) -> None:
     assert (numbers["dead.contribution_worst_case"], numbers["dead.contribution_rss"]) == ("rad", "1")
 
 
+def test_a_measure_without_limits_has_no_yield_in_its_row(result: Any, tmp_path: Path) -> None:
+    """The share with an answer is none of a limit that is kept; what has limits or bounds keeps its yield."""
+    save(result, tmp_path / "x.csv")
+    head, *rows = ([*line.split(",")] for line in (tmp_path / "x.csv").read_text("utf-8").splitlines())
+    told = [dict(zip(head, row, strict=True)) for row in rows]
+    ends = ("limit_lower", "limit_upper", "at_least", "at_most")
+    limited = [any(row[end] for end in ends) for row in told]
+    for end in ("yield", "yield_low", "yield_high"):
+        assert [bool(row[end]) for row in told] == limited
+
+
 def test_unit_of_all_measures() -> None:
     """One unit of all measures stands in the units of each variable."""
     found = tolerance(slider_crank(dimensions=LENGTHS), methods=("linear",))

@@ -267,6 +267,14 @@ ODD = {
 }
 
 
+def test_points_without_a_number_are_told_beside_those_with_one():
+    """As of an efficiency where the load is never reached."""
+    (axes,) = figure(swept(ONE, lambda angle: 0.8 if angle < 20 else np.nan)).axes
+    assert "no value" in [text.get_text() for text in axes.texts]
+    (axes,) = figure(swept(ONE, lambda angle: 0.8)).axes
+    assert not axes.texts
+
+
 @pytest.mark.spread(2)
 @pytest.mark.parametrize("case", ODD)
 def test_odd_cases_are_drawn_and_nothing_is_cut_off(case):

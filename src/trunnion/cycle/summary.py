@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis, near_locking, uncounted
+from trunnion.cycle import contact_loss, diagnosis, jumps, near_locking, uncounted
 from trunnion.cycle.deviations import error_figures
 from trunnion.cycle.holding import reverse_figure
 from trunnion.cycle.kept import ALL, Kept
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
 __all__ = [
     "BALANCED",
     "balance",
-    "beside_jumps",
     "books",
     "dataset_of",
     "effort_units",
@@ -60,11 +59,6 @@ __all__ = [
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
-FEWEST = 12  # positions among which a jump can be told from a slope
-JUMP, STEADY = (
-    0.2,
-    2e-3,
-)  # of the largest effort: what drops by more is a jump, what changes by less is steady beside it
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 TIMES = "times the friction"  # what a locking margin is
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
@@ -133,7 +127,8 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at, near),
         *_missed_peaks(run.system, at),
-        *beside_jumps(run, at.time, at.arrays),
+        *jumps.findings(run, at.time, at.arrays, effort_units(run.system)),
+        *jumps.moved(run, at, effort_units(run.system)),
         *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
@@ -231,33 +226,6 @@ def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
             yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
 
 
-def beside_jumps(run: Run, time: NDArray[np.float64], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """Efforts that are largest beside a jump, of a load or of friction: how much more it may be at the jump itself."""
-    for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, effort_units(run.system), strict=True)):
-        size = np.abs(np.where(arrays["status"] < Status.NOT_CONVERGED, arrays["drive_effort"][i], np.nan))
-        if found := _beside_jump(run, time, size):
-            k, more = found
-            at = run.system.dial(run.values, time).at(k)
-            yield finding_for("effort.beside_jump", f"drivers.{name}", at=at, more=more, unit=unit)
-
-
-def _beside_jump(run: Run, time: NDArray[np.float64], size: NDArray[np.float64]) -> tuple[int, float] | None:
-    """Place of the largest of a course, (position,), if it is beside a jump, and how much more it may be at the jump.
-
-    The jump is looked for last: most courses have none.
-    """
-    if len(time) < FEWEST or not np.any(np.isfinite(size)):
-        return None
-    k, scale = int(np.nanargmax(size)), float(np.nanmax(np.abs(size)))
-    for side in (-1, 1) if 1 < k < len(time) - 2 else ():
-        beyond, more = size[k] - size[k + side], size[k] - size[k - side]
-        if beyond > JUMP * scale and STEADY * scale < more < beyond:
-            low, high = sorted((time[k], time[k + side]))
-            if np.any(np.mod(run.edges - low, run.cycle.duration) <= high - low):
-                return k, float(more)
-    return None
-
-
 def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
     """What only the motion shows of a load or spring: a resistance that drives, a torsional spring that unwinds."""
     entries = run.system.mechanism.parameter_set.entries.items()
@@ -306,10 +274,11 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
     sound = sound_positions(status)
     with np.errstate(all="ignore"):
-        yield from _effort_figures(run.system, found, dial, sound)
-        yield from _reaction_figures(run.system, arrays, dial, sound)
+        top = _Tops(found, sound, jumps.sides(run, found))
+        yield from _effort_figures(run.system, found, top)
+        yield from _reaction_figures(run.system, arrays, top)
         if rubbing(run.system):
-            yield from _friction_figures(run, found, near, dial, sound)
+            yield from _friction_figures(run, found, near, top)
         note = uncounted.meaning(run.system.mechanism, means, status)
         yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=note)
         yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
@@ -329,29 +298,45 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
         yield Figure("positions_lost", "positions not valid (a pin loses contact or bears no load)", lost)
 
 
-def _effort_figures(system: System, found: Positions, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:
+class _Tops(NamedTuple):
+    """Where extremes are looked for: at sound positions, and beside jumps where they are larger there."""
+
+    found: Positions
+    sound: NDArray[np.intp]
+    sides: Positions | None
+
+    def of(self, course: Callable[[Arrays], NDArray[np.float64]]) -> tuple[float, str]:
+        """The largest of a course, (position,), and its place."""
+        own = course(self.found.arrays)
+        k = int(self.sound[np.argmax(own[self.sound])])
+        if self.sides is not None:
+            solved = self.sides.arrays["status"] == Status.SOLVED
+            beside = np.where(solved, course(self.sides.arrays), -np.inf)
+            if np.max(beside) > own[k]:
+                return float(np.max(beside)), f"at {self.sides.dial.at(int(np.argmax(beside)))}"
+        return float(own[k]), f"at {self.found.dial.at(k)}"
+
+
+def _effort_figures(system: System, found: Positions, top: _Tops) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
-        effort, subject = found.arrays["drive_effort"][i], f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
-        for end, aspect, pick in (("min", "minimum", np.argmin), ("max", "maximum", np.argmax)) if len(sound) else ():
-            k = int(sound[pick(effort[sound])])
-            yield Figure(f"{name}.effort_{end}", subject, effort[k], unit, aspect, f"at {dial.at(k)}")
+        subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
+        for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)) if len(top.sound) else ():
+            value, at = top.of(lambda arrays, i=i, sign=sign: sign * arrays["drive_effort"][i])  # type: ignore[misc]
+            yield Figure(f"{name}.effort_{end}", subject, sign * value, unit, aspect, at)
         yield Figure(f"{name}.effort_rms", subject, found.means.drive_effort_rms[i], unit, "RMS")
 
 
-def _friction_figures(
-    run: Run, found: Positions, near: near_locking.Locking | None, dial: Dial, sound: NDArray[np.intp]
-) -> Iterator[Figure]:
+def _friction_figures(run: Run, found: Positions, near: near_locking.Locking | None, top: _Tops) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
     valid = found.arrays["status"] != Status.CONTACT_LOST
     if found.method.margin_up_to:
         margin = np.where(valid, found.arrays["locking_margin"], np.nan)
-        yield near_locking.least_margin("locking_margin", "locking margin", margin, dial, TIMES)
-    yield from near.figures(run, dial) if near else ()
+        yield near_locking.least_margin("locking_margin", "locking margin", margin, found.dial, TIMES)
+    yield from near.figures(run, found.dial) if near else ()
     yield Figure("friction_power_mean", "friction power", found.means.friction_power.net, "W", "mean")
-    if len(sound):
-        lost = np.sum(found.arrays["friction_power"], axis=0)
-        top = int(sound[np.argmax(lost[sound])])
-        yield Figure("friction_power_max", "friction power", lost[top], "W", "maximum", f"at {dial.at(top)}")
+    if len(top.sound):
+        lost, at = top.of(lambda arrays: np.sum(arrays["friction_power"], axis=0))
+        yield Figure("friction_power_max", "friction power", lost, "W", "maximum", at)
 
 
 def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
@@ -363,19 +348,18 @@ def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
     return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
 
-def _reaction_figures(system: System, arrays: Arrays, dial: Dial, sound: NDArray[np.intp]) -> Iterator[Figure]:
+def _reaction_figures(system: System, arrays: Arrays, top: _Tops) -> Iterator[Figure]:
     """Largest reaction of every joint, in space its moment too; stroke of every slide."""
     loads = [("reaction", "reaction_force", "N")]
     if system.mechanism.space == "spatial":
         loads.append(("reaction moment", "reaction_moment", "N m"))
     rounding = {variable: _rounding(arrays, variable) for _, variable, _ in loads}
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
-        for what, variable, unit in loads if len(sound) else ():
-            size = np.sqrt(np.sum(arrays[variable][i] ** 2, axis=0))
-            top = int(sound[np.argmax(size[sound])])
+        for what, variable, unit in loads if len(top.sound) else ():
+            size, at = top.of(lambda arrays, of=variable, i=i: np.sqrt(np.sum(arrays[of][i] ** 2, axis=0)))  # type: ignore[misc]
             key, planar = f"{name}.{what.replace(' ', '_')}_max", system.mechanism.space == "planar"
-            if size[top] > rounding[variable] or (planar and size[top] == 0):
-                yield Figure(key, f"{what} of {name}", size[top], unit, "maximum", f"at {dial.at(top)}")
+            if size > rounding[variable] or (planar and size == 0):
+                yield Figure(key, f"{what} of {name}", size, unit, "maximum", at)
             elif planar:  # rounding has no place
                 yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
         if not PAIRS[kind].guided:

@@ -22,6 +22,7 @@ from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
+from trunnion.studies.motor import Motor, motor
 
 __all__ = [
     "Counterweight",
@@ -72,9 +73,9 @@ class Design:
     dyad in −π/2 … π/2 (0 is best); dead_centres: of each link that turns about the ground or slides on it, the
     drive coordinates where it turns back; limits: drive coordinates between which the linkage can be assembled;
     shaking_force, shaking_moment (about the ground's origin): largest
-    that inertia puts on the frame; rms_effort, peak_power: of the first driver; energy_swing: largest change of
-    its energy about the mean, J; mean_speed: of that driver, 0 if it turns back; grashof: type of a four-bar, empty
-    if it is none.
+    that inertia puts on the frame; rms_effort, peak_power, mean_power: of the first driver; energy_swing: largest
+    change of its energy about the mean, J; mean_speed: of that driver, 0 if it turns back; grashof: type of a
+    four-bar, empty if it is none.
     """
 
     grashof: str
@@ -106,8 +107,9 @@ class Design:
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
     """What a designer asks of a planar linkage: transmission, dead centres, range, shaking, balance, motor.
 
-    steps: equally spaced positions of the cycle, at which extremes and means are taken; dead centres and limits are
-    found between them. Returns a Design, SI and rad. Source: R. L. Norton, Design of Machinery.
+    steps: equally spaced positions of the cycle, at which extremes are taken; dead centres, limits and the largest
+    power are found between them, and the other figures of the drive depend on none (`motor`). Returns a Design, SI and
+    rad. Source: R. L. Norton, Design of Machinery.
     Raises MechanismError for a mechanism in space, or if the structure does not determine the motion.
     """
     run = _planar(mechanism)
@@ -117,10 +119,10 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
     force, moment = shaking(back)
     steps = len(time)
     driver = next(iter(mechanism.drivers), "")
-    effort = np.broadcast_to(back.efforts[driver], time.shape) if driver else np.zeros(steps)
     rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
-    power = effort * rate
-    swing = np.cumsum(power - np.mean(power)) * (time[1] - time[0] if steps > 1 else 0.0)
+    asked = motor(run, driver, steps) if driver else Motor()
+    if not math.isfinite(asked.peak_power):  # of the positions that have an answer
+        asked = asked._replace(peak_power=_largest(back.efforts[driver] * rate))
     return Design(
         grashof(mechanism, run),
         {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},
@@ -129,10 +131,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
         limits(run, steps),
         _largest(np.hypot(*force)),
         _largest(moment),
-        float(np.sqrt(np.mean(effort**2))),
-        _largest(power),
-        float(np.mean(power)),
-        float(np.max(swing) - np.min(swing)),
+        *asked,
         0.0 if np.any(rate * np.sum(rate) <= 0) else float(np.mean(rate)),
     )
 

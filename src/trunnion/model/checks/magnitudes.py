@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["bare_number", "magnitudes"]
 
 FAR = 20.0  # times the largest length stated with a unit: a plain number above it is no length of this mechanism
-WIDE = 0.01  # of that length: a plain tolerance or play above it is likely in another unit
+WIDE = 0.01  # of that length: a plain tolerance, play or limit above it is likely in another unit
 # kinds told of where lengths have units, and the unit that is likely meant
 MEANT = {
     KINDS[name]: text for name, text in (("length", "mm"), ("stiffness", "N/mm"), ("force", "N"), ("speed", "mm/s"))
@@ -41,7 +41,10 @@ def magnitudes(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Finding]:
     yield from _of_unit_one(mechanism, numbers) if bare is not None else ()
     bare = bare or {}
     for path, kind in bare.items():
-        long = kind is KINDS["length"] and values[path] > (WIDE if path in plain else 1.0) * known
+        if path.endswith(".limit.lower"):
+            continue  # a plain limit is one number, told as the upper one
+        narrow = path in plain or path.endswith(".limit.upper")
+        long = kind is KINDS["length"] and values[path] > (WIDE if narrow else 1.0) * known
         yield _forgotten(path, values[path], known) if long else _meant(path, nominal[path], kind)
     far = [one for one in (*places, *pins) if values[one.path] > FAR * known > 0]
     told = {path: values[path] for one in far for path in _plain(mechanism, one) if values[path] > FAR * known}

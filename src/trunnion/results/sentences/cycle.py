@@ -112,6 +112,12 @@ CYCLE: dict[str, Sentence] = {
         "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}",
         "use more --steps",
     ),
+    "errors.jump_moved": Sentence(
+        NOTE,
+        "the change by the errors at {at} is that of a jump whose place they move: with them it is {built}, "
+        "without them {meant}; elsewhere the effort changes by at most {rest:~{unit}}",
+        "compare the extremes with and without errors, not single positions beside the jump",
+    ),
     "effort.peak_missed": Sentence(
         WARNING,
         "the RMS over the cycle, {rms:~{unit}}, exceeds the largest value at any position, {largest:~{unit}}",

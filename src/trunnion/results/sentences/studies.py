@@ -151,7 +151,7 @@ SWEEP = {
             f"the model's measure{'s' * (len(measures) > 1)} {', '.join(measures)} "
             f"{'are' if len(measures) > 1 else 'is'} not in this sweep"
         ),
-        "add it with --measure, in Python with measures=[…]",
+        lambda measures: f"add {'them' if len(measures) > 1 else 'it'} with --measure, in Python with measures=[…]",
     ),
 }
 

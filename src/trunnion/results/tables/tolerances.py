@@ -83,10 +83,12 @@ def _measures(result: xr.Dataset) -> Flat:
         for k, name in enumerate(ends):
             column = [np.nan if pair is None or pair[k] is None else float(pair[k]) for pair in stated]
             found += [(name, _common(_units(result)), np.array(column))] if column else []
+    limited = np.any([np.isfinite(column) for _, _, column in found[2:]], axis=0) if len(found) > 2 else True
     for variable, one in result.data_vars.items():
         key = str(variable)
         if one.dims == ("measure",):
-            found.append((key, "1" if _is_share(key) else _stated(one), np.asarray(one.values)))
+            own = np.where(limited, one.values, np.nan) if key.startswith("yield") else np.asarray(one.values)
+            found.append((key, "1" if _is_share(key) else _stated(one), own))
         elif one.dims == ("measure", "quantile"):
             levels = result["quantile"].values
             stem = key.replace("quantile_value", "quantile")

@@ -50,12 +50,13 @@ FIGURES: dict[str, Variable] = {
 Reduced = dict[str, Any]
 
 
-def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System) -> Reduced:
+def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System, sides: Arrays | None = None) -> Reduced:
     """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
 
     arrays: over positions, by the names of `results.VARIABLES`: status, drive_effort, reaction_force, and
     locking_margin if it was looked for; means: over the cycle; ideal: those of the mechanism without errors, None if it
-    has none, else arrays also have joint_rotation_error and joint_slide_error.
+    has none, else arrays also have joint_rotation_error and joint_slide_error. sides: effort, reaction and status on
+    both sides of jumps, which count in their extremes.
     """
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
@@ -72,8 +73,12 @@ def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System) -
     kept = sound if len(sound) else np.flatnonzero(status < Status.CONTACT_LOST)
     if not len(kept):  # contact is lost everywhere
         return told
-    effort = arrays["drive_effort"]
-    size = np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))
+    effort, force = arrays["drive_effort"][:, kept], arrays["reaction_force"][..., kept]
+    if sides is not None:
+        solved = sides["status"] == Status.SOLVED
+        effort = np.concatenate([effort, sides["drive_effort"][:, solved]], axis=-1)
+        force = np.concatenate([force, sides["reaction_force"][..., solved]], axis=-1)
+    size = np.sqrt(np.sum(force**2, axis=1))
     if ideal:
         turned, slid = (np.abs(arrays[f"joint_{what}_error"][:, kept]) for what in ("rotation", "slide"))
         slides = np.array([PAIRS[kind].guided for kind, _ in system.joints.values()])
@@ -83,11 +88,11 @@ def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System) -
     return told | {
         "efficiency": means.efficiency,
         "efficiency_error": means.efficiency_error,
-        "drive_effort_min": np.min(effort[:, kept], axis=1),
-        "drive_effort_max": np.max(effort[:, kept], axis=1),
+        "drive_effort_min": np.min(effort, axis=1),
+        "drive_effort_max": np.max(effort, axis=1),
         "drive_effort_rms": means.drive_effort_rms,
         "drive_power_mean": means.drive_power_mean,
         "useful_power_mean": means.useful_power_mean,
         "friction_power_mean": means.friction_power.net,
-        "reaction_max": np.max(size[:, kept], axis=1),
+        "reaction_max": np.max(size, axis=1),
     }

@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.cycle import jumps
 from trunnion.cycle.many import Many
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.positions import check_steps, positions
-from trunnion.cycle.summary import beside_jumps, model_notes
+from trunnion.cycle.summary import effort_units, model_notes
 from trunnion.cycle.written import CONDITIONS
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
@@ -36,7 +37,7 @@ from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.hints import distance, hints, named_way
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.switches import Mechanisms
+from trunnion.solve.switches import Mechanisms, edges
 from trunnion.solve.system import Cycle, System, law_of, rubbing
 from trunnion.studies.sweep.figures import Reduced, reduced
 from trunnion.studies.sweep.grid import Swept, named
@@ -62,7 +63,8 @@ class Points:
     """The points of a grid and how their cycles are run.
 
     looked: points that were prepared by themselves; said: what they have to say, by place and text and then by point;
-    erring: whether any point has errors; run: of the first point, jumps: beside which its efforts are largest.
+    erring: whether any point has errors; run: of the first point; jumps: beside which efforts of points with pins in
+    seats are largest.
     """
 
     mechanism: Mechanism
@@ -124,9 +126,9 @@ class Points:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
             found = positions(run, self.steps, self.method, margin=self.margin)
-        if not any(index):
-            self.jumps = list(beside_jumps(run, found.time, found.arrays))
-        return self._reduced(found.arrays, found.means, found.ideal)
+        self.jumps += jumps.findings(run, found.time, found.arrays, effort_units(run.system))
+        sides = jumps.sides(run, found)
+        return self._reduced(found.arrays, found.means, found.ideal, None if sides is None else sides.arrays)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
         """Figures of measures at a point."""
@@ -138,9 +140,11 @@ class Points:
             figures = figures_of(run, of_cycle, self.steps, self.method) if of_cycle else {}
             return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
 
-    def _reduced(self, arrays: Mapping[str, Array], means: Means, ideal: Means | None) -> Reduced:
+    def _reduced(
+        self, arrays: Mapping[str, Array], means: Means, ideal: Means | None, sides: Mapping[str, Array] | None
+    ) -> Reduced:
         wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}
-        return reduced(wanted, means, ideal, self.run.system)
+        return reduced(wanted, means, ideal, self.run.system, sides)
 
     # ---- in one pass ------------------------------------------------------------------------------------------
 
@@ -223,26 +227,73 @@ class Points:
             ours &= ~_may_change(run.system, arrays[CONDITIONS], run.cycle.periodic)
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
-            means = self._means(values, cycles, ours & _answered(arrays))
+            whole = ours & _answered(arrays)
+            between = self._edges(values, cycles, whole)
+            means = self._means(values, cycles, whole, between)
+            sides = self._sides(values, cycles, arrays, between)
             likes = self._means(ideal_values, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
         found: list[Reduced | None] = []
         for i in range(len(points)):
             own = {name: array[..., i, :] for name, array in arrays.items()}
-            if not any(points[i]):
-                self.jumps = list(beside_jumps(run, cycles[i].times(self.steps), own))
             like = (likes.get(i) or still(own)) if errs[i] else None
-            found.append(self._reduced(own, means.get(i) or still(own), like) if ours[i] else None)
+            found.append(self._reduced(own, means.get(i) or still(own), like, sides.get(i)) if ours[i] else None)
         return found
 
-    def _means(
+    def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:
+        """Some mechanisms of a batch."""
+        run = self.run
+        everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
+        return replace(everyone, values=everyone.picked(rows), cycles=[cycles[int(row)] for row in rows])
+
+    def _edges(
         self, values: Mapping[str, Number], cycles: Sequence[Cycle], wanted: NDArray[np.bool_]
+    ) -> dict[int, Array]:
+        """Times, s, between which the forces of those mechanisms of a batch are smooth that are wanted, by number."""
+        rows = np.flatnonzero(wanted)
+        return dict(zip(rows.tolist(), edges(self._some(values, cycles, rows)), strict=True)) if len(rows) else {}
+
+    def _sides(
+        self,
+        values: Mapping[str, Number],
+        cycles: Sequence[Cycle],
+        arrays: Mapping[str, Array],
+        between: Mapping[int, Array],
+    ) -> dict[int, Mapping[str, Array]]:
+        """The variables on both sides of the jumps beside which efforts have their extremes, by number of mechanism."""
+        efforts = jumps.both_ways(arrays["drive_effort"])
+        gaps = jumps.dropping(efforts, arrays["status"], self.run.cycle.periodic)
+        times = {
+            row: jumps.beside(gaps[row], cycles[row].times(self.steps), own, cycles[row])
+            for row, own in between.items()
+            if np.any(gaps[row])
+        }
+        times = {row: own for row, own in times.items() if len(own)}
+        if not times:
+            return {}
+        most, of = max(map(len, times.values())), self._some(values, cycles, np.array(list(times), np.intp))
+        time = np.array([np.pad(own, (0, most - len(own)), mode="edge") for own in times.values()])
+        shape = (1, time.size) if len(times) == 1 else time.shape
+        rows = np.arange(len(times))
+        found = self._many.arrays(of.picked(rows), of.lanes(time), shape, WANTED, self.method)
+        return {
+            row: {
+                name: found[name][..., k if len(times) > 1 else 0, :] for name in (*WANTED, "status") if name in found
+            }
+            for k, row in enumerate(times)
+        }
+
+    def _means(
+        self,
+        values: Mapping[str, Number],
+        cycles: Sequence[Cycle],
+        wanted: NDArray[np.bool_],
+        between: Mapping[int, Array] | None = None,
     ) -> dict[int, Means]:
-        """Means over the cycles of those mechanisms of a batch that are wanted, by their number."""
-        rows, run = np.flatnonzero(wanted), self.run
+        """Means over the cycles of those mechanisms of a batch that are wanted, by their number; between: its edges."""
+        rows = np.flatnonzero(wanted)
         if not len(rows):
             return {}
-        everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
-        of = Mechanisms(run.system, run.chosen.assembly, everyone.picked(rows), [cycles[int(row)] for row in rows])
+        of = self._some(values, cycles, rows)
 
         def powers(lanes: NDArray[np.intp], time: Array) -> dict[str, Array]:
             with np.errstate(all="ignore"):
@@ -250,7 +301,8 @@ class Points:
                 arrays = self._many.arrays(of.picked(lanes), of.lanes(time), shape, AVERAGED, self.method)
             return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
 
-        return dict(zip(rows.tolist(), means_of(of, powers), strict=True))
+        parts = None if between is None else list(between.values())
+        return dict(zip(rows.tolist(), means_of(of, powers, parts), strict=True))
 
     def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
         """MechanismError where the numbers of a point are none that a mechanism can have."""

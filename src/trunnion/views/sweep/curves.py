@@ -14,7 +14,19 @@ from trunnion.errors import Status
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, SHADE, outside, style_of
 from trunnion.views.common.lettering import plain
-from trunnion.views.sweep.panels import ALIKE, Board, Field, Panel, ends, on_scale, ring, scale_of_colours, tell, ticks
+from trunnion.views.sweep.panels import (
+    ALIKE,
+    NOTHING,
+    Board,
+    Field,
+    Panel,
+    ends,
+    on_scale,
+    ring,
+    scale_of_colours,
+    tell,
+    ticks,
+)
 from trunnion.views.sweep.scales import Scale, cause
 
 if TYPE_CHECKING:
@@ -48,7 +60,8 @@ def _panel(panel: Panel, told: Field, alone: bool) -> None:
     axes, other = panel.axes, told.plan.other
     x, y, status = told.x, told.values[:, :, panel.place], told.status[:, :, panel.place]
     ideal = None if told.ideal is None else told.ideal[:, :, panel.place]
-    _shade(axes, told.plan.x, x, status, alone)
+    empty = ~np.isfinite(y) & (status < Status.NOT_CONVERGED) & bool(np.isfinite(y).any())
+    _shade(axes, told.plan.x, x, np.where(empty, NOTHING, status), alone, told.nothing)
     count = y.shape[1]
     for k in range(count):
         look = _look(k, count, x.size, ideal is not None) if count <= MOST_NAMED else _coloured(other, k)
@@ -137,14 +150,19 @@ def _frame(panels: list[Panel], told: Field) -> None:
 # ---- where there is no answer ---------------------------------------------------------------------------------
 
 
-def _shade(axes: Axes, scale: Scale, x: Array, status: NDArray[np.int8], alone: bool) -> None:
-    """Grey where no curve has an answer, hatched where some have none; the cause beside it or, in panels, above."""
-    missing = status >= Status.NOT_CONVERGED
+def _shade(
+    axes: Axes, scale: Scale, x: Array, status: NDArray[np.int8], alone: bool, nothing: str = "no value"
+) -> None:
+    """Grey where no curve has an answer, hatched where some have none; the cause beside it or, in panels, above.
+
+    status: or NOTHING, where a point with an answer has no number.
+    """
+    missing = (status >= Status.NOT_CONVERGED) | (status == NOTHING)
     low, high = ends(scale)
     middle = np.sqrt(x[:-1] * x[1:]) if on_scale(scale) == "log" else (x[:-1] + x[1:]) / 2
     edges = np.concatenate([[low], middle, [high]])
     kind = np.where(missing.all(axis=1), 2, np.where(missing.any(axis=1), 1, 0))
-    codes = np.where(missing, status, 0).max(axis=1)
+    codes = np.where(missing, status, NOTHING).max(axis=1)
     changes = np.flatnonzero(np.diff(np.append(0, kind)) != 0)
     said: set[str] = set()
     for start in (int(one) for one in changes if kind[one]):
@@ -153,7 +171,8 @@ def _shade(axes: Axes, scale: Scale, x: Array, status: NDArray[np.int8], alone: 
         look: dict[str, Any] = (
             {"color": SHADE} if all_of_it else {"facecolor": "none", "edgecolor": HATCH, "hatch": "///"}
         )
-        text = cause(int(codes[start:stop].max())) + ("" if all_of_it else " for some")
+        code = int(codes[start:stop].max())
+        text = (nothing if code == NOTHING else cause(code)) + ("" if all_of_it else " for some")
         axes.axvspan(edges[start], edges[stop], linewidth=0, zorder=0.5, **look)
         if alone:
             place = _middle(scale, edges[start], edges[stop])

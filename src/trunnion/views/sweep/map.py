@@ -22,7 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, outside
-from trunnion.views.sweep.panels import ALIKE, Board, Field, on_scale, ring, scale_of_colours, tell, ticks
+from trunnion.views.sweep.panels import ALIKE, NOTHING, Board, Field, on_scale, ring, scale_of_colours, tell, ticks
 from trunnion.views.sweep.scales import Scale, cause
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ Beyond = Literal["neither", "both", "min", "max"]
 BANDS = 10
 COLOURS = colormaps["viridis"]
 FINER = 8  # parts of a cell along a logarithmic axis
-NOTHING = -1  # beside the statuses: sound, and yet without a number
 # fill and hatch of what has no number, to be told apart without colours
 LOOKS: dict[int, tuple[str, str]] = {
     Status.NOT_CONVERGED: ("#f3f4f6", "..."),

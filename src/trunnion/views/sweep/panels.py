@@ -49,6 +49,7 @@ MOST_COLUMNS = 4  # of panels
 ROOM = {1: 70, 2: 40, 3: 28, 4: 24}
 SIZE = {1: 8.5, 2: 8.5, 3: 8.0, 4: 7.2}
 WIDE = 74  # characters of a title in a line
+NOTHING = -1  # beside the statuses: sound, and yet without a number
 ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
 
 

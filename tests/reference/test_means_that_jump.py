@@ -111,3 +111,25 @@ def test_a_study_has_the_part_of_the_place_at_which_the_load_begins(engine: str)
     assert float(found["worst_case_upper"]) == pytest.approx(whole, rel=1e-6)
     assert float(found["searched_upper"]) == pytest.approx(whole, rel=1e-6)
     assert float(found["deviation"]) == pytest.approx(float(found["deviation_linear"]), rel=0.06)
+
+
+@pytest.mark.parametrize("xi", [0.0, 180.0])
+def test_pins_in_seats_move_the_place_at_which_the_load_begins(xi: float) -> None:
+    """A pin on one side of its hole along the rod makes the rod longer or shorter by the clearance."""
+    pin, play = of().data(), 1e-3
+    pin["joints"]["A"] = {**pin["joints"]["A"], "links": ["crank", "rod"], "pin": {"radius": 0.01, "clearance": play}}
+    pin["joints"]["A"]["seat"] = {"xi": f"{xi} deg"}
+    seated = prepare(trunnion.Mechanism(**pin))
+    measures = named(seated.system.mechanism, FIGURES, seated.values)
+    found = figures_of(seated, measures, 24, FrictionMethod())
+    length = ROD - play * np.cos(np.radians(xi))
+    bare = prepare(of(rod=length))
+    expected = figures_of(bare, named(bare.system.mechanism, FIGURES, bare.values), 24, FrictionMethod())
+    assert found["power"] == pytest.approx(-FORCE * (R + length - TOUCH) / TIME, rel=1e-6)
+    for name in FIGURES:
+        assert found[name] == pytest.approx(expected[name], rel=1e-6), name
+    study = trunnion.tolerance(
+        trunnion.Mechanism(**{**pin, "tolerances": {"touch": 1e-4}}), ["power"], ["linear"], steps=24
+    ).sel(measure="power")
+    assert float(study["nominal"]) == pytest.approx(expected["power"], rel=1e-9)
+    assert float(study["worst_case_upper"]) == pytest.approx(FORCE / TIME * 1e-4, rel=1e-6)

@@ -21,22 +21,29 @@ from trunnion.solve.switches import Mechanisms, bends, parted, tracked
 
 if TYPE_CHECKING:
     from trunnion.measures.positions import PositionPlan
+    from trunnion.solve.system import Values
 
-__all__ = ["averaged", "own_edges", "with_jumps"]
+__all__ = ["LookAtParts", "averaged", "own_edges", "settled", "with_jumps"]
 
 Array = NDArray[np.float64]
 LookAtParts = Callable[[Array], Sequence[Array]]  # from times, s, to the parts of a course there, all (row, place)
 BESIDE = 1e-9  # of the cycle: on the sides of a place at which the model switches
 JUMP = 1e-6  # of the size of a course: what is less is none
+ROUNDS, PARTS, SMALL = 7, 8, 1e-9  # so often a panel is parted, into how many, from which share of the mean it errs
 MOST = 32  # bends beside jumps that are followed too, as to points of a table
 
 
-def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan) -> Reference:
-    """The same nominal mechanism, with the places at which the course bends if its figure is a mean and it jumps."""
-    run, edges = plan.run, known.window.edges
-    if edges is None or known.against or known.measure.in_time or not run.bends:
+def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan, values: Values) -> Reference:
+    """The same nominal mechanism, with the places at which the course bends if its figure is a mean and it jumps.
+
+    values: its numbers, with pins in their seats, which move these places.
+    """
+    run = plan.run
+    if known.against or known.measure.in_time or not run.bends:
         return known
-    time = np.array([one.time for one in run.bends])
+    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
+    time = tracked(of, run.bends, lambda own, time: replace(plan, times=time).moved(own))[0]
+    time = np.where(np.isnan(time), [one.time for one in run.bends], time)
     sides = look((time + BESIDE * run.cycle.duration * np.array([[-1.0], [1.0]])).reshape(1, -1))
     jumps = np.zeros(len(time), bool)
     for part, whole in zip(sides, known.parts, strict=True):
@@ -44,7 +51,25 @@ def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan) -> Refer
     if not np.any(jumps):
         return known
     followed = np.flatnonzero(jumps | (len(time) <= MOST))
-    return replace(known, bends=tuple(run.bends[i] for i in followed), corner=True)
+    sharp = replace(known, bends=tuple(run.bends[i] for i in followed), corner=True)
+    return replace(sharp, figure=float(averaged(sharp, look, own_edges(sharp, of, plan))[0]))
+
+
+def settled(known: Reference, look: LookAtParts) -> Reference:
+    """The same mechanism, its mean by panels that are parted where the rule errs: pins in seats move the jumps."""
+    edges = known.window.edges
+    assert edges is not None
+    for _ in range(ROUNDS):
+        rule = nodes(edges)
+        parts = np.array(look(rule.at[None])).reshape(len(known.parts), len(edges) - 1, -1)
+        inside, whole = (one.reshape(len(edges) - 1, -1) for one in (rule.inside, rule.weights))
+        off = np.abs(np.sum(parts * (whole - inside), axis=-1))
+        wide = np.any(off > SMALL * np.sum(np.abs(parts) * whole, axis=(1, 2))[:, None], axis=0)
+        if not np.any(wide):
+            break
+        new = np.linspace(edges[:-1][wide], edges[1:][wide], PARTS + 1)[1:-1]
+        edges = np.sort(np.concatenate([edges, new.ravel()]))
+    return replace(known, figure=float(averaged(known, look, edges[None])[0]))
 
 
 def averaged(known: Reference, look: LookAtParts, edges: Array) -> Array:

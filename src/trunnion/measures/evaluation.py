@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
-from trunnion.measures.averages import averaged, own_edges, with_jumps
+from trunnion.measures.averages import LookAtParts, averaged, own_edges, settled, with_jumps
 from trunnion.measures.corners import extreme, raised, sides_of, with_corner
 from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
@@ -129,11 +129,19 @@ def figures_of(run: Run, measures: Sequence[Measure], steps: int, method: Fricti
         window = places.windows[measure.name]
         one = reference(measure, courses[measure.name], window, system, rate)
 
-        def look(time: NDArray[np.float64], measure: Measure = measure) -> NDArray[np.float64]:
-            course = courses_of(run, [measure], time.ravel(), method)[0][measure.name][0]
-            return np.broadcast_to(np.asarray(primal(course), float).reshape(-1), time.size).reshape(time.shape)
+        def parts(time: NDArray[np.float64], measure: Measure = measure) -> list[NDArray[np.float64]]:
+            at = (time % run.cycle.duration if run.cycle.periodic else time).ravel()
+            course = [
+                np.asarray(primal(part), float) for part in courses_of(run, [measure], at, method)[0][measure.name]
+            ]
+            return [np.broadcast_to(part.reshape(-1), time.size).reshape(time.shape) for part in course]
 
-        found[measure.name] = with_corner(one, look, run).figure
+        def look(time: NDArray[np.float64], parts: LookAtParts = parts) -> NDArray[np.float64]:
+            return parts(time)[0]
+
+        averages = window.edges is not None and run.seats and not one.against
+        sharp = settled(one, parts) if averages else with_corner(one, look, run)
+        found[measure.name] = sharp.figure
     return found
 
 
@@ -184,7 +192,7 @@ def _parts_at(
 def sharpened(known: Reference, kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number]) -> Reference:
     """The nominal mechanism with what is to be known of corners and jumps of its course."""
     if known.window.edges is not None:
-        return with_jumps(known, _parts_at(kernel, plan, values, known.measure), plan)
+        return with_jumps(known, _parts_at(kernel, plan, values, known.measure), plan, values)
     return with_corner(known, looking(kernel, plan, values, known.measure), plan.run)
 
 

@@ -50,9 +50,9 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
     if value <= 0 and held:
         return Figure(name, subject, value, note="self-locking" if _by_friction(run, back) else "held without friction")
     if value <= 0:
-        return Figure(name, subject, value, note="the reversed motion takes work; the ranges of `locking` differ")
+        return Figure(name, subject, value, note="it takes work on the whole; see the ranges of `locking`")
     differ = len(states) > 1 and felt(run.system, run.values)
-    return Figure(name, subject, value, note="a mean: the ranges of `locking` differ" * bool(differ))
+    return Figure(name, subject, value, note="the mean; see the ranges of `locking`" * bool(differ))
 
 
 def _by_friction(run: Run, back: Passage) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.cycle.analyse import analyse_run
 from trunnion.cycle.holding import holding_figures, holding_multiples, reverse_figure
 from trunnion.cycle.locking_ends import told
@@ -168,7 +169,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     figures += _turning(found)
     state = found["locking_state"].values
     figures += holding_figures(run, found["holding_multiple"].values, state, dial)
-    figures += _run_backward(found, dial)
+    figures += _reversing(run, found, dial)
     backward = reverse_figure(run, _reverse(found), state)
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
@@ -186,13 +187,17 @@ def _turning(found: xr.Dataset) -> list[Figure]:
     return [Figure("drive_effort_sign", f"the drive effort changes sign{centred} at", where)]
 
 
-def _run_backward(found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
-    """The largest effort of each driver in the reversed motion, as to open a clamp."""
-    for name, unit in zip(found["driver"].values.tolist(), attribute(found, "driver_units"), strict=True):
+def _reversing(run: Run, found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
+    """The largest effort that each driver has to supply to go back over its range, as to open a clamp."""
+    if run.cycle.periodic:
+        return
+    units, time = attribute(found, "driver_units"), found["time"].values
+    for name, unit in zip(found["driver"].values.tolist(), units, strict=True):
         effort = found["drive_effort_reverse"].sel(driver=name).values
-        if np.any(np.isfinite(effort)):
-            k = int(np.nanargmax(np.abs(effort)))
-            subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}, reversed motion"
+        supplied = -effort * np.sign(primal(run.system.drive(run.values, name, time)[1]))
+        if np.any(supplied > ROUNDING * np.nanmax(np.abs(effort), initial=0.0)):
+            k = int(np.nanargmax(supplied))
+            subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} to reverse the motion"
             yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", f"at {dial.at(k)}")
 
 

@@ -226,6 +226,13 @@ TOLERANCE = {
     "tolerance.negative": Sentence(
         WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
     ),
+    "tolerance.range_fixed": Sentence(
+        WARNING,
+        "the tolerance of {numbers} does not move the range of {driver} in the samples, which are all at the same "
+        "places of the drive",
+        "state the deviation in the link that it moves, as a dimension e in its points, such as [r*cos(e), r*sin(e)]; "
+        "`trunnion sweep` moves the range",
+    ),
     "tolerance.corner": Sentence(
         NOTE,
         "the figure is at a corner of its course, such as the beginning of a load, and is located between the "

@@ -124,6 +124,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _play_sizes(outcome)
     yield from _measured(outcome)
     yield from _impossible(outcome)
+    yield from _range_ends(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
         yield from _corner(outcome, of)
@@ -211,6 +212,22 @@ def _impossible(outcome: Outcome) -> Iterator[Finding]:
         elif refused:
             why = f"{refused[0].where} {refused[0].what}"
             yield finding_for("tolerance.impossible", where, value=reached, unit=unit, phrases={"why": why})
+
+
+def _range_ends(outcome: Outcome) -> Iterator[Finding]:
+    """Tolerances that move the range or the start of a driver, which samples do not follow."""
+    study, mechanism = outcome.study, outcome.study.run.system.mechanism
+    parameters, found = mechanism.parameter_set, {name: list[str]() for name in mechanism.drivers}
+    for one in study.inputs.tolerances:
+        deviation = one.upper if one.upper else one.lower
+        moved = mechanism.parameters(deviations={parameters.entries[one.path].alias or one.path: deviation})
+        for name, numbers in found.items():
+            paths = (f"drivers.{name}.{key}" for key in ("range.from", "range.to", "start"))
+            if any(path in moved and moved[path] != parameters.nominal[path] for path in paths):
+                numbers.append(one.path.removeprefix("dimensions."))
+    for name, numbers in found.items():
+        if numbers:
+            yield finding_for("tolerance.range_fixed", f"drivers.{name}", numbers=numbers, driver=name)
 
 
 def _nominal(outcome: Outcome) -> Iterator[Finding]:

@@ -68,6 +68,7 @@ def toleranced(
         **{name: (("measure", "parameter"), [values] * measures) for name, values in by_parameter.items()},
         **{name: (("measure", "position"), [values] * measures) for name, values in over.items()},
         "curve_sensitivity": (("measure", "parameter", "position"), [slope] * measures),
+        "status": (("position",), np.zeros(len(curve), np.int8)),
         "parameter_nominal": (("parameter",), nominal),
         "parameter_lower": (("parameter",), -half),
         "parameter_upper": (("parameter",), half),
@@ -256,6 +257,7 @@ def gap():
         values = result[name].values.copy()
         values[..., 130:176] = np.nan
         result[name] = (result[name].dims, values)
+    result["status"][130:176] = 8
     return result
 
 

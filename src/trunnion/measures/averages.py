@@ -41,9 +41,7 @@ def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan, values: 
     run = plan.run
     if known.against or known.measure.in_time or not run.bends:
         return known
-    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
-    time = tracked(of, run.bends, lambda own, time: replace(plan, times=time).moved(own))[0]
-    time = np.where(np.isnan(time), [one.time for one in run.bends], time)
+    time = plan.bends(values)
     sides = look((time + BESIDE * run.cycle.duration * np.array([[-1.0], [1.0]])).reshape(1, -1))
     jumps = np.zeros(len(time), bool)
     for part, whole in zip(sides, known.parts, strict=True):
@@ -52,6 +50,7 @@ def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan, values: 
         return known
     followed = np.flatnonzero(jumps | (len(time) <= MOST))
     sharp = replace(known, bends=tuple(run.bends[i] for i in followed), corner=True)
+    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
     return replace(sharp, figure=float(averaged(sharp, look, own_edges(sharp, of, plan))[0]))
 
 

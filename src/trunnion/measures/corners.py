@@ -70,10 +70,10 @@ def with_corner(known: Reference, look: Look, run: Run) -> Reference:
     return replace(known, bends=tuple(bends[i] for i in np.flatnonzero(jumps & (above > -NEAR))))
 
 
-def switch(known: Reference, look: Look, run: Run, time: float) -> float:
-    """Time, s, of the place at which the model switches where the course has its figure; if there is none, as given."""
-    window, cycle = known.window, run.cycle
-    beside = (run.edges[:, None] + BESIDE * cycle.duration * np.array([-1.0, 1.0])).ravel()
+def switch(known: Reference, look: Look, edges: Array, cycle: Cycle, time: float) -> float:
+    """Time, s, of that of the places, s, at which the model switches where the course has its figure; else as given."""
+    window = known.window
+    beside = (edges[:, None] + BESIDE * cycle.duration * np.array([-1.0, 1.0])).ravel()
     beside = beside if window.period else beside[(beside >= window.time[0]) & (beside <= window.time[-1])]
     if not len(beside):
         return time

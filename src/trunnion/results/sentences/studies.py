@@ -59,6 +59,11 @@ PLAY = {
         "the play of {joints} is the mean of their fits; the largest is {largest:~m}, of {most}",
         "--set fits=maximum takes the largest play",
     ),
+    "play.on_other_links": Sentence(
+        NOTE,
+        "the effect is largest with the place of the pin fixed on {links} as the joint turns",
+        lambda links, joint: f"state joints.{joint}.seat_on: the link on which the pin keeps its place, if it is known",
+    ),
     "play.beyond_first_order": Sentence(
         NOTE,
         "pins in their holes can change it by {exact:~{unit}} (at {at}), {percent:~} % more than the worst case to "

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.measures.measures import Measure
 
 if TYPE_CHECKING:
@@ -55,6 +56,14 @@ class Effect:
     def sensitivity(self) -> Array:
         """Loads that count, (measure, joint, end, axis, position)."""
         return np.where(self.on_others[:, :, None, None], self.others, self.loads)
+
+    def by_link(self, i: int, j: int) -> Array:
+        """Worst case of a joint with its seat on one link and on the other, (2, position); 0 of one that it cannot be
+        on."""
+        play = list(self.plays.values())[j]
+        radii = np.array([np.broadcast_to(np.asarray(primal(one), float), self.time.shape) for one in play.radii])
+        loads = np.stack([self.loads[i, j], self.others[i, j]])[:, : len(radii)]
+        return np.asarray(np.sum(radii * np.sqrt(np.nansum(loads**2, axis=2)), axis=1))
 
     @property
     def total(self) -> Array:

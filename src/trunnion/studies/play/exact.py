@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
-__all__ = ["beyond_first_order", "exact_changes", "figures_with"]
+__all__ = ["beyond_first_order", "exact_changes", "figures_with", "on_other_links"]
 
 Array = NDArray[np.float64]
+MUCH = 1.2  # times as much on the other link as on that of the hole
 SLIGHT, GRAVE = (
     0.01,
     0.05,
@@ -71,6 +72,21 @@ def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, 
     if measure.turning(run.system):
         found = found - 2 * np.pi * np.round(found / (2 * np.pi))
     return found, first
+
+
+def on_other_links(effect: Effect, i: int) -> Iterator[Finding]:
+    """Joints whose effect, where it is largest, is that of a pin whose place is not fixed on the link with the hole."""
+    joints, links = effect.run.system.mechanism.effective_joints, {}
+    for j, name in enumerate(effect.plays):
+        course = effect.worst_case[i, j]
+        if not np.any(np.isfinite(course)):
+            continue
+        hole, other = effect.by_link(i, j)[:, int(np.nanargmax(course))]
+        if other > MUCH * hole:
+            links[name] = f"{joints[name].links[0]} ({name}: {hole / other:.2g} times on {joints[name].links[1]})"
+    if links:
+        where = f"measures.{effect.measures[i].name}"
+        yield finding_for("play.on_other_links", where, links=list(links.values()), joint=next(iter(links)))
 
 
 def figures_with(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:

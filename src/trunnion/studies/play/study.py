@@ -49,7 +49,7 @@ from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order, figures_with
+from trunnion.studies.play.exact import beyond_first_order, figures_with, on_other_links
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -231,7 +231,7 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
             continue
         look = looking(kernel, places, run.values, measure)
         sharp = with_corner(one, look, run)
-        time = switch(sharp, look, run, time) if sharp.corner else time
+        time = switch(sharp, look, run.edges, run.cycle, time) if sharp.corner else time
         time = time % run.cycle.duration if run.cycle.periodic else time
         there = _over(run, [measure], known, np.array([time]))
         if sharp.corner:
@@ -362,6 +362,7 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     yield from _places(run, effect)
     yield from _idle(run, effect)
     for i in range(len(effect.measures)):
+        yield from on_other_links(*effect.of(i))
         yield from beyond_first_order(*effect.of(i))
     dial = run.system.dial(run.values, effect.time)
     for code in Status:

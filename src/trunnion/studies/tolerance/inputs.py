@@ -52,6 +52,14 @@ class Inputs:
         return [*(one.path for one in self.tolerances), *(f"joints.{name}.clearance" for name in self.loose)]
 
     @cached_property
+    def nominal(self) -> dict[str, Number]:
+        """The numbers of the nominal mechanism, pins in the seats that are given."""
+        values: dict[str, Number] = {**self.run.values}
+        for joint in self.held:
+            values.update(self.seat(joint, self.run.values))
+        return values
+
+    @cached_property
     def dims(self) -> int:
         """How many uniform numbers a sample takes."""
         play = sum(len(end) for name in self.loose for end in self.ends(name))

@@ -124,9 +124,7 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
 def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[str, Reference]:
     """Every measure of the nominal mechanism, pins in the middle of their holes where no seat is given."""
     run = kernel.run
-    values = {**run.values}
-    for joint in inputs.held:
-        values.update(inputs.seat(joint, run.values))
+    values = inputs.nominal
     walk = forward(run.system, values, run.chosen.assembly, plan.times)
     courses, _ = kernel.courses(values, plan.times)
     system, found = run.system, {}

@@ -222,7 +222,9 @@ def _place(found: ToleranceStudy, of: Of) -> float:
     run, known = found.run, of.reference
     time = known.window.time[of.place] if of.place >= 0 else moment(known)
     if known.corner and np.isfinite(time):
-        time = switch(known, looking(found.kernel, found.plan, run.values, known.measure), run, time)
+        values = found.inputs.nominal
+        look, edges = looking(found.kernel, found.plan, values, known.measure), [run.edges, found.plan.bends(values)]
+        time = switch(known, look, np.concatenate(edges), run.cycle, time)
     if not np.isfinite(time) or run.cycle.duration <= 0:
         return float("nan")
     time = time % run.cycle.duration if run.cycle.periodic else time

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from trunnion.errors import Status
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
 from trunnion.views.common.cycle import Abscissa, Array, names
@@ -194,7 +195,9 @@ class MeasureReading:
         unit = str(self.result.attrs.get("drive_unit", ""))
         unit, driver = "°" if unit in DEGREE else unit, str(self.result.attrs.get("drive", ""))
         x, step = drive[order], float(np.median(np.diff(drive[order])))
-        holes = np.flatnonzero(np.diff(x) > 1.5 * step) + 1
+        unsolved = np.asarray(self.result["status"].values) >= Status.NOT_CONVERGED
+        holes = np.unique(np.searchsorted(x, drive[unsolved & ~np.isfinite(self.row("curve"))]))
+        holes = holes[(holes > 0) & (holes < len(x))]
         picked = np.insert(order, holes, -1).tolist()
         over = np.insert(x, holes, 0.5 * (x[holes - 1] + x[holes]))
         round_trip = unit == "°" and bool(self.result.attrs.get("periodic", 0))

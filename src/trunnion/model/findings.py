@@ -79,6 +79,8 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = f"{wrong}is not one of {context['expected']}", "write one of these"
         near = nearest(str(error["input"]), re.findall(r"'([^']*)'", context["expected"]))
         remedy = near if near.startswith("did you mean") else remedy
+        if location[:1] == ("tables",) and key == "over":
+            remedy = "write drive or time; a force over a path is an expression, as between(ram.Q.x, 223 mm, 230 mm)"
         if key == "seat":
             remedy = "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}"
     elif kind in _MEANINGS:

@@ -54,6 +54,12 @@ def _errors(error: ValidationError) -> list[ErrorDetails]:
     return [one for one in found if one["type"] != "too_short" or one["loc"] not in parents]
 
 
+_INSTEAD = {  # what to write in place of a word that is none of the known, by key
+    "seat": "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}",
+    "tables.over": "write drive or time; a force over a path is an expression, as between(ram.Q.x, 223 mm, 230 mm)",
+}
+
+
 def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any]) -> Finding:
     location = _plain(error["loc"])
     key = str(location[-1]) if location else ""
@@ -79,10 +85,7 @@ def _finding(error: ErrorDetails, model: type[BaseModel], data: Mapping[str, Any
         what, remedy = f"{wrong}is not one of {context['expected']}", "write one of these"
         near = nearest(str(error["input"]), re.findall(r"'([^']*)'", context["expected"]))
         remedy = near if near.startswith("did you mean") else remedy
-        if location[:1] == ("tables",) and key == "over":
-            remedy = "write drive or time; a force over a path is an expression, as between(ram.Q.x, 223 mm, 230 mm)"
-        if key == "seat":
-            remedy = "write free or loaded, or a group of angles {beta: …, xi: …}; of a ball {direction: [x, y, z]}"
+        remedy = _INSTEAD.get(f"tables.{key}" if location[:1] == ("tables",) else key, remedy)
     elif kind in _MEANINGS:
         what, remedy = (text.format(**{"key": key, **context}) for text in _MEANINGS[kind])
     else:

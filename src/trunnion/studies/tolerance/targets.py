@@ -257,6 +257,8 @@ def _largest(outcome: Outcome, of: Of) -> tuple[str, float, str]:
     groups = np.abs(worst - worst[:, None]) <= EQUAL * worst[:, None]
     same = groups[int(np.argmax(groups @ worst))]
     together = float(same @ worst)
-    equals = f", or {', '.join(np.array(study.inputs.names)[same])}, which are equal, together "
+    names, first = study.inputs.names, study.inputs.names[top]
+    others = ", ".join(name for name, like in zip(names, same, strict=True) if like and name != first)
+    equals = f", and {others} as much, together " if same[top] else f", or {others}, which are equal, together "
     equals += f"{100 * together / total:.3g} %"
-    return study.inputs.names[top], float(worst[top]) / total, equals if together > worst[top] else ""
+    return first, float(worst[top]) / total, equals if together > worst[top] else ""

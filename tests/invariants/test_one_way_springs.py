@@ -162,3 +162,26 @@ def test_a_spring_without_free_length_needs_no_direction() -> None:
     result = run(data, 12)
     turn = np.arange(12) * np.pi / 6
     assert result["drive_effort"].values[0] == pytest.approx(10.0 * (x * x + y * y) * np.sin(turn), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("end", "spring", "told"),
+    [
+        (0.12, {"free_length": 0.2, "only": "push"}, True),
+        (0.12, {"free_length": 0.2}, True),
+        (0.12, {"free_length": 0.2, "only": "pull"}, False),  # it is slack there
+        (0.12, {}, False),  # without free length its force goes through zero
+        (0.3, {"free_length": 0.2, "only": "push"}, False),
+    ],
+)
+def test_a_spring_whose_ends_pass_each_other_is_told(end: float, spring: Data, told: bool) -> None:
+    """The cart goes from 0 to 0.25 m past the other end, or stays before it; its force turns round there."""
+    data = cart(springs={"S": {"between": ["ground.E", "cart.X"], "stiffness": 2000.0, **spring}})
+    data["links"]["ground"]["points"]["E"] = [end, 0]
+    result = run(data, 21)
+    codes = [row["code"] for row in json.loads(result.attrs["findings"]) if row["where"] == "springs.S"]
+    assert ("spring.turned_round" in codes) == told
+    if told:
+        force = result["drive_effort"].values[0]
+        assert force[9] * force[11] < 0
+        assert abs(force[9]) > 100

@@ -243,6 +243,8 @@ def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
                 yield finding_for("spring.jump", f"springs.{name}", at=at.dial.at(int(jumps[0])))
         if spring.only is not None:
             yield from _never_acts(run, name, at.arrays["spring_elongation"][i])
+        if spring.between is not None and spring.only != "pull":
+            yield from _turned_round(run, name, at.arrays["spring_elongation"][i], at.dial)
     marked = [name for name, load in run.system.mechanism.loads.items() if load.useful]
     useful = at.arrays["useful_power"]
     if marked and np.all(np.isfinite(useful)) and not np.any(useful):  # where positions have no answer, that is why
@@ -257,6 +259,18 @@ def _never_acts(run: Run, name: str, elongation: NDArray[np.float64]) -> Iterato
         free = float(np.max(run.values[f"springs.{name}.free_length"]))
         nearest = free + sign * float(np.nanmax(sign * elongation))
         yield finding_for("spring.never_acts", f"springs.{name}", only=only, free=free, nearest=nearest)
+
+
+def _turned_round(run: Run, name: str, elongation: NDArray[np.float64], dial: Dial) -> Iterator[Finding]:
+    """A spring whose ends pass each other: at some position it is shorter than the step to one beside it."""
+    free, preload = (float(np.max(run.values.get(f"springs.{name}.{key}", 0.0))) for key in ("free_length", "preload"))
+    length = elongation + free
+    if len(length) < 3 or not (free or preload):
+        return
+    steps = np.abs(np.diff(length))
+    passed = np.flatnonzero(length[1:-1] < np.minimum(steps[1:], steps[:-1]))
+    if len(passed):
+        yield finding_for("spring.turned_round", f"springs.{name}", at=dial.at(int(passed[0]) + 1))
 
 
 def references(mechanism: Mechanism) -> list[str]:

@@ -169,6 +169,11 @@ CYCLE: dict[str, Sentence] = {
         "its torque jumps at {at}, where its angle passes half a turn from the free angle",
         "whole turns are not counted in this joint",
     ),
+    "spring.turned_round": Sentence(
+        WARNING,
+        "its ends pass each other at {at}: its length falls to about 0, and its force turns round",
+        "move one end along its line, with the free length, so that they stay apart",
+    ),
     "spring.never_acts": Sentence(
         WARNING,
         lambda only, free, nearest: (

@@ -170,7 +170,7 @@ def test_a_spring_without_free_length_needs_no_direction() -> None:
         (0.12, {"free_length": 0.2, "only": "push"}, True),
         (0.12, {"free_length": 0.2}, True),
         (0.12, {"free_length": 0.2, "only": "pull"}, False),  # it is slack there
-        (0.12, {}, False),  # without free length its force goes through zero
+        (0.12, {"free_length": 0.0}, False),  # without free length its force goes through zero
         (0.3, {"free_length": 0.2, "only": "push"}, False),
     ],
 )

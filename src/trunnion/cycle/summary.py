@@ -262,13 +262,13 @@ def _never_acts(run: Run, name: str, elongation: NDArray[np.float64]) -> Iterato
 
 
 def _turned_round(run: Run, name: str, elongation: NDArray[np.float64], dial: Dial) -> Iterator[Finding]:
-    """A spring whose ends pass each other: at some position it is shorter than the step to one beside it."""
+    """A spring whose ends pass each other: where it is shortest, it is shorter than the step to a position beside."""
     free, preload = (float(np.max(run.values.get(f"springs.{name}.{key}", 0.0))) for key in ("free_length", "preload"))
     length = elongation + free
     if len(length) < 3 or not (free or preload):
         return
-    steps = np.abs(np.diff(length))
-    passed = np.flatnonzero(length[1:-1] < np.minimum(steps[1:], steps[:-1]))
+    before, here, after = length[:-2], length[1:-1], length[2:]
+    passed = np.flatnonzero((here <= before) & (here <= after) & (2 * here < np.maximum(before, after)))
     if len(passed):
         yield finding_for("spring.turned_round", f"springs.{name}", at=dial.at(int(passed[0]) + 1))
 

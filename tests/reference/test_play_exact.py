@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import trunnion
 from mechanisms import Array, four_bar
@@ -165,3 +166,69 @@ def press(play: float) -> Mechanism:
         loads={"press": {"joint": "S", "resisting_force": "1000 N * between(S.slide, 115 mm, 200 mm)"}},
         measures={"top": {"effort": "O", "as": "maximum"}},
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-5])
+def test_a_spring_that_is_just_open_is_not_said_to_be_without_effect(gap: float) -> None:
+    """A crank in its dead centre presses on a spring that is just free: the play of three pins closes it."""
+    play, stiffness, r, rod = 2e-5, 1e6, 0.02, 0.08
+    pin = {"radius": 0.004, "clearance": play}
+    model = {
+        "name": "Clamp",
+        "gravity": [0, 0],
+        "links": {
+            "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "W": [0.2, 0]}},
+            "crank": {"points": {"O": [0, 0], "A": [r, 0]}},
+            "rod": {"points": {"A": [0, 0], "B": [rod, 0]}},
+            "ram": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        },
+        "joints": {
+            "O": {"type": "revolute", "links": ["ground", "crank"], "pin": pin},
+            "A": {"type": "revolute", "links": ["crank", "rod"], "pin": pin},
+            "B": {"type": "revolute", "links": ["rod", "ram"], "pin": pin},
+            "S": {"type": "prismatic", "links": ["ground", "ram"]},
+        },
+        "springs": {
+            "work": {
+                "between": ["ground.W", "ram.B"],
+                "stiffness": stiffness,
+                "free_length": 0.2 - (r + rod) - gap,
+                "only": "push",
+            }
+        },
+        "drivers": {"O": {"range": ["-60 deg", "0 deg"], "speed": "60 deg/s"}},
+        "measures": {"force": {"spring_force": "work", "at": "0 deg"}},
+        "assembly": {"B": [0.09, 0]},
+    }
+    found = trunnion.play(trunnion.Mechanism(**model), steps=12)
+    (told,) = [one for one in found.trunnion.findings if one.code == "play.one_sided"]
+    assert told.figures["found"] == pytest.approx(stiffness * (3 * play - gap), rel=0.01)
+    assert not [one for one in found.trunnion.findings if one.code.startswith(("play.no_effect", "play.held"))]
+    model["springs"]["work"]["free_length"] -= 1e-3
+    free = trunnion.play(trunnion.Mechanism(**model), steps=12).trunnion.findings
+    assert not [one for one in free if one.code == "play.one_sided"]
+
+
+def test_samples_about_a_contact_that_is_just_open_have_their_quantiles() -> None:
+    """Half of them press: y = max(0, c d) of a normal deviation d, which first order does not see."""
+    half, stiffness = 3e-4, 1e6
+    model = {
+        "name": "Stop",
+        "links": {
+            "ground": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "W": [0.2, 0]}},
+            "ram": {"points": {"S": {"at": [0, 0], "axis": [1, 0]}, "T": ["tip", 0]}},
+        },
+        "dimensions": {"tip": 0.05, "gap": 0.1},
+        "joints": {"S": {"type": "prismatic", "links": ["ground", "ram"]}},
+        "springs": {
+            "stop": {"between": ["ground.W", "ram.T"], "stiffness": stiffness, "free_length": "gap", "only": "push"}
+        },
+        "drivers": {"S": {"range": [0, 0.05], "speed": 0.1}},
+        "measures": {"force": {"spring_force": "stop", "at": 0.05}},
+        "tolerances": {"tip": half},
+    }
+    found = trunnion.tolerance(trunnion.Mechanism(**model), samples=4000, steps=12, seed=3).sel(measure="force")
+    assert float(found["deviation_linear"]) == 0
+    low = float(found["quantile_value"].sel(quantile=0.05, method="nearest"))
+    level = float(found["quantile"].sel(quantile=0.05, method="nearest"))
+    assert low == pytest.approx(stiffness * half / 3 * norm.ppf(level), rel=0.06)

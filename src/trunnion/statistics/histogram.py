@@ -19,6 +19,7 @@ __all__ = ["Bins", "count", "quantile"]
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
+LEAST = 1e-13  # a deviation that is rounding, SI
 _ONE = 1023 << 52
 """The bits of 1.0."""
 
@@ -34,18 +35,19 @@ class Bins:
     centre: Any
     scale: Any
     fineness: int = 7
-    octaves: int = 20
+    octaves: int = 64
 
     @classmethod
-    def around(cls, centre: Any, deviation: Any, fineness: int = 7, octaves: int = 20) -> Self:
+    def around(cls, centre: Any, deviation: Any, fineness: int = 7, octaves: int = 64) -> Self:
         """Bins for values expected about `centre` with a standard deviation of `deviation`.
 
-        Where that is 0 or not known (NaN, ∞) the scale is 1e-9 of the centre, or 1e-12: rounding falls into few bins.
+        Where that is 0 or not known (NaN, ∞) the scale is 1e-9 of the centre, or 1e-12: rounding falls into few bins,
+        and what is beyond first order, as the force of a contact that is just open, within the outermost.
         """
         centre = np.nan_to_num(np.asarray(centre, dtype=np.float64))
         deviation = np.nan_to_num(np.asarray(deviation, dtype=np.float64), posinf=0.0)
         unknown = np.maximum(1e-9 * np.abs(centre), 1e-12)
-        return cls(centre, np.where(deviation > 0, deviation, unknown), fineness, octaves)
+        return cls(centre, np.where(deviation > LEAST, deviation, unknown), fineness, octaves)
 
     @property
     def half(self) -> int:

@@ -59,6 +59,12 @@ PLAY = {
         "the play of {joints} is the mean of their fits; the largest is {largest:~m}, of {most}",
         "--set fits=maximum takes the largest play",
     ),
+    "play.one_sided": Sentence(
+        WARNING,
+        "to first order play has no effect, but pins on the rims of their holes can change it by at least "
+        "{found:~{unit}} (at {at}): a contact or a spring that acts one way is just open there",
+        "`trunnion tolerance` samples the places of the pins",
+    ),
     "play.on_other_links": Sentence(
         NOTE,
         "the effect is largest with the place of the pin fixed on {links} as the joint turns",

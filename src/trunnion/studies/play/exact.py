@@ -30,9 +30,11 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
-__all__ = ["beyond_first_order", "exact_changes", "figures_with", "on_other_links"]
+__all__ = ["beyond_first_order", "exact_changes", "figures_with", "on_other_links", "one_sided"]
 
 Array = NDArray[np.float64]
+TRIED, WIDTHS = 64, (1.0, 0.5, 0.25, 0.12, 0.06)  # places of the pins tried at a time, and how far about the best
+PLACES, NONE = 24, 1e-6  # positions at which they are; of the largest value: a change that is none
 MUCH = 1.2  # times as much on the other link as on that of the hole
 SLIGHT, GRAVE = (
     0.01,
@@ -87,6 +89,47 @@ def on_other_links(effect: Effect, i: int) -> Iterator[Finding]:
     if links:
         where = f"measures.{effect.measures[i].name}"
         yield finding_for("play.on_other_links", where, links=list(links.values()), joint=next(iter(links)))
+
+
+def one_sided(effect: Effect, i: int) -> Iterator[Finding]:
+    """A measure of forces that does not change to first order, but does with the pins on the rims of their holes.
+
+    So does that of a spring or contact that is just open. The rims are searched: directions by chance, and about the
+    best of them.
+    """
+    run, measure = effect.run, effect.measures[i]
+    known = np.flatnonzero(np.isfinite(effect.value[i]))
+    if measure.kind in MOTIONS or np.any(effect.total[i] > 0) or not len(known):
+        return
+    at = known[:: -(-len(known) // PLACES)]
+    kernel, rng = NumpyKernel(run, [measure], FrictionMethod()), np.random.default_rng(1)
+    ends = [(name, end, one.radii[k]) for name, one in effect.plays.items() for k, end in enumerate(one.model.ends)]
+    best: list[Array] = [np.zeros((1, len(end))) for _, end, _ in ends]
+    most, time, size = 0.0, 0.0, float(np.max(np.abs(effect.value[i, known])))
+    for width in WIDTHS:
+        ways = [place + width * rng.standard_normal((TRIED, place.shape[1])) for place in best]
+        ways = [way / np.sqrt(np.sum(way**2, axis=1, keepdims=True)) for way in ways]
+        offsets = {
+            f"{HOLE}.{name}.{key}": float(np.ravel(primal(radius))[0]) * way[:, k : k + 1]
+            for (name, end, radius), way in zip(ends, ways, strict=True)
+            for k, key in enumerate(end)
+        }
+        course = kernel.courses({**run.values, **offsets}, effect.time[at])[0][measure.name][0]
+        value = np.broadcast_to(np.asarray(primal(course), float), (TRIED, len(at)))
+        change, size = (
+            np.abs(np.nan_to_num(value - effect.value[i, at])),
+            max(size, float(np.max(np.nan_to_num(value)))),
+        )
+        row, column = np.unravel_index(int(np.argmax(change)), change.shape)
+        if change[row, column] > most:
+            most, time, best = (
+                float(change[row, column]),
+                float(effect.time[at[column]]),
+                [way[row : row + 1] for way in ways],
+            )
+    if most > NONE * size:
+        where, dial = f"measures.{measure.name}", run.system.dial(run.values, np.array([time]))
+        yield finding_for("play.one_sided", where, found=most, unit=measure.unit(run.system), at=dial.at(0))
 
 
 def figures_with(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:

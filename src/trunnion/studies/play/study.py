@@ -49,7 +49,7 @@ from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order, figures_with, on_other_links
+from trunnion.studies.play.exact import beyond_first_order, figures_with, on_other_links, one_sided
 from trunnion.studies.play.result import dataset, relied_on
 
 if TYPE_CHECKING:
@@ -360,7 +360,8 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
     yield from _fits(run, effect.plays)
     yield from _limits(run, effect)
     yield from _places(run, effect)
-    yield from _idle(run, effect)
+    for i in range(len(effect.measures)):
+        yield from list(one_sided(*effect.of(i))) or _idle(run, effect, i)
     for i in range(len(effect.measures)):
         yield from on_other_links(*effect.of(i))
         yield from beyond_first_order(*effect.of(i))
@@ -462,32 +463,22 @@ def _places(run: Run, effect: Effect) -> Iterator[Finding]:
         yield from _limit_at(run, measure, worst, at)
 
 
-def _idle(run: Run, effect: Effect) -> Iterator[Finding]:
+def _idle(run: Run, effect: Effect, i: int) -> Iterator[Finding]:
     """Joints whose play does nothing to a measure.
 
     Of a measure that moves, likely another joint is driven in the machine; of one that stays as it is over the cycle
     the other joints hold it, whatever is driven.
     """
-    for measure, rows, course in zip(effect.measures, effect.worst_case, effect.value, strict=True):
-        largest = [float(np.nanmax(row, initial=0.0)) for row in rows]
-        idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= IDLE * max(largest)]
-        if not idle:
-            continue
-        if len(effect.time) == 1:  # elsewhere it may have some
-            at = run.system.dial(run.values, effect.time).at(0)
-            yield finding_for(
-                "play.no_effect_there", f"measures.{measure.name}", joints=idle, measure=measure.name, at=at
-            )
-            continue
-        known = course[np.isfinite(course)]
-        if len(known) and np.ptp(known) <= IDLE * max(float(np.max(np.abs(known))), 1.0):
-            holding = [joint for joint in effect.plays if joint not in idle]
-            yield finding_for(
-                "play.held", f"measures.{measure.name}", joints=idle, measure=measure.name, holding=holding
-            )
-            continue
-        drivers = list(run.system.mechanism.drivers)
-        yield finding_for(
-            "play.no_effect", f"measures.{measure.name}", joints=idle, measure=measure.name, drivers=drivers,
-            count=len(drivers),
-        )  # fmt: skip
+    measure, course = effect.measures[i], effect.value[i]
+    largest = [float(np.nanmax(row, initial=0.0)) for row in effect.worst_case[i]]
+    idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= IDLE * max(largest)]
+    told: dict[str, Any] = {"where": f"measures.{measure.name}", "joints": idle, "measure": measure.name}
+    known, drivers = course[np.isfinite(course)], list(run.system.mechanism.drivers)
+    if not idle:
+        return
+    if len(effect.time) == 1:  # elsewhere it may have some
+        yield finding_for("play.no_effect_there", at=run.system.dial(run.values, effect.time).at(0), **told)
+    elif len(known) and np.ptp(known) <= IDLE * max(float(np.max(np.abs(known))), 1.0):
+        yield finding_for("play.held", holding=[joint for joint in effect.plays if joint not in idle], **told)
+    else:
+        yield finding_for("play.no_effect", drivers=drivers, count=len(drivers), **told)

@@ -44,6 +44,7 @@ MOST = 2048  # samples in a block, so that few of them show how figures converge
 MOTIONS = 480  # the same of motions in time, each of which takes as long as a cycle of many positions
 REPLICATES = 8  # independent scramblings, whose spread is the error
 CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
+NOTHING, COARSE = 1e-9, 1e-2  # of the peak of a curve: scatter to first order that is none, and the scale of bins there
 BAND = {"fineness": 4, "octaves": 8}  # of the histograms at every position
 
 
@@ -202,7 +203,9 @@ class Sampling:
     def curve_bins(self, i: int) -> Bins:
         """Bins of the deviation of the curve of a measure from nominal at every position of its window."""
         nominal, deviation = self.curve_spread[i]
-        return Bins.around(0.0 * nominal, deviation, **BAND)
+        peak = float(np.max(np.abs(np.nan_to_num(nominal)), initial=0.0))
+        some = np.nan_to_num(deviation, posinf=0.0) > NOTHING * peak
+        return Bins.around(0.0 * nominal, np.where(some, deviation, COARSE * peak), **BAND)
 
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""

@@ -221,7 +221,9 @@ def contributions(read: MeasureReading, short: bool = False) -> TextTable:
     rest = [one for one in found if one not in kept]
     if rest:
         sums = (float(np.nansum([getattr(one, key) for one in rest])) for key in shares.values())
-        alike = "no effect" if all(one.worst == 0 for one in rest) else "small"
+        scatters = any(abs(read.value(key)) > 0 for key in ("deviation", "searched_lower", "searched_upper"))
+        none = "no effect to first order" if scatters and not any(one.worst for one in found) else "no effect"
+        alike = none if all(one.worst == 0 for one in rest) else "small"
         rows.append([f"{len(rest)} others, {alike}", "", "", "", *(share(part, 1) for part in sums)])
     at = f" at {read.told_place}" if read.told_place else ""
     return TextTable(f"contributions to {read.name}{at}", head, rows)

@@ -139,11 +139,13 @@ def holding_figures(run: Run, multiples: Array, state: NDArray[np.int8], dial: D
         return []
     aspect, subject = "maximum" * bool(everywhere), "down to which it is self-locking" + _centred(run)
     place, multiple = f"at {dial.at(at)}", float(multiples[at])
-    figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, "1", aspect, place)]
+    forward = state[at] == LockingState.SELF_LOCKING_FORWARD
+    note = "below it the loads drive it on, onto a stop there" * bool(forward and not run.cycle.periodic)
+    figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, "1", aspect, place, note)]
     paths = {f"joints.{joint}.friction.{law_of(run.system, joint).scale}" for joint in felt(run.system, run.values)}
     same = {float(np.ravel(primal(run.values[path]))[0]) if path in run.values else np.nan for path in paths}
     if len(same) == 1 and np.isfinite(value := same.pop()):
         figures.append(
-            Figure("holding_coefficient", f"friction coefficient {subject}", multiple * value, "1", aspect, place)
+            Figure("holding_coefficient", f"friction coefficient {subject}", multiple * value, "1", aspect, place, note)
         )
     return figures

@@ -74,6 +74,20 @@ def test_an_extreme_is_that_at_the_jump(steps: int, sign: int) -> None:
     assert float(np.abs(result["drive_effort"]).max()) < 0.999 * abs(effort.value)  # the positions stay as they are
 
 
+@pytest.mark.parametrize("steps", [36, 90])
+def test_a_reaction_that_is_largest_at_another_jump_than_the_effort_is_located_too(steps: int) -> None:
+    """The torque is largest where the load begins, the reactions where it ends, nearer to the dead centre."""
+    angle = np.radians(357.3)
+    tilt = np.sqrt(1 - (0.03 * np.sin(angle) / 0.2) ** 2)
+    result = analysed(
+        "-(50 kN + 40 kN * (drive - 320.3 deg) / 0.6457718 rad) * between(drive, 320.3 deg, 357.3 deg)", steps
+    )
+    figures = {one.name: one for one in result.trunnion.summary}
+    assert figures["O.effort_max"].place == "at 320.3°"
+    assert figures["P.reaction_max"].place == "at 357.3°"
+    assert figures["P.reaction_max"].value == pytest.approx(90e3 / tilt, rel=1e-6)
+
+
 def test_the_start_of_a_cycle_is_beside_its_end() -> None:
     """A load that ends with the cycle has its jump behind the last position."""
     data = {**PRESS, "drivers": {"O": {"speed": "60 rpm"}}}

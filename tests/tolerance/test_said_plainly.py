@@ -180,7 +180,10 @@ def test_equal_parts_are_told_together_and_a_play_is_within_its_radius() -> None
     result = trunnion.tolerance(model, methods=["linear"], steps=12)
     (found,) = coded(result, "limit.missed")
     assert "'dimensions.k', 30 % of" in found.remedy
-    assert "joints.O.clearance, joints.P.clearance, joints.Q.clearance, which are equal, together 60 %" in found.remedy
+    assert (
+        "joints.O.clearance, joints.P.clearance, joints.Q.clearance, as much as each other, together 60 %"
+        in found.remedy
+    )
     rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
     told = {row[0]: row[1].replace("\u00a0", " ") for row in rows}
     assert (told["k"], told["O.clearance"]) == ("±0.015 mm", "within 0.02 mm")

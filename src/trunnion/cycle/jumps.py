@@ -1,7 +1,8 @@
 """Forces beside a jump, of a load or of friction: their extremes are at the jump itself, between two positions.
 
-Where a drive effort is largest or least at a position and drops at once beside it, both sides of every place at which
-the model switches there (`switches`) count as positions too. Pins in seats move such places: there it is only said.
+Where a drive effort is largest or least at a position, or a reaction largest, and drops at once beside it, both sides
+of every place at which the model switches there (`switches`) count as positions too. Pins in seats move such places:
+there it is only said.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle
 
-__all__ = ["beside", "both_ways", "dropping", "findings", "moved", "sides"]
+__all__ = ["beside", "courses", "dropping", "findings", "moved", "sides"]
 
 Array = NDArray[np.float64]
 FEWEST = 12  # positions among which a jump can be told from a slope
@@ -48,9 +49,10 @@ def dropping(courses: Array, status: NDArray[Any], closed: bool) -> NDArray[np.b
     return gaps
 
 
-def both_ways(efforts: Array) -> Array:
-    """Efforts and their negatives, whose largest values are the least ones, (course, …)."""
-    return np.concatenate([efforts, -efforts])
+def courses(arrays: Mapping[str, NDArray[Any]]) -> Array:
+    """What the extremes of a summary are of, (course, …): efforts, their negatives, and sizes of reactions."""
+    efforts = arrays["drive_effort"]
+    return np.concatenate([efforts, -efforts, np.sqrt(np.sum(arrays["reaction_force"] ** 2, axis=1))])
 
 
 def beside(gaps: NDArray[np.bool_], time: Array, edges: Array, cycle: Cycle) -> Array:
@@ -64,12 +66,13 @@ def beside(gaps: NDArray[np.bool_], time: Array, edges: Array, cycle: Cycle) -> 
 
 
 def sides(run: Run, found: Positions) -> Positions | None:
-    """The two sides of jumps beside which drive efforts have their extremes, as positions; None if there are none."""
+    """The two sides of jumps beside which efforts or reactions have their extremes, as positions; None if there are
+    none."""
     time, cycle = found.time, run.cycle
     if len(time) < FEWEST or run.seats:
         return None
     closed = cycle.periodic and bool(time[-1] - time[0] + 1.5 * (time[1] - time[0]) > cycle.duration)
-    gaps = dropping(both_ways(found.arrays["drive_effort"]), found.arrays["status"], closed)
+    gaps = dropping(courses(found.arrays), found.arrays["status"], closed)
     times = beside(gaps, time, run.edges, cycle) if np.any(gaps) else np.zeros(0)
     if not len(times):
         return None
@@ -81,9 +84,20 @@ def findings(run: Run, time: Array, arrays: Mapping[str, NDArray[Any]], units: l
     """With pins in seats: efforts that are largest beside a jump, and how much more they may be at the jump itself."""
     if not run.seats or len(time) < FEWEST:
         return
-    step = time[1] - time[0]
+    step, status = time[1] - time[0], arrays["status"]
     for i, (name, unit) in enumerate(zip(run.system.mechanism.drivers, units, strict=True)):
         size = np.abs(arrays["drive_effort"][[i]])
+        top = int(np.argmax(np.where(status == Status.SOLVED, size[0], -1.0)))
+        around = (
+            (top + np.array([-1, 1])) % len(time)
+            if run.cycle.periodic
+            else np.clip([top - 1, top + 1], 0, len(time) - 1)
+        )
+        if size[0, top] > 0 and np.any(status[around] == Status.CONTACT_LOST):
+            yield finding_for(
+                "effort.beside_gap", f"drivers.{name}", at=run.system.dial(run.values, time).at(top), driver=name
+            )
+            continue
         for low in np.flatnonzero(dropping(size, arrays["status"], run.cycle.periodic)):
             away = np.mod(run.edges - time[low] + MOVED * step, run.cycle.duration)
             k, rest = (low, low - 1) if size[0, low] > size[0, (low + 1) % len(time)] else (low + 1, low + 2)

@@ -347,7 +347,11 @@ def _friction_figures(run: Run, found: Positions, near: near_locking.Locking | N
         margin = np.where(valid, found.arrays["locking_margin"], np.nan)
         yield near_locking.least_margin("locking_margin", "locking margin", margin, found.dial, TIMES)
     yield from near.figures(run, found.dial) if near else ()
-    yield Figure("friction_power_mean", "friction power", found.means.friction_power.net, "W", "mean")
+    means = found.means
+    yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
+    if means.supposed > 0:
+        off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
+        yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
     if len(top.sound):
         lost, at = top.of(lambda arrays: np.sum(arrays["friction_power"], axis=0))
         yield Figure("friction_power_max", "friction power", lost, "W", "maximum", at)

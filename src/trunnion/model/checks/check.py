@@ -109,9 +109,11 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
             entry.quantity.check(sayable, entry.kind)
         except UnitError as error:
             yield Finding(error.what, entry.where, error.remedy)
+    rubs = any(joint.friction is not None for joint in mechanism.effective_joints.values())
+    remedy = "remove it" if rubs else "remove it, unless it is of friction, which is off"
     for name in mechanism.dimensions:
         if name not in used:
-            yield Finding("is not used", f"dimensions.{name}", "remove it", Severity.NOTE)
+            yield Finding("is not used", f"dimensions.{name}", remedy, Severity.NOTE)
 
 
 def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadable: set[str]) -> Iterator[Finding]:

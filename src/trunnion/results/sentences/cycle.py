@@ -112,6 +112,12 @@ CYCLE: dict[str, Sentence] = {
         "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}",
         "use more --steps",
     ),
+    "effort.beside_gap": Sentence(
+        NOTE,
+        "the largest effort, at {at}, is beside positions at which pins cross their play; nearer to them it may be "
+        "larger",
+        "use more --steps; a measure, {{effort: {driver}, as: maximum}}, lies between positions",
+    ),
     "errors.jump_moved": Sentence(
         NOTE,
         "the change by the errors at {at} is that of a jump whose place they move: with them it is {built}, "
@@ -171,7 +177,7 @@ CYCLE: dict[str, Sentence] = {
     ),
     "spring.turned_round": Sentence(
         WARNING,
-        "its ends pass each other at {at}: its length falls to about 0, and its force turns round",
+        "its ends pass each other at {at}: its length falls to about 0, and its force reverses",
         "move one end along its line, with the free length, so that they stay apart",
     ),
     "spring.never_acts": Sentence(

@@ -259,9 +259,8 @@ class Points:
         arrays: Mapping[str, Array],
         between: Mapping[int, Array],
     ) -> dict[int, Mapping[str, Array]]:
-        """The variables on both sides of the jumps beside which efforts have their extremes, by number of mechanism."""
-        efforts = jumps.both_ways(arrays["drive_effort"])
-        gaps = jumps.dropping(efforts, arrays["status"], self.run.cycle.periodic)
+        """The variables on both sides of jumps beside which forces have their extremes, by number of mechanism."""
+        gaps = jumps.dropping(jumps.courses(arrays), arrays["status"], self.run.cycle.periodic)
         times = {
             row: jumps.beside(gaps[row], cycles[row].times(self.steps), own, cycles[row])
             for row, own in between.items()

@@ -259,6 +259,6 @@ def _largest(outcome: Outcome, of: Of) -> tuple[str, float, str]:
     together = float(same @ worst)
     names, first = study.inputs.names, study.inputs.names[top]
     others = ", ".join(name for name, like in zip(names, same, strict=True) if like and name != first)
-    equals = f", and {others} as much, together " if same[top] else f", or {others}, which are equal, together "
+    equals = f", and {others} as much, together " if same[top] else f", or {others}, as much as each other, together "
     equals += f"{100 * together / total:.3g} %"
     return first, float(worst[top]) / total, equals if together > worst[top] else ""

@@ -272,6 +272,7 @@ def corners(read: MeasureReading) -> TextTable | None:
     rows = [
         [path, *(value_text(float(read.row(f"corner_{end}")[j]), about[path].unit) for end in ends)]
         for j, path in enumerate(names(read.result, "parameter"))
+        if about[path].worst != 0
     ]
     return TextTable(f"worst corners of {read.name}, of the nonlinear model", head, rows)
 

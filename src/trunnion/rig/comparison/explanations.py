@@ -309,7 +309,7 @@ def _differ(kind: str, sizes: Sequence[Cause], members: Members) -> bool:
     values = [one.size for one in sizes]
     spread = max(values) - min(values)
     known = [pair.judged.bias_expanded for _, pair in members]
-    typical = [max(float(np.sqrt(np.nanmean(pair.course.mean**2))), 1e-300) for _, pair in members]
+    typical = [max(float(np.sqrt(np.nanmean(pair.course.read**2))), 1e-300) for _, pair in members]
     wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
     return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
 

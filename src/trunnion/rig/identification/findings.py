@@ -10,7 +10,6 @@ import numpy as np
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
-from trunnion.rig.comparison.explanations import LENGTHS
 from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
@@ -178,15 +177,16 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     first = found[0]
     also = [_story(judged, one) for one in found[1:]]
     also_told = f"; {' or '.join(also)} would explain as much" if also else ""
-    rows = zip(problem.model.unknowns, first.estimates, first.halves, strict=True)
-    known = [f"{one.name} = {amount(value, half, one.unit)}" for one, value, half in rows if np.isfinite(half)]
-    unit = {"shift": "rad", "delay": "s", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
+    lengths = [one.channel for one in found if one.kind == "length"]
+    unit = {"shift": "rad", "delay": "s", "length": "m", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
     phrases = {
-        "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
+        "story": _story(judged, first), "also": also_told, "estimates": _estimates(judged, first),
+        "channel": " or ".join(lengths) if first.kind == "length" else first.channel,
         "times": f", {few_digits(judged.times_stated)} times its stated standard uncertainty,"
         if judged.times_stated > FAR else "",
         "left": f", reduced χ² {_times(first.left.reduced)} remains" if first.left.misfit else "",
-        "before": f"{LENGTHS}, then " if first.left.misfit and _moves(judged, first) else "",
+        "lengths": f"check {' or '.join(lengths)} of the model first (--parameter {lengths[0]} identifies it); "
+        if lengths and first.kind != "length" else "",
         "odd": _joined(_odd(judged, first)), "files": _zeros(judged, first),
         "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
     }  # fmt: skip
@@ -198,9 +198,10 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _moves(judged: Assessment, one: MisfitCause) -> bool:
-    """Whether it is an offset of a motion, on which lengths act."""
-    return one.kind == "zero" and judged.problem.model.measures[one.channel].of_motion
+def _estimates(judged: Assessment, one: MisfitCause) -> str:
+    """What the unknowns would be with a cause."""
+    rows = zip(judged.problem.model.unknowns, one.estimates, one.halves, strict=True)
+    return _joined([f"{own.name} = {amount(value, half, own.unit)}" for own, value, half in rows if np.isfinite(half)])
 
 
 def _zeros(judged: Assessment, one: MisfitCause) -> str:
@@ -241,7 +242,11 @@ def _story(judged: Assessment, one: MisfitCause) -> str:
         "delay": "a delay of all channels",
         "zero": f"a constant offset of {one.channel}",
         "gain": f"a gain error of {one.channel}",
+        "length": f"a length {one.channel} {'larger' if one.size > 0 else 'smaller'} than the model's by",
     }.get(one.kind)
+    if one.kind == "length":
+        with_it = f" (with {_estimates(judged, one)})" if one is not judged.found.causes[0] else ""
+        return f"{what} {amount(abs(one.size), one.expanded, 'm')}{with_it}"
     if what is None:
         return f"{KINDS[one.kind]} of {one.channel}"
     if not one.own and one.kind == "gain" and abs(one.size) >= FACTOR:

@@ -13,6 +13,7 @@ import trunnion
 from measured_data.recording import mapping, recorded, text_of
 from trunnion.rig.comparison.assessment import Verdict
 from trunnion.rig.reading.read import read_measured
+from trunnion.views.compare.tables import sensors
 
 CRANK, ROD, AHEAD, DATUM = 40.0, 160.0, 10.0, 120.0  # mm
 GAIN, ZERO = 0.002, 0.2  # stated: relative, mm
@@ -73,6 +74,17 @@ def test_the_uncertainty_of_a_gain_acts_on_the_reading(tmp_path: Path) -> None:
     for name in ("residual", "bias", "bias_expanded", "within", "uncertainty"):
         assert found[name].values == pytest.approx(other[name].values, rel=1e-9, abs=1e-12)
     assert trunnion.rig.compare(crank(), measured(tmp_path, 1.0, zero=f"{DATUM} mm")).verdict.item() == Verdict.WITHIN
+
+
+def test_an_offset_beyond_what_is_stated_may_be_a_length(tmp_path: Path) -> None:
+    """A rod 1.5 mm too long; figures are told in the unit of the readings."""
+    result = trunnion.rig.compare(crank(rod=161.5), measured(tmp_path, 1.0, zero=f"{DATUM} mm"))
+    (row,) = (one for one in json.loads(result.attrs["findings"]) if one["severity"] == "error")
+    assert row["remedy"].startswith("check the dimensions of the model, which act alike, then check the zero")
+    biased = trunnion.rig.compare(crank(rod=160.44), measured(tmp_path, 1.0, zero=f"{DATUM} mm"))
+    (row,) = (one for one in json.loads(biased.attrs["findings"]) if one["code"] == "compare.bias")
+    assert " mm, its U " in row["what"]
+    assert sensors(result).rows[0][2:4] == ["mm", "0.200\u00a0mm"]
 
 
 def test_a_gain_is_estimated_of_the_reading(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from matplotlib.text import Text
 
 import trunnion
 from trunnion.errors import Finding
+from trunnion.rig.identification import findings
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.report import report
 
@@ -331,3 +332,38 @@ def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: 
     assert "run-1.csv angle" in page
     result.attrs |= {"data_findings": "[]"}
     assert "No errors or warnings." in report(result)
+
+
+def test_what_is_said_of_a_channel_that_is_not_used_and_of_what_is_known_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A motion tells the angle; of a wrong gain of it that is named; of a wrong unit nothing else is."""
+    (tmp_path / "sprung.yaml").write_text(SPRUNG)
+    torque = {"measures": "effort:O", "range": "20 N m", "noise": "0.1 N m", "accuracy": {"gain": "0.2 %"}}
+    slide = {"measures": "slide:S", "range": "250 mm", "noise": "0.5 mm", "accuracy": {"gain": "0.2 %"}}
+    schedule = {"over": {"L0": ["190 mm", "200 mm"]}, "turns": 20, "idle": "0.3 s"}
+    machine = trunnion.read(tmp_path / "sprung.yaml")
+    rig = {**RIG, "rate": "1 kHz", "schedule": schedule, "sensors": {"M": torque, "W": slide}}
+    trunnion.rig.observe(machine, rig, seed=3).write(tmp_path)
+    data = trunnion.rig.read(tmp_path / "mapping.yaml")
+
+    def told(channel: str, factor: float) -> dict[str, Finding]:
+        conditions = []
+        for one in data.conditions:
+            course = replace(one.courses[channel], turns=factor * one.courses[channel].turns)
+            conditions.append(replace(one, courses={**one.courses, channel: course}))
+        result = trunnion.rig.identify(machine, replace(data, conditions=tuple(conditions)), ["pins", "guide"])
+        return {one.code: one for one in result.trunnion.findings}
+
+    monkeypatch.setattr(findings, "ALIKE", 0.75)
+    found = told("W", 1.0)
+    assert "--channel M --channel W fits them all" in found["fit.unused"].remedy
+    assert "parameter.hardly_told_apart" not in found
+    monkeypatch.setattr(findings, "WELL", 0.0)
+    found = told("W", 1.02)
+    assert found["parameter.hardly_told_apart"].figures["correlation"] < -0.75
+    assert re.match(r"a gain error of \+(2|1\.\d|2\.\d) % would explain it", found["fit.unused_missed"].remedy)
+    monkeypatch.setattr(findings, "ALIKE", 0.0)
+    found = told("M", 0.7376)
+    assert "lbf ft read as N m" in found["fit.cause"].what
+    assert not {"parameter.not_told_apart", "parameter.hardly_told_apart"} & found.keys()

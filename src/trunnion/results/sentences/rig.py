@@ -218,7 +218,13 @@ IDENTIFY = {
             )[kind]
         ),
     ),
-    "fit.unused": Sentence(NOTE, "no parameter acts on {channels}: not used in the fit"),
+    "fit.unused": Sentence(
+        NOTE,
+        "no parameter acts on {channels}: not used in the fit",
+        lambda taken, **_: (
+            taken and f"{taken} fits them all: a motion tells the error of the angle, which is fitted too"
+        ),
+    ),
     "fit.unused_missed": Sentence(
         WARNING,
         "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} {of}, where its {by} is "

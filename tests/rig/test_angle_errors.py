@@ -136,7 +136,9 @@ def test_a_channel_that_is_not_used_speaks_for_or_against_a_cause(tmp_path: Path
         missed = told["fit.unused_missed"]
         true = np.degrees(np.std(rocker(TURN) - rocker(TURN, 0.086)))
         assert np.degrees(missed.figures["rms"]) == pytest.approx(true, rel=0.05)
-        assert "fit.cause" not in told
+        assert told["fit.cause"].what.startswith("a length CD smaller than the model's by")
+        assert told["fit.cause"].figures["size"] == pytest.approx(-1e-3, abs=5e-5)
+        assert told["fit.cause"].figures["values"]["brake.resisting_torque"] == pytest.approx(20.0, abs=0.02)
     elif zero:
         assert told["fit.cause"].figures["kind"] == "shift"
         assert np.degrees(told["fit.cause"].figures["size"]) == pytest.approx(2.0, abs=0.1)

@@ -13,11 +13,13 @@ import pytest
 import trunnion
 from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
+from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
 from trunnion.rig.comparison.assessment import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.rig.comparison.error_sources import best, causes
 from trunnion.rig.comparison.result import VARIABLES
+from trunnion.rig.modelled import prepared
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 
@@ -299,6 +301,27 @@ def test_an_angle_that_runs_backwards_is_refused():
         compare(back)
     assert {one.code for one in caught.value.findings} == {"data.angle.backwards"}
     assert caught.value.findings[0].figures["measured"] == -4.0
+
+
+@pytest.mark.parametrize(
+    "verb", [trunnion.rig.compare, lambda model, data: trunnion.rig.identify(model, data, ["A.friction"])]
+)
+def test_all_files_that_run_backwards_are_told(verb):
+    data = measured(settings=({"A.speed": 4.0}, {"A.speed": 5.0}, {"A.friction": 0.1}), channels=("speed", "out"))
+    speeds = zip(data.conditions, (-4.0, 5.0, -6.0), strict=True)
+    with pytest.raises(MechanismError, match=r"2 such findings: run-1\.csv, run-3\.csv"):
+        verb(rocker(), replace(data, conditions=tuple(replace(one, speed=speed) for one, speed in speeds)))
+
+
+def test_a_length_that_is_set_with_its_unit_is_no_plain_number():
+    """As of all files that state the same; one without a unit is told."""
+    mechanism, length = trunnion.read(EXAMPLES / "slider-crank.yaml"), KINDS["length"].dimensions[0]
+    path = next(path for path, one in mechanism.parameter_set.entries.items() if one.kind is KINDS["length"])
+    for dimensions in ({path: length}, {}):
+        run = prepared(mechanism, Condition("a", {path: 0.06}, np.zeros(1), {}, dimensions=dimensions))
+        told = [one for one in model_notes(run.system.mechanism, run.system) if "a plain number" in one.what]
+        assert bool(told) != bool(dimensions)
+        assert run.system.mechanism.parameters()[path] == 0.06
 
 
 # ---- no answer ------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from matplotlib.text import Text
 
 import trunnion
 from trunnion.errors import Finding
+from trunnion.rig.identification import findings
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.report import report
 
@@ -115,16 +116,71 @@ def test_a_wrong_unit_is_no_error_of_a_gain_that_is_stated(folder: Path) -> None
     assert np.all(np.abs(result["sensor_error"].values) <= 5 + 1e-9)
 
 
-def test_an_offset_that_leaves_a_misfit_is_first_one_of_the_dimensions(tmp_path: Path) -> None:
+def test_a_wrong_length_is_named_with_its_size(folder: Path) -> None:
+    result = identified(folder, l="133 mm")
+    found = cause(result)
+    assert found.figures["kind"] == "length"
+    assert found.figures["size"] == pytest.approx(-3e-3, abs=max(3e-4, 1.5 * found.figures["expanded"]))
+    assert "a length l smaller than the model's by" in found.what
+    assert "--parameter l identifies it" in found.remedy
+
+
+SPRUNG = """
+trunnion: 1
+name: a slider-crank beside the line of its slide, against a spring
+space: planar
+dimensions: {e: 10 mm, L0: 190 mm, pins: 0.12, guide: 0.15}
+links:
+  ground: {points: {O: [0, 0], S: {at: [0, e], axis: [1, 0]}, F: [300 mm, e]}}
+  crank: {points: {O: [0, 0], A: [40 mm, 0]}}
+  rod: {points: {A: [0, 0], B: [160 mm, 0]}}
+  ram: {points: {B: [0, 0], S: {at: [0, 0], axis: [1, 0]}}}
+joints:
+  O: {type: revolute, links: [ground, crank], pin: {radius: 12 mm}, friction: pins}
+  A: {type: revolute, links: [crank, rod], pin: {radius: 10 mm}, friction: pins}
+  B: {type: revolute, links: [rod, ram], pin: {radius: 8 mm}, friction: pins}
+  S: {type: prismatic, links: [ground, ram], guide: {length: 40 mm}, friction: guide}
+springs: {back: {between: [ground.F, ram.B], stiffness: 4 N/mm, free_length: L0, only: push}}
+drivers: {O: {speed: 40 rpm}}
+assembly: {B: [199 mm, 10 mm]}
+"""
+
+
+def test_a_length_that_acts_like_an_offset_of_the_angle_is_named_with_it(tmp_path: Path) -> None:
+    """To add the offset to the zero of the angle would leave a wrong friction."""
+    (tmp_path / "sprung.yaml").write_text(SPRUNG)
+    torque = {
+        "measures": "effort:O",
+        "range": "20 N m",
+        "noise": "0.1 N m",
+        "accuracy": {"gain": "0.2 %", "zero": "0.05 N m"},
+    }
+    schedule = {"over": {"L0": ["190 mm", "200 mm"]}, "turns": 20, "idle": "0.3 s"}
+    rig = {**RIG, "rate": "1 kHz", "schedule": schedule, "sensors": {"M": torque}}
+    machine = trunnion.read(tmp_path / "sprung.yaml")
+    trunnion.rig.observe(machine, rig, seed=3).write(tmp_path)
+    data = trunnion.rig.read(tmp_path / "mapping.yaml")
+    found = cause(trunnion.rig.identify(machine.with_values({"e": "11 mm"}), data, ["pins", "guide"]))
+    assert found.figures["kind"] == "shift"
+    assert abs(found.figures["values"]["guide"] - 0.15) > 0.015
+    (told,) = re.findall(
+        r"a length e smaller than the model's by ([\d.]+) ± ([\d.]+) mm \(with [^)]* guide = ([\d.]+)", found.what
+    )
+    assert float(told[0]) == pytest.approx(1.0, abs=1.5 * float(told[1]))
+    assert float(told[2]) == pytest.approx(0.15, abs=0.004)
+    assert found.remedy.startswith(
+        "check e of the model first (--parameter e identifies it); check the zero of the angle"
+    )
+
+
+def test_a_length_is_named_in_place_of_an_offset_that_leaves_a_misfit(tmp_path: Path) -> None:
     """A rod 1 mm too long moves the slider by nearly 1 mm everywhere, but not quite."""
     slide = {"measures": "slide:S", "range": "500 mm", "noise": "0.1 mm", "bits": 16}
     rig = {**RIG, "sensors": {**RIG["sensors"], "x": slide}}
     trunnion.rig.observe(trunnion.read(MODEL), rig, seed=3).write(tmp_path)
     data, parameters = trunnion.rig.read(tmp_path / "mapping.yaml"), {"mu": [GUIDE], "enc": ["O.start"]}
     found = cause(trunnion.rig.identify(trunnion.read(MODEL).with_values({"l": "131 mm"}), data, parameters))
-    assert (found.figures["kind"], found.figures["size"]) == ("zero", pytest.approx(-1e-3, abs=5e-5))
-    assert re.search(r"reduced χ² 1\.\d+ remains", found.what)
-    assert "check the dimensions of the model, then check the zero of x" in found.remedy
+    assert (found.figures["kind"], found.figures["size"]) == ("length", pytest.approx(-1e-3, abs=5e-5))
 
 
 def test_what_is_expected_is_the_scatter_of_what_is_used(folder: Path) -> None:
@@ -276,3 +332,38 @@ def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: 
     assert "run-1.csv angle" in page
     result.attrs |= {"data_findings": "[]"}
     assert "No errors or warnings." in report(result)
+
+
+def test_what_is_said_of_a_channel_that_is_not_used_and_of_what_is_known_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A motion tells the angle; of a wrong gain of it that is named; of a wrong unit nothing else is."""
+    (tmp_path / "sprung.yaml").write_text(SPRUNG)
+    torque = {"measures": "effort:O", "range": "20 N m", "noise": "0.1 N m", "accuracy": {"gain": "0.2 %"}}
+    slide = {"measures": "slide:S", "range": "250 mm", "noise": "0.5 mm", "accuracy": {"gain": "0.2 %"}}
+    schedule = {"over": {"L0": ["190 mm", "200 mm"]}, "turns": 20, "idle": "0.3 s"}
+    machine = trunnion.read(tmp_path / "sprung.yaml")
+    rig = {**RIG, "rate": "1 kHz", "schedule": schedule, "sensors": {"M": torque, "W": slide}}
+    trunnion.rig.observe(machine, rig, seed=3).write(tmp_path)
+    data = trunnion.rig.read(tmp_path / "mapping.yaml")
+
+    def told(channel: str, factor: float) -> dict[str, Finding]:
+        conditions = []
+        for one in data.conditions:
+            course = replace(one.courses[channel], turns=factor * one.courses[channel].turns)
+            conditions.append(replace(one, courses={**one.courses, channel: course}))
+        result = trunnion.rig.identify(machine, replace(data, conditions=tuple(conditions)), ["pins", "guide"])
+        return {one.code: one for one in result.trunnion.findings}
+
+    monkeypatch.setattr(findings, "ALIKE", 0.75)
+    found = told("W", 1.0)
+    assert "--channel M --channel W fits them all" in found["fit.unused"].remedy
+    assert "parameter.hardly_told_apart" not in found
+    monkeypatch.setattr(findings, "WELL", 0.0)
+    found = told("W", 1.02)
+    assert found["parameter.hardly_told_apart"].figures["correlation"] < -0.75
+    assert re.match(r"a gain error of \+(2|1\.\d|2\.\d) % would explain it", found["fit.unused_missed"].remedy)
+    monkeypatch.setattr(findings, "ALIKE", 0.0)
+    found = told("M", 0.7376)
+    assert "lbf ft read as N m" in found["fit.cause"].what
+    assert not {"parameter.not_told_apart", "parameter.hardly_told_apart"} & found.keys()

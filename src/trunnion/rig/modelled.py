@@ -14,7 +14,7 @@ from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
-from trunnion.model.units import Kind, dimension_text
+from trunnion.model.units import Kind, dimension_text, si_unit
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement, Signal
 from trunnion.rig.reading.signal_checks import backward_finding
@@ -150,8 +150,11 @@ def refuse_unit(run: Run, measure: Measure, channel: str, course: Signal) -> Non
 
 def prepared(mechanism: Mechanism, condition: Condition) -> Run:
     """The mechanism with the values of a condition; what is wrong with it says in which."""
+    units = {name: si_unit(one) for name, one in condition.dimensions.items()}
+    stated = {name: f"{value} {units[name]}" if units.get(name, "1") != "1" and np.isfinite(value) else value
+              for name, value in condition.values.items()}  # fmt: skip
     with _in(condition):
-        return prepare(mechanism.with_values(dict(condition.values)))
+        return prepare(mechanism.with_values(stated))
 
 
 @contextmanager
@@ -218,15 +221,20 @@ def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> No
         raise MechanismError(gathered(found))
 
 
-def _refuse_followed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:
-    """MechanismError where all conditions that take the speed of the driver from the data turn against the model's."""
+def _refuse_opposed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:
+    """MechanismError where conditions turn against the speed of the driver that is stated of them, by all their files.
+
+    Of those that take it from the data only where all turn against the model's.
+    """
     driver = next(iter(mechanism.drivers), "")
     path = f"drivers.{driver}.speed"
     if path in mechanism.parameter_set.entries:
-        stated = float(mechanism.parameters()[path])
-        rows = [(one, stated) for one in conditions if {path, f"{driver}.speed"} & set(one.followed)]
-        if all(one.speed * stated < 0 for one, _ in rows):
-            refuse_backwards(driver, rows)
+        stated, names = float(mechanism.parameters()[path]), (path, f"{driver}.speed")
+        rows = [(one, stated) for one in conditions if set(names) & set(one.followed)]
+        rows = rows if all(one.speed * stated < 0 for one, _ in rows) else []
+        rows += [(one, next((one.values[name] for name in names if name in one.values), stated)) for one in conditions
+                 if not set(names) & set(one.followed)]  # fmt: skip
+        refuse_backwards(driver, rows)
 
 
 def _degrees(angle: float) -> str:
@@ -244,10 +252,10 @@ def _beside(turning: bool, course: Array, measured: Array) -> Array:
 def check_settings(mechanism: Mechanism, measurement: Measurement) -> None:
     """MechanismError where a condition states a number in a unit that the model's number cannot have.
 
-    Also where all speeds that are taken from the data are against that of the model: its angle runs backwards.
+    Also where the angle runs backwards.
     Names that the model does not have, and numbers without a unit, which are SI, are passed over.
     """
-    _refuse_followed(mechanism, measurement.conditions)
+    _refuse_opposed(mechanism, measurement.conditions)
     findings: dict[tuple[str, str], Finding] = {}
     stated = {name for one in measurement.conditions for name in one.dimensions}
     kinds: dict[str, Kind | None] = {}

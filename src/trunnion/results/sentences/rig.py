@@ -190,31 +190,41 @@ IDENTIFY = {
         WARNING,
         "{story}{times} would explain {explains_percent:.0f} % of the misfit{left}{also}; the estimates would then be "
         "{estimates}",
-        lambda kind, size_told, channel, odd, files, before, times, conditions=None, **_: (
-            {
-                "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
-                f"correct the zero of their files alone: files: [{files or '{file: …, angle: {zero: …}}'}]",
-                "zero": f"{before}check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
-                "gain": f"check range and gain of {channel}, and lengths and loads of the model, in {odd}",
-            }
-            if conditions
-            else {
-                "shift": "check the zero of the angle; if it is off, "
-                + (
-                    f"correct the zeros that the files state: files: [{files}]"
-                    if files
-                    else f"add {size_told} to angle: zero: in the mapping"
-                ),
-                "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
-                "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
-                "zero": f"{before}check the zero of {channel}"
-                + ("" if times else "; with accuracy: {zero: …} in the mapping it is estimated too"),
-                "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike"
-                + ("" if times else "; with accuracy: {gain: …} in the mapping a gain is estimated too"),
-            }
-        )[kind],
+        lambda kind, size_told, channel, odd, files, times, lengths, conditions=None, **_: (
+            lengths
+            + (
+                {
+                    "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
+                    f"correct the zero of their files alone: files: [{files or '{file: …, angle: {zero: …}}'}]",
+                    "zero": f"check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
+                    "gain": f"check range and gain of {channel}, and lengths and loads of the model, in {odd}",
+                }
+                if conditions
+                else {
+                    "shift": "check the zero of the angle; if it is off, "
+                    + (
+                        f"correct the zeros that the files state: files: [{files}]"
+                        if files
+                        else f"add {size_told} to angle: zero: in the mapping"
+                    ),
+                    "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
+                    "length": f"check {channel} in the model; --parameter {channel.partition(' ')[0]} identifies it",
+                    "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
+                    "zero": f"check the zero of {channel}"
+                    + ("" if times else "; with accuracy: {zero: …} in the mapping it is estimated too"),
+                    "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike"
+                    + ("" if times else "; with accuracy: {gain: …} in the mapping a gain is estimated too"),
+                }
+            )[kind]
+        ),
     ),
-    "fit.unused": Sentence(NOTE, "no parameter acts on {channels}: not used in the fit"),
+    "fit.unused": Sentence(
+        NOTE,
+        "no parameter acts on {channels}: not used in the fit",
+        lambda taken, **_: (
+            taken and f"{taken} fits them all: a motion tells the error of the angle, which is fitted too"
+        ),
+    ),
     "fit.unused_missed": Sentence(
         WARNING,
         "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} {of}, where its {by} is "

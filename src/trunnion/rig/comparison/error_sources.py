@@ -84,15 +84,17 @@ def causes(
     turning: bool = False,
     without: Array | None = None,
     drive: Array | None = None,
+    datum: float = 0.0,
 ) -> list[Cause]:
     """Every explanation that can be fitted, in the order of KINDS; finite values only.
 
     closed: the cycle ends where it starts; turning: the course is an angle, of which neither sign nor gain is tried,
     nor a shift if it turns right round; without: the model without its friction, if that is to be among them; drive:
-    its angle, rad, which may have been read in place of another.
+    its angle, rad, which may have been read in place of another; datum: where the sensor reads 0, from which gains act.
     """
     pair, found = _Pair(measured, model), []
-    square = float(np.sum(model**2))
+    read = model - datum
+    square = float(np.sum(read**2))
     if not turning and pair.flat:
         level = float(np.mean(measured))
         return [Cause("flat", level, pair.explained(np.full_like(model, level)))]
@@ -102,9 +104,9 @@ def causes(
     found.append(Cause("zero", zero, pair.explained(model + zero)))
     if square == 0:
         return found
-    gain = float(np.sum(measured * model)) / square
+    gain = float(np.sum((measured - datum) * read)) / square
     if gain > 0 and not turning:
-        found.append(Cause("gain", gain - 1.0, pair.explained(gain * model)))
+        found.append(Cause("gain", gain - 1.0, pair.explained(gain * read + datum)))
     if closed and len(phase) >= FEWEST:
         found += [*_shift(pair, phase, 1), *_shift(pair, phase, -1)]
     if turning:
@@ -113,9 +115,9 @@ def causes(
     around = model - np.mean(model)
     if float(np.sum(around**2)) > 1e-6 * square:  # of a flat course the two cannot be told apart
         slope = float(np.sum(measured * around) / np.sum(around**2))
-        offset = float(np.mean(measured) - slope * np.mean(model))
+        offset = float(np.mean(measured - datum) - slope * np.mean(read))
         if slope > 0:
-            found.append(Cause("zero and gain", offset, pair.explained(slope * model + offset), slope - 1.0))
+            found.append(Cause("zero and gain", offset, pair.explained(slope * read + datum + offset), slope - 1.0))
     return found
 
 

@@ -22,7 +22,7 @@ from trunnion.rig.reading.units_taken import read_as
 if TYPE_CHECKING:
     from trunnion.rig.comparison.comparison import ChannelComparison, Compared
 
-__all__ = ["AGREE", "LENGTHS", "corrected", "explained", "hides_friction"]
+__all__ = ["AGREE", "LENGTHS", "corrected", "explained", "hides_friction", "told_in"]
 
 Members = Sequence[tuple["Compared", "ChannelComparison"]]
 STANDS_OUT = 2.0  # times the median of the conditions
@@ -37,10 +37,13 @@ def explained(name: str, measures: str, kind: str, members: Members, conditions:
     where = in_which([one.condition.name for one, _ in members], len(conditions))
     worst = min(pair.judged.within for _, pair in members)
     rms = max(pair.judged.rms for _, pair in members)
-    unit, size = _told_in(name, members)
+    unit, size = told_in(name, members)
     offset = all(pair.judged.verdict is Verdict.OFFSET for _, pair in members)
     if offset and kind == "zero":
-        story, remedy = _story(name, measures, kind, [_size(pair, kind) for _, pair in members], members)
+        sizes = [_size(pair, kind) for _, pair in members]
+        story, remedy = _story(name, measures, kind, sizes, members)
+        if _of_motion(name, members) and _beyond(sizes, members):
+            remedy = f"check the dimensions of the model, which act alike, then {remedy}"
         phrases = {"cases": where, "story": story, "remedy": remedy}
         after = min(pair.judged.within_unbiased for _, pair in members)
         return finding_for(
@@ -80,7 +83,7 @@ def explained(name: str, measures: str, kind: str, members: Members, conditions:
 def _left_over(name: str, members: Members) -> str:
     """What stays once an offset is taken off, which the scatter and the gain do not explain."""
     pair = max((one for _, one in members), key=lambda one: one.judged.rms_unbiased)
-    (unit, size), of = _told_in(name, members), at_positions(uncertainty_of(pair.course), pair.comparable)
+    (unit, size), of = told_in(name, members), at_positions(uncertainty_of(pair.course), pair.comparable)
     own = float(np.sqrt(np.nanmean(of.random**2 + of.local**2)))
     times = f", {few_digits(pair.judged.rms_unbiased / own)} times its standard uncertainty" if own > 0 else ""
     return f"; RMS {said(pair.judged.rms_unbiased / size, unit)} remains without it{times}"
@@ -234,7 +237,7 @@ def _of_motion(name: str, members: Members) -> bool:
     return members[0][0].model.measures[name].of_motion
 
 
-def _told_in(name: str, members: Members) -> tuple[str, float]:
+def told_in(name: str, members: Members) -> tuple[str, float]:
     """Unit in which figures of a channel are told, and its factor to SI: of a motion that of its readings."""
     course = members[0][1].course
     return course.shown if _of_motion(name, members) else (course.unit, 1.0)
@@ -254,7 +257,7 @@ def _unsure(values: Sequence[float], members: Members) -> float:
 
 def _offset_of(name: str, values: Sequence[float], members: Members) -> str:
     """An offset in words: of a motion with all digits that are known of it."""
-    unit, size = _told_in(name, members)
+    unit, size = told_in(name, members)
     if not _of_motion(name, members) or unit == "rad":
         return extent(values, unit)
     low, high = (_precise(one / size, _unsure(values, members) / size) for one in (min(values), max(values)))
@@ -309,7 +312,7 @@ def _differ(kind: str, sizes: Sequence[Cause], members: Members) -> bool:
     values = [one.size for one in sizes]
     spread = max(values) - min(values)
     known = [pair.judged.bias_expanded for _, pair in members]
-    typical = [max(float(np.sqrt(np.nanmean(pair.course.mean**2))), 1e-300) for _, pair in members]
+    typical = [max(float(np.sqrt(np.nanmean(pair.course.read**2))), 1e-300) for _, pair in members]
     wide = [one if kind == "zero" else one / size for one, size in zip(known, typical, strict=True)]
     return bool(spread > 2 * np.nanmax([*wide, 0.0]) and spread > 0.1 * abs(values[0]))
 

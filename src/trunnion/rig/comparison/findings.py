@@ -17,7 +17,7 @@ from trunnion.model.names import as_key
 from trunnion.model.units import unit as unit_of
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.assessment import Verdict, going_on
-from trunnion.rig.comparison.explanations import AGREE, corrected, explained, hides_friction
+from trunnion.rig.comparison.explanations import AGREE, corrected, explained, hides_friction, told_in
 from trunnion.rig.comparison.wording import extent, in_which, said, turned
 from trunnion.rig.modelled import apart
 
@@ -116,7 +116,7 @@ def _local(name: str, cases: Sequence[tuple[Compared, ChannelComparison]], of: i
     one, pair = max(cases, key=lambda case: _beyond(case[1]))
     stretch = pair.judged.stretch
     assert stretch is not None
-    shown, size = pair.course.shown if pair.course.unit == "rad/s" else (pair.course.unit, 1.0)
+    shown, size = told_in(name, [(one, pair)])
     start, end = (float(one.model.drive[k]) for k in (stretch.positions[0], stretch.positions[-1]))
     phrases = {
         "cases": in_which([case.condition.name for case, _ in cases], of),
@@ -158,7 +158,7 @@ def _biased(name: str, cases: Sequence[tuple[Compared, ChannelComparison]]) -> I
         return
     ratio, one, pair = max(beyond, key=lambda row: row[0])
     often = len(beyond) > max(1.0, BY_CHANCE * len(ratios))
-    shown, size = pair.course.shown if pair.course.unit == "rad/s" else (pair.course.unit, 1.0)
+    shown, size = told_in(name, [(one, pair)])
     phrases = {
         "cases": in_which([row[1].condition.name for row in beyond], len(cases)),
         "most": f", the most in {one.condition.name}" if len(beyond) > 1 else "",

@@ -146,7 +146,7 @@ def _pair(
     found = causes(
         course.mean[where], theirs[where], np.asarray(condition.phase)[where], closed=model.run.cycle.periodic,
         turning=model.measures[channel].turning(model.run.system), without=None if free is None else free[where],
-        drive=model.drive[where] if model.unit == "rad" else None,
+        drive=model.drive[where] if model.unit == "rad" else None, datum=course.accuracy.datum,
     )  # fmt: skip
     if apart(condition.speed, model.speed):  # forces of another speed are no error of the angle
         found = [one for one in found if one.kind not in ("shift", "mirror")]

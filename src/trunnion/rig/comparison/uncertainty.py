@@ -62,7 +62,7 @@ def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
 def uncertainty_of(course: Signal) -> Uncertainty:
     """The parts of a course's uncertainty."""
     zero = np.full_like(course.mean, np.hypot(course.accuracy.zero, course.accuracy.cut))
-    shared = np.array([zero, course.accuracy.gain * course.mean])
+    shared = np.array([zero, course.accuracy.gain * course.read])
     random = course.scatter / np.sqrt(np.maximum(course.count, 1))
     local = np.sqrt(np.maximum(course.uncertainty**2 - random**2 - np.sum(shared**2, axis=0), 0.0))
     return Uncertainty(random, local, shared, course.count, course.turns - course.mean)

@@ -10,17 +10,15 @@ import numpy as np
 from trunnion.errors import Finding, Severity, Status
 from trunnion.results.sentences import finding_for
 from trunnion.rig.comparison.error_sources import KINDS
-from trunnion.rig.comparison.explanations import LENGTHS
 from trunnion.rig.comparison.findings import other_speed
 from trunnion.rig.comparison.wording import said
 from trunnion.rig.identification.assessment import Assessment
-from trunnion.rig.identification.blocks import shared_zero
 from trunnion.rig.identification.fit import FAR
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns, known_of, sizes_of
 from trunnion.rig.identification.misfit import MisfitCause, OwnSize
-from trunnion.rig.identification.number_text import amount, share
+from trunnion.rig.identification.number_text import amount, joined, share
 from trunnion.rig.identification.outstanding import Outstanding, outstanding
-from trunnion.rig.identification.sensor_findings import of_sensors
+from trunnion.rig.identification.sensor_findings import exact_channels, of_sensors
 from trunnion.rig.identification.uncertainty import quantile
 from trunnion.rig.reading.log import few_digits
 from trunnion.rig.reading.measurement import zeros_of_files
@@ -29,6 +27,7 @@ from trunnion.rig.reading.units_taken import read_as
 __all__ = ["sentences"]
 
 ALIKE = 0.95  # correlation from which two are hardly told apart
+WELL = 0.03  # of an estimate: U of one that is known well all the same
 MUCH = 3.0  # times what scatter explains, between conditions
 POOR = 2.0  # times what is expected, of predictions
 MOST_NAMED = 3
@@ -37,6 +36,7 @@ MOST_TOLD = 4
 FEW = 5.0  # degrees of freedom
 DOUBTFUL = 0.05  # a chance below which a misfit is spoken of
 OF_DRIVE = "its readings are the angle of the drive: check the column of the channel"
+OF_GAIN = "a gain error of {:+.2g} % would explain it: check gain and unit of the channel, and lengths of the model"
 LENGTH = "check the lengths of the model and the zero of the angle, or identify a length that acts on it"
 FACTOR = 0.5  # of a gain: told as a factor from here on
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
@@ -44,14 +44,10 @@ NUMBERS = ("no", "one", "two", "three", "four", "five", "six")
 
 def sentences(judged: Assessment) -> list[Finding]:
     """Errors and warnings first."""
-    parts = (_speeds, _search, _fit, _unused, _groups, _near, _limits, of_sensors, _exact, _data, _held)
+    parts = (_speeds, _search, _fit, _unused, _groups, _near, _limits, of_sensors, exact_channels, _data, _held)
     found = [one for part in parts for one in part(judged)]
     order = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
     return sorted(found, key=lambda one: order.index(one.severity))
-
-
-def _joined(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _count(number: int, what: str) -> str:
@@ -136,7 +132,11 @@ def _unused(judged: Assessment) -> Iterator[Finding]:
     missing = {} if ahead else unused.missing(judged.told, judged.late)
     fine = [name for name in dict.fromkeys(block.channel for block in unused.blocks) if name not in missing]
     if fine:
-        yield finding_for("fit.unused", "channels", channels=fine)
+        steps = any(one.kind == "delay" and not one.channel for one in judged.problem.sensors)  # of the angle
+        more = [name for name in unused.moving(judged.told) if steps and name in fine]
+        names = dict.fromkeys([*(block.channel for block in judged.problem.blocks), *more])
+        taken = " ".join(f"--channel {name}" for name in names if more)
+        yield finding_for("fit.unused", "channels", channels=fine, phrases={"taken": taken})
     units = {block.channel: block.course.shown for block in unused.blocks}
     for name, one in missing.items():
         unit, size = units[name]
@@ -144,7 +144,7 @@ def _unused(judged: Assessment) -> Iterator[Finding]:
             "rms_told": said(one.rms / size, unit), "known_told": said(one.expected / size, unit),
             "of": "once its zero and gain are fitted" if one.shape else "about the mean",
             "by": "scatter" if one.shape else "standard uncertainty",
-            "remedy": OF_DRIVE if one.drive else LENGTH,
+            "remedy": OF_DRIVE if one.drive else LENGTH if np.isnan(one.gain) else OF_GAIN.format(100 * one.gain),
         }  # fmt: skip
         yield finding_for("fit.unused_missed", f"channels.{name}", phrases=phrases, rms=one.rms, expected=one.expected)
 
@@ -178,16 +178,17 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     first = found[0]
     also = [_story(judged, one) for one in found[1:]]
     also_told = f"; {' or '.join(also)} would explain as much" if also else ""
-    rows = zip(problem.model.unknowns, first.estimates, first.halves, strict=True)
-    known = [f"{one.name} = {amount(value, half, one.unit)}" for one, value, half in rows if np.isfinite(half)]
-    unit = {"shift": "rad", "delay": "s", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
+    lengths = [one.channel for one in found if one.kind == "length"]
+    unit = {"shift": "rad", "delay": "s", "length": "m", "zero": _unit_of(judged, first.channel)}.get(first.kind, "1")
     phrases = {
-        "story": _story(judged, first), "also": also_told, "estimates": _joined(known), "channel": first.channel,
+        "story": _story(judged, first), "also": also_told, "estimates": _estimates(judged, first),
+        "channel": " or ".join(lengths) if first.kind == "length" else first.channel,
         "times": f", {few_digits(judged.times_stated)} times its stated standard uncertainty,"
         if judged.times_stated > FAR else "",
         "left": f", reduced χ² {_times(first.left.reduced)} remains" if first.left.misfit else "",
-        "before": f"{LENGTHS}, then " if first.left.misfit and _moves(judged, first) else "",
-        "odd": _joined(_odd(judged, first)), "files": _zeros(judged, first),
+        "lengths": f"check {' or '.join(lengths)} of the model first (--parameter {lengths[0]} identifies it); "
+        if lengths and first.kind != "length" else "",
+        "odd": joined(_odd(judged, first)), "files": _zeros(judged, first),
         "size_told": amount(first.size, None, unit) if first.kind != "shift" else f"{np.degrees(first.size):+.3g} deg",
     }  # fmt: skip
     each: dict[str, Any] = {"conditions": {_condition(judged, one): one.size for one in first.own}} if first.own else {}
@@ -198,9 +199,10 @@ def _causes(judged: Assessment) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _moves(judged: Assessment, one: MisfitCause) -> bool:
-    """Whether it is an offset of a motion, on which lengths act."""
-    return one.kind == "zero" and judged.problem.model.measures[one.channel].of_motion
+def _estimates(judged: Assessment, one: MisfitCause) -> str:
+    """What the unknowns would be with a cause."""
+    rows = zip(judged.problem.model.unknowns, one.estimates, one.halves, strict=True)
+    return joined([f"{own.name} = {amount(value, half, own.unit)}" for own, value, half in rows if np.isfinite(half)])
 
 
 def _zeros(judged: Assessment, one: MisfitCause) -> str:
@@ -241,7 +243,11 @@ def _story(judged: Assessment, one: MisfitCause) -> str:
         "delay": "a delay of all channels",
         "zero": f"a constant offset of {one.channel}",
         "gain": f"a gain error of {one.channel}",
+        "length": f"a length {one.channel} {'larger' if one.size > 0 else 'smaller'} than the model's by",
     }.get(one.kind)
+    if one.kind == "length":
+        with_it = f" (with {_estimates(judged, one)})" if one is not judged.found.causes[0] else ""
+        return f"{what} {amount(abs(one.size), one.expanded, 'm')}{with_it}"
     if what is None:
         return f"{KINDS[one.kind]} of {one.channel}"
     if not one.own and one.kind == "gain" and abs(one.size) >= FACTOR:
@@ -271,6 +277,11 @@ def _read_as(judged: Assessment, one: MisfitCause) -> str:
         return ""
     sizes = [own.size for own in _apart(one)[0]] if one.own else [one.size]
     return read_as([1 + size for size in sizes], *course.shown)
+
+
+def _of_unit(judged: Assessment) -> bool:
+    """Whether what explains a misfit is a unit taken for another."""
+    return any(_read_as(judged, one) for one in judged.found.causes[:1])
 
 
 def _sized(judged: Assessment, one: MisfitCause, size: float, expanded: float | None) -> str:
@@ -307,27 +318,32 @@ def _groups(judged: Assessment) -> Iterator[Finding]:
         phrases = {"unknowns": _count(many, "unknown"), "out_told": f" ({out} more are left out)" if out else ""}
         yield finding_for("fit.few_positions", "data", phrases=phrases, positions=used, unknowns=many)
         return
-    for group in judged.found.groups:
+    for group in [] if _of_unit(judged) else judged.found.groups:
         names = [_name(judged, i) for i in group.members]
-        channels = _joined(list(dict.fromkeys(block.channel for block in judged.problem.blocks if block.fitted)))
+        channels = joined(list(dict.fromkeys(block.channel for block in judged.problem.blocks if block.fitted)))
         where = f"parameter {names[0]}"
         if len(group.members) == 1:
             yield finding_for("parameter.no_effect", where, name=names[0], phrases={"channels": channels})
             continue
         same = "the same" if group.exact else "nearly the same"
-        alike = f"{_joined(names)} are not separately identifiable: they have {same} effect on {channels}"
+        alike = f"{joined(names)} are not separately identifiable: they have {same} effect on {channels}"
         some = "one" if len(names) == 2 else "some"
         phrases = {"alike": alike, "known": _known(judged, group, names), "some": some}
         yield finding_for("parameter.not_told_apart", where, phrases=phrases, names=names)
 
 
 def _near(judged: Assessment) -> Iterator[Finding]:
-    """Pairs that are separately identifiable, but badly: what of them is known far better than either."""
-    n = judged.problem.count
+    """Pairs that are separately identifiable, but badly: what of them is known far better than either.
+
+    Not those that are both known well, nor where a wrong unit makes nonsense of both.
+    """
+    n = 0 if _of_unit(judged) else judged.problem.count
     size = sizes_of(judged.problem, judged.found.x)
+    half = quantile(judged.found.spread.freedom) * judged.deviation
+    well = half[: judged.problem.count] < WELL * np.abs(judged.estimate)
     for p in range(n):
         for q in range(p):
-            if not abs(judged.correlation[p, q]) > ALIKE:  # NaN of what is not identifiable
+            if not abs(judged.correlation[p, q]) > ALIKE or (well[p] and well[q]):  # NaN of what is not identifiable
                 continue
             pair = (q, p)
             known = known_of(judged.problem, judged.found.x, judged.found.spread, pair, size)
@@ -432,24 +448,6 @@ def _limits(judged: Assessment) -> Iterator[Finding]:
             value = judged.estimate[p]
             phrases = {"told": amount(value, half, unknown.unit)}
             yield finding_for("parameter.hardly_known", where, phrases=phrases, value=value, half=half)
-
-
-def _exact(judged: Assessment) -> Iterator[Finding]:
-    """Channels whose zero and gain are taken as exact: of torques and forces that is hardly so."""
-    measures = judged.problem.model.measures
-    known: dict[str, bool] = {}
-    for one in judged.problem.blocks:
-        accuracy = one.course.accuracy
-        if one.fitted:
-            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain or accuracy.stated)
-            known[one.channel] = known.get(one.channel, False) or stated
-    bare = [channel for channel, stated in known.items() if not stated]
-    forces = [channel for channel in bare if not measures[channel].of_motion]
-    for channels, severity in ((forces, Severity.WARNING), ([one for one in bare if one not in forces], Severity.NOTE)):
-        if channels:
-            narrow = ", and the intervals are too narrow" if severity is Severity.WARNING else ""
-            phrases = {"channels": _joined(channels), "too_narrow": narrow}
-            yield finding_for("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)
 
 
 def _data(judged: Assessment) -> Iterator[Finding]:

@@ -1,9 +1,9 @@
 """Least squares with exact derivatives: residuals of all blocks, and of the errors that are stated of the sensors.
 
-A sensor reads (1 + g) f + z of what there is: f of the model, g and z its errors, the same at every position. They
-are unknowns too, in units of their standard uncertainties, each with the observation 0 ± 1: what is stated of it, and
-within ± `most`: what is further off is no error that was stated. So is a delay τ of the sensor behind the angle, of
-which f − τ df/dt is there to be read.
+A sensor reads (1 + g) f + z of what there is: f of the model, counted from the datum of the sensor, g and z its errors,
+the same at every position. They are unknowns too, in units of their standard uncertainties, each with the observation
+0 ± 1: what is stated of it, and within ± `most`: what is further off is no error that was stated. So is a delay τ of
+the sensor behind the angle, of which f − τ df/dt is there to be read.
 """
 
 from __future__ import annotations
@@ -249,11 +249,12 @@ class FitProblem:
         if late:
             slope = slope - late * self.model.rate(block.condition, slope)
         seen = value - late * rate
+        datum = block.course.accuracy.datum
         columns = np.zeros((len(x), size))
         columns[: self.count] = gain * slope
         for s, kind, u in errors:
-            columns[s] = {"delay": -gain * u * rate, "gain": u * seen}.get(kind, u)
-        return gain * seen + zero, columns
+            columns[s] = {"delay": -gain * u * rate, "gain": u * (seen - datum)}.get(kind, u)
+        return gain * (seen - datum) + datum + zero, columns
 
     def misses(self, x: Array, k: int, data: Array) -> Array:
         """Data less what the sensor would read, (…, position); angles by the nearest turn."""

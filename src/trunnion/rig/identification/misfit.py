@@ -1,8 +1,9 @@
 """What one error of the crank angle or of a sensor would explain of a misfit, and what the estimates would be without.
 
-The candidates are those of a comparison (`rig.comparison.error_sources`), each as one more unknown of the fit: the same
-machinery finds its size, its uncertainty and the estimates that go with it. The simplest one is named that explains
-enough: first those that all conditions share, then those of which each condition has its own.
+The candidates are those of a comparison (`rig.comparison.error_sources`), and lengths of the model that act like the
+residuals, each as one more unknown of the fit: the same machinery finds its size, its uncertainty and the estimates
+that go with it. The simplest one is named that explains enough: first those that all conditions share, then those of
+which each condition has its own.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 from trunnion.rig.comparison.error_sources import ENOUGH, Cause, causes
 from trunnion.rig.identification.blocks import Block
 from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, SensorError
+from trunnion.rig.identification.lengths import likely_lengths
 from trunnion.rig.identification.search import Search, inside, refined
 from trunnion.rig.identification.uncertainty import Test, lack_of_fit, quantile, spread_of
+from trunnion.rig.identification.unknowns import Unknown
 from trunnion.rig.identification.unused import UnusedChannels
 
 __all__ = ["MisfitCause", "OwnSize", "explanations"]
@@ -32,6 +35,7 @@ ROUNDS = 5
 BEYOND = 4.0  # standard uncertainties: an error of one condition so far from what is stated explains the misfit itself
 OTHER = 0.05  # of a speed, by which conditions differ enough to tell a delay from an offset of the angle
 LEAST = 1e-6  # of the model, that a wrong unit may have a sensor read: N mm for kN m
+NEARLY = 0.95  # of a misfit that a length has to explain which leaves one
 ALIKE = 3.0  # standard deviations of χ², within which two candidates explain the same
 
 
@@ -47,7 +51,8 @@ class OwnSize(NamedTuple):
 class MisfitCause:
     """One explanation of a misfit.
 
-    kind: as in `error_sources.KINDS`, or "delay"; channel: empty of what all channels have in common; size: of a shift
+    kind: as in `error_sources.KINDS`, "delay" or "length"; channel: empty of what all channels have in common, of a
+    length its name; size: of a length by how much it is larger than the model's, m, of a shift
     rad by which the readings are ahead of the model, of a delay s, of a zero in the unit of the channel, of a gain
     relative; expanded: U of it, 95 %; explains: share of the misfit, the part of χ² above what scatter leads to expect;
     estimates, halves: of the unknowns with it, (unknown,), and U of each, 95 %; left: how well the model fits with it;
@@ -71,7 +76,7 @@ class _Refit:
     """A fit with one candidate more.
 
     size: of the one that all conditions share; where each of `conditions` has its own, sizes of these. What was fitted
-    of it is last in x, in units of `scale`; nothing of it where that is 0.
+    of it is last in x, in units of `scale`, of a length the last unknown; nothing of it where that is 0.
     """
 
     kind: str
@@ -90,7 +95,7 @@ class _Refit:
     @property
     def strange(self) -> bool:
         """Whether what is stated of a single condition or file is far off with it: these then explain the misfit."""
-        first, count = self.problem.count, len(self.sizes) * (self.scale != 0)
+        first, count = self.problem.count, len(self.sizes) * (self.scale != 0 and self.kind != "length")
         told = zip(self.problem.sensors[: len(self.problem.sensors) - count], self.fit.x[first:], strict=False)
         return any(one.stated and bool(one.group) and abs(x) > BEYOND for one, x in told)
 
@@ -101,7 +106,8 @@ def explanations(
     """The simplest error that explains most of a misfit, and others that explain as much; empty if none does.
 
     One whose size is 0 within its uncertainty explains nothing; what each condition has by itself is named only where
-    nothing that they share explains as much. unused: channels that are not fitted; they may speak against a shift.
+    nothing that they share explains as much; a length, of which there are many, where it explains nearly all.
+    unused: channels that are not fitted; they may speak against a shift.
     """
     tried = [
         one for one in _candidates(problem, search) if np.isfinite(one.fit.cost) and not one.strange and not one.bounded
@@ -112,7 +118,10 @@ def explanations(
     chance = 1 + ALIKE * np.sqrt(2 / max(test.freedom, 2.0))  # of the ratio of two reduced χ²
     least = min((one for one in left if np.isfinite(one)), default=float("nan"))
     rows, most = zip(tried, tests, explained, strict=True), chance * max(least, 1.0)
-    found = [_cause(one, share, rest) for one, rest, share in rows if share >= ENOUGH and rest.reduced <= most]
+    found = [
+        _cause(one, share, rest) for one, rest, share in rows
+        if share >= (NEARLY if one.kind == "length" and rest.misfit else ENOUGH) and rest.reduced <= most
+    ]  # fmt: skip
     found = [one for one in found if one.kind == "sign" or abs(one.size) > one.expanded]
     if unused is not None:
         found = [one for one in found if one.kind != "shift" or not unused.refute(one.estimates, _ahead(problem, one))]
@@ -131,8 +140,9 @@ def _cause(one: _Refit, explains: float, left: Test) -> MisfitCause:
     """A candidate with its uncertainty."""
     spread = spread_of(one.problem, one.fit.x)
     half = quantile(spread.freedom) * np.sqrt(np.maximum(np.diagonal(spread.covariance), 0.0))
-    count = one.problem.count
-    wide = [float(row) for row in half[-len(one.sizes) :] * one.scale]
+    count = one.problem.count - (one.kind == "length")
+    own_half = half[count : count + 1] if one.kind == "length" else half[-len(one.sizes) :]
+    wide = [float(row) for row in own_half * one.scale]
     k = int(np.argmax(np.abs(one.sizes)))
     own = tuple(map(OwnSize, one.conditions, one.sizes, wide))
     return MisfitCause(
@@ -144,7 +154,7 @@ def _cause(one: _Refit, explains: float, left: Test) -> MisfitCause:
 
 
 def _candidates(problem: FitProblem, search: Search) -> Iterator[_Refit]:
-    """Fits with a wrong sign, an offset or a wrong gain of each channel, a shift of the angle, a delay; then
+    """Fits with a wrong sign, an offset or a wrong gain of each channel, a shift of the angle, a delay, a length; then
     the same of each condition by itself."""
     start = np.concatenate([search.start, np.zeros(len(problem.sensors))])
     channels = list(dict.fromkeys(block.channel for block in problem.blocks if block.fitted))
@@ -156,6 +166,8 @@ def _candidates(problem: FitProblem, search: Search) -> Iterator[_Refit]:
         yield from _sensor(problem, start, kind, channel)
     yield from _shifted(problem, start)
     yield from _late(problem, start)
+    for length in likely_lengths(problem, search.fit.x):
+        yield _length(problem, start, length)
     if len(everywhere) > 1:
         yield from _shifted(problem, start, everywhere)
         for kind, channel in kinds:
@@ -298,3 +310,12 @@ def _late(problem: FitProblem, start: Array) -> Iterator[_Refit]:
     sizes = tuple(MILLISECOND * _of_course(block) for block in problem.blocks)
     more, found = _with(problem, start, [SensorError("delay of all channels", "", "delay", sizes, stated=False)])
     yield _Refit("delay", "", more, found, (float(found.x[-1]) * MILLISECOND,), MILLISECOND)
+
+
+def _length(problem: FitProblem, start: Array, length: Unknown) -> _Refit:
+    """A length of the model, as one unknown more."""
+    n = problem.count
+    model = replace(problem.model, unknowns=(*problem.model.unknowns, length))
+    more = FitProblem(model, problem.blocks, problem.sensors, problem.guard, progress=problem.progress)
+    found = _refit(more, np.insert(start, n, length.start))
+    return _Refit("length", length.name, more, found, (float(found.x[n]) - length.start,), 1.0)

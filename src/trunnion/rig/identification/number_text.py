@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-__all__ = ["amount", "decimals", "scaled", "share"]
+__all__ = ["amount", "decimals", "joined", "scaled", "share"]
 
 READ = {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, ""), "": (1.0, "")}
 
@@ -43,3 +44,8 @@ def amount(value: float, half: float | None, unit: str) -> str:
 def share(part: float) -> str:
     """A share in whole percent."""
     return f"{100 * part:.0f} %"
+
+
+def joined(names: Sequence[str]) -> str:
+    """Names one after the other."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

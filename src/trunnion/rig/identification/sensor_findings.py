@@ -9,13 +9,13 @@ import numpy as np
 from trunnion.errors import Finding, Severity
 from trunnion.results.sentences import finding_for
 from trunnion.rig.identification.assessment import Assessment
-from trunnion.rig.identification.blocks import OWN
+from trunnion.rig.identification.blocks import OWN, shared_zero
 from trunnion.rig.identification.fit import SensorError
-from trunnion.rig.identification.number_text import share
+from trunnion.rig.identification.number_text import joined, share
 from trunnion.rig.identification.uncertainty import RANDOM, STATED
 from trunnion.rig.reading.log import few_digits
 
-__all__ = ["of_sensors"]
+__all__ = ["exact_channels", "of_sensors"]
 
 FAR = 3.0  # standard uncertainties from what was stated of a sensor
 MOSTLY = 0.5  # of the variance
@@ -66,3 +66,21 @@ def _size(judged: Assessment, sensor: SensorError, value: float) -> str:
     factor, unit = {"gain": (100.0, "%"), "delay": (1e3, "ms")}.get(sensor.kind, (1 / size, unit))
     told = few_digits(abs(value) * max(map(abs, sensor.sizes)) * factor)
     return told if unit == "1" else f"{told} {unit}"
+
+
+def exact_channels(judged: Assessment) -> Iterator[Finding]:
+    """Channels whose zero and gain are taken as exact: of torques and forces that is hardly so."""
+    measures = judged.problem.model.measures
+    known: dict[str, bool] = {}
+    for one in judged.problem.blocks:
+        accuracy = one.course.accuracy
+        if one.fitted:
+            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain or accuracy.stated)
+            known[one.channel] = known.get(one.channel, False) or stated
+    bare = [channel for channel, stated in known.items() if not stated]
+    forces = [channel for channel in bare if not measures[channel].of_motion]
+    for channels, severity in ((forces, Severity.WARNING), ([one for one in bare if one not in forces], Severity.NOTE)):
+        if channels:
+            narrow = ", and the intervals are too narrow" if severity is Severity.WARNING else ""
+            phrases = {"channels": joined(channels), "too_narrow": narrow}
+            yield finding_for("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)

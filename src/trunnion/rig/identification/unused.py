@@ -27,13 +27,14 @@ class Missed(NamedTuple):
     """A channel that the model misses: RMS of its residual and what is expected of it.
 
     shape: of what is left once zero and gain are fitted, against the scatter alone; drive: whether it is the
-    angle of the drive.
+    angle of the drive; gain: relative error of the gain that explains it, NaN if none does.
     """
 
     rms: float
     expected: float
     shape: bool
     drive: bool
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -112,8 +113,29 @@ class UnusedChannels:
                 rms, known = figures(at, block, 0.0, (mean, float(np.hypot(wide, self.delay))))
                 before = found.get(block.channel)
                 if rms > MISSES * known and (before is None or (before.shape == shape and rms > before.rms)):
-                    found[block.channel] = Missed(rms, known, shape, self._of_drive(at, block))
+                    found[block.channel] = Missed(
+                        rms, known, shape, self._of_drive(at, block), np.nan if shape else self._gain(at, block)
+                    )
         return found
+
+    def _gain(self, at: Array, block: Block) -> float:
+        """The error of a gain, relative, that explains a residual about its mean; NaN of angles, and if none does."""
+        model, said, gap = self._gap(at, block, 0.0)
+        there = np.isfinite(gap) & np.isfinite(said)
+        around, left = (one[there] - np.mean(one[there]) for one in (said, gap))
+        square = float(np.sum(around**2))
+        gain = float(np.sum(left * around)) / square if square > 0 else np.nan
+        explains = gain**2 * square >= ENOUGH * float(np.sum(left**2))
+        return gain if explains and not model.measures[block.channel].turning(model.run.system) else np.nan
+
+    def moving(self, at: Array) -> list[str]:
+        """Channels whose course varies over the cycle, which therefore tells of the angle."""
+        found: dict[str, None] = {}
+        for block, said in ((one, self._gap(at, one, 0.0)[1]) for one in self.blocks):
+            known = said[np.isfinite(said)]
+            if known.size >= FEWEST and np.ptp(known) > FLAT * np.max(np.abs(known)):
+                found[block.channel] = None
+        return list(found)
 
     def _of_drive(self, at: Array, block: Block) -> bool:
         """Whether the readings of an angle are those of the drive."""

@@ -73,6 +73,11 @@ class ChannelReading:
         off = readings - zero.value
         return sign * self.scale.factor * (off - zero.drift * (seconds - zero.since) if zero.drift else off)
 
+    def live(self, zero: Amount) -> bool:
+        """Whether a zero is what the sensor gives of nothing, as 4 mA: stated of readings that are not the quantity."""
+        stated = zero.plain or alike(zero.dimensions, self.scale.of_reading)
+        return stated and not alike(self.scale.of_reading, self.scale.of_quantity)
+
 
 def reading(name: str, channel: Channel, column: Column, account: Account) -> ChannelReading:
     """The unit of a channel's readings: the mapping's, else the file's, else that of what it measures in SI."""

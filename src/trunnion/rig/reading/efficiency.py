@@ -252,12 +252,12 @@ def _weights(
 
 
 def _type_b(weights: Mapping[str, tuple[Signal, Array]]) -> list[UncertaintyContribution]:
-    """Contributions of gain, zero and resolution, channel by channel: x → (1 + gain) x + zero."""
+    """Contributions of gain, zero and resolution, channel by channel: of what it reads, x → (1 + gain) x + zero."""
     found = []
     for name, (course, weight) in weights.items():
-        by_zero = float(np.nanmean(weight))
+        by_zero, read = float(np.nanmean(weight)), course.turns - course.accuracy.datum
         found += [
-            UncertaintyContribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * course.turns))),
+            UncertaintyContribution(name, "gain", course.accuracy.gain, float(np.nanmean(weight * read))),
             UncertaintyContribution(name, "zero", course.accuracy.zero, by_zero),
             UncertaintyContribution(name, "resolution", course.unresolved, by_zero),
         ]

@@ -202,7 +202,7 @@ def _clipped(
     if count > MOST * finite:  # what is left says nothing of the channel
         what = f"clipped: {counted(count, 'reading')} of {finite:,} at or beyond the end of {end}"
         figures = {"count": count, "readings": finite}
-        remedy = "check unit, gain and range of the channel in the mapping; else use a larger range"
+        remedy = "check column, unit, gain and range of the channel in the mapping; else use a larger range"
         raise MechanismError(
             Finding(what, where, remedy, file=account.file, code="data.readings.clipped", figures=figures)
         )

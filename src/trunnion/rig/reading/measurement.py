@@ -49,7 +49,8 @@ class Accuracy:
     zero: of its zero, in the unit of the course; gain: of its gain, relative; they are the same at every position of
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
-    of `zero` is the same in all files. stated: of a value of one start, by itself. cut: of what all readings are off by
+    of `zero` is the same in all files. datum: value at which the sensor reads 0, in the unit of the course; an error of
+    its gain acts on value − datum. stated: of a value of one start, by itself. cut: of what all readings are off by
     alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`. left:
     what of the error by the resolution all turns repeat, so that averaging leaves it; None for all of step/√12.
     """
@@ -61,6 +62,7 @@ class Accuracy:
     stated: float = 0.0
     cut: float = 0.0
     left: LeftOfSteps | None = None
+    datum: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,11 @@ class Signal:
             warnings.simplefilter("ignore", RuntimeWarning)
             return np.asarray(np.nanmean(self.turns, axis=0))
 
+    @property
+    def read(self) -> Array:
+        """Mean of what the sensor reads, in the unit of the course, (position,): on which an error of its gain acts."""
+        return self.mean - self.accuracy.datum
+
     @cached_property
     def scatter(self) -> Array:
         """Standard deviation between turns, (position,); NaN with fewer than two."""
@@ -127,7 +134,7 @@ class Signal:
         repeated = np.where((self.count == 1) & (self.accuracy.stated > 0), 0.0, repeated)
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
             known = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
-            return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.mean) ** 2))
+            return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.read) ** 2))
 
 
 @dataclass(frozen=True)

@@ -421,10 +421,11 @@ class _File:
             extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
-            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file)
-            nothing = None
+            datum, nothing = 0.0, None
             if isinstance(channel.zero, Amount):
                 nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
+                datum = 0.0 if own.live(channel.zero) else -nothing[0] * nothing[1]
+            accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file, datum=datum)
             course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=part.left.get(name)))

@@ -134,18 +134,20 @@ def conditions(result: xr.Dataset) -> TextTable:
 
 def sensors(result: xr.Dataset) -> TextTable:
     """What each channel measures, with the standard uncertainties of its zero and gain."""
-    measures = attribute(result, "channel_measures")
+    measures, held = attribute(result, "channel_measures"), attribute(result, "channel_read_in")
     rows = []
-    for i, (name, unit) in enumerate(zip(names(result, "channel"), units(result), strict=True)):
+    for i, (name, own) in enumerate(zip(names(result, "channel"), units(result), strict=True)):
+        read, size = held[i] if held else ("", 1.0)
+        unit = read or own
         zero, gain = (_spread(result[f"accuracy_{what}"].values[i]) for what in ("zero", "gain"))
-        zeros = " to ".join(dict.fromkeys(_small(one, unit) if one else "0" for one in zero)) or NONE
+        zeros = " to ".join(dict.fromkeys(_small(one, own, read, size) if one else "0" for one in zero)) or NONE
         gains = " to ".join(dict.fromkeys(f"{number(100 * one, 3)}\u00a0%" if one else "0" for one in gain)) or NONE
         rows.append([name, measures[i], "" if unit == "1" else unit, zeros, gains])
     return TextTable("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
 
 
-def _small(value: float, unit: str) -> str:
-    factor, shown = prefixed(value, unit)
+def _small(value: float, unit: str, read: str, size: float) -> str:
+    factor, shown = (1 / size, read) if read and size != 1 else prefixed(value, unit)
     return text(value * factor, shown)
 
 

@@ -368,8 +368,12 @@ def test_what_masses_hold_is_no_self_locking() -> None:
     assert found["efficiency_reverse"].note == "held without friction"
 
 
-def test_effort_to_open_a_clamp_past_its_dead_centre() -> None:
-    """A crank presses a slider against a spring past the dead centre: what opens it is at the stop, by statics."""
+@pytest.mark.parametrize("share", [0.0, 0.95, 1.05])
+def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
+    """A crank presses a slider against a spring past the dead centre: what opens it is at the stop, by statics.
+
+    A moment on the crank that is not useful takes a share of it; with more than all of it the clamp opens by itself.
+    """
     r, rod, stiffness, pressed, mu, stop = 0.02, 0.08, 5e4, 0.002, 0.1, np.radians(3.0)
     model = {
         "name": "Clamp",
@@ -398,12 +402,20 @@ def test_effort_to_open_a_clamp_past_its_dead_centre() -> None:
         "drivers": {"O": {"range": ["-60 deg", "3 deg"], "speed": "60 deg/s"}},
         "assembly": {"B": [0.09, 0]},
     }
-    run = prepare(Mechanism(**model))
-    found = look(run, 64)
-    row = next(one for one in report_figures(run, found) if one.name == "O.effort_reverse")
     tilt = np.arcsin(r * np.sin(stop) / rod)
     force = stiffness * (r * np.cos(stop) + rod * np.cos(tilt) - (r + rod - pressed)) / np.cos(tilt)
     opens = -force * r * np.sin(stop + tilt) - mu * 0.004 * force
+    if share:
+        model["loads"] = {"back": {"link": "crank", "moment": share * opens}}
+    run = prepare(Mechanism(**model))
+    found = look(run, 64)
+    assert found["drive_effort_reverse"].values[0, -1] == pytest.approx((1 - share) * opens, rel=1e-9)
+    there = {0.0: LockingState.DRIVEN_ON, 0.95: LockingState.SELF_LOCKING_FORWARD, 1.05: LockingState.BACKDRIVABLE}
+    assert found["locking_state"].values[-1] == there[share]
+    assert np.isfinite(found["holding_multiple"].values[-1]) == (share == 0.95)
+    if share:
+        return
+    row = next(one for one in report_figures(run, found) if one.name == "O.effort_reverse")
     assert row.place == "at 3°"
     assert row.value == pytest.approx(opens, rel=1e-9)
     assert float(found["drive_effort_reverse"].max()) > 0  # where the spring opens it, it is held back

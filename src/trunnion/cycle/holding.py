@@ -47,8 +47,10 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
         return Figure(name, subject, None, note=_beside(run))
     states = {one for one in PUSHES if one in state}
     value, held = min(delivered / given, 1.0), states <= {LockingState.SELF_LOCKING}
+    if value <= 0 and not _by_friction(run, back):
+        return Figure(name, subject, value, note="held without friction")
     if value <= 0 and held:
-        return Figure(name, subject, value, note="self-locking" if _by_friction(run, back) else "held without friction")
+        return Figure(name, subject, value, note="self-locking")
     if value <= 0:
         return Figure(name, subject, value, note="it takes work on the whole; see the ranges of `locking`")
     differ = len(states) > 1 and felt(run.system, run.values)
@@ -106,8 +108,9 @@ def holding_multiples(run: Run, time: Array, ahead: Passage, back: Passage) -> A
     held without the friction that follows loads. ahead, back: the positions passed forward and backward.
     """
     found = np.full(len(time), np.nan)
-    for way, turned in ((ahead, False), (back, True)):
-        at = np.flatnonzero(pushed(way) & (way.locked | (way.delivered <= 0)))
+    for way, other, turned in ((ahead, back, False), (back, ahead, True)):
+        leaves = ~other.locked & pushed(other._replace(given=other.delivered))  # driven the other way by other loads
+        at = np.flatnonzero(pushed(way) & (way.locked | (way.delivered <= 0)) & ~leaves)
         if len(at):
             found[at] = root(_released(run, time[at], turned), np.zeros(len(at)), np.ones(len(at)))
     return found

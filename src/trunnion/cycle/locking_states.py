@@ -40,14 +40,14 @@ class LockingState(Coded):
     """What friction does at a position: forward, and when all speeds are reversed."""
 
     RUNS = 0, "runs; the useful loads push it neither backward nor forward"
-    BACKDRIVABLE = 1, "can be backdriven by the useful loads"
+    BACKDRIVABLE = 1, "can be backdriven: the loads drive it backward, and the drive brakes it"
     SELF_LOCKING = 2, "self-locking: the useful loads push it backward, but do not overcome friction"
     LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward"
     LOCKED = 4, "locked: no drive effort can move it forward"
     JAMMED = 5, "jammed: locked forward and backward"
     UNSOLVED = 6, "not solved"
     SELF_LOCKING_FORWARD = 7, "self-locking: the useful loads push it forward, but do not overcome friction"
-    DRIVEN_ON = 8, "the useful loads drive it forward, and the drive brakes it"
+    DRIVEN_ON = 8, "the loads drive it forward, and the drive brakes it"
 
     @property
     def short(self) -> str:
@@ -101,20 +101,23 @@ def _least(of: Passage) -> float:
 
 def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
     """The code of `LockingState` of every position. ahead, back: the positions passed forward and backward; known:
-    where the forces or the cause of locking are; least: see `pushed`."""
+    where the forces or the cause of locking are; least: see `pushed`.
+
+    Which way the useful loads push tells where they matter; whether it moves there without the drive, all that acts.
+    """
     least = _least(back) if least is None else least
     driven = pushed(back, least) & ~back.locked
-    held = -ahead.delivered > least  # the drive must push against friction
     beyond = pushed(ahead, least)
+    runs_back, runs_on = driven & (back.delivered > 0), beyond & (-ahead.delivered <= least)
     cases = [
         (~known, LockingState.UNSOLVED),
         (ahead.locked & back.locked, LockingState.JAMMED),
         (ahead.locked, LockingState.LOCKED),
         (back.locked, LockingState.LOCKED_BACKWARD),
-        (driven & (back.delivered > 0), LockingState.BACKDRIVABLE),
+        (runs_back | (beyond & (back.delivered > least)), LockingState.BACKDRIVABLE),
+        (runs_on | (driven & (ahead.delivered > least)), LockingState.DRIVEN_ON),
         (driven, LockingState.SELF_LOCKING),
-        (beyond & held, LockingState.SELF_LOCKING_FORWARD),
-        (beyond, LockingState.DRIVEN_ON),
+        (beyond, LockingState.SELF_LOCKING_FORWARD),
     ]
     found = np.full(len(known), int(LockingState.RUNS), np.int8)
     for where, state in reversed(cases):

@@ -417,3 +417,13 @@ def test_points_without_errors_stand_beside_those_with() -> None:
     assert float(swept["efficiency"][0]) == float(swept["efficiency_ideal"][0])
     assert float(swept["transmission_error_max"].max("joint")[0]) == 0
     assert float(swept["efficiency"][1]) < float(swept["efficiency_ideal"][1])
+
+
+def test_a_length_that_is_swept_in_its_unit_is_no_plain_number() -> None:
+    """So that no point asks for a unit; plain numbers far above the others are asked about."""
+    model = read("toleranced-slider-crank")
+    (name,) = [one for one in ("rod", "l") if one in model.dimensions]
+    clean = trunnion.sweep(model, {name: ("150 mm", "400 mm", 3)}, STEPS)
+    assert not [one for one in clean.trunnion.findings if "unit" in one.what]
+    plain = trunnion.sweep(model, {name: [250.0]}, STEPS)
+    assert [one for one in plain.trunnion.findings if "unit" in one.what]

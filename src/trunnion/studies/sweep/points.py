@@ -111,7 +111,7 @@ class Points:
         """The mechanism of a point by itself; MechanismError says at which."""
         with named(self.swept, index):
             changed = self.mechanism.with_values(
-                {one.path: float(one.values[i]) for one, i in zip(self.swept, index, strict=True)}
+                {one.path: one.stated(i) for one, i in zip(self.swept, index, strict=True)}
             )
             run = prepare(changed)
             if run.determinacy is not None:

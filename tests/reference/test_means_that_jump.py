@@ -56,19 +56,24 @@ FIGURES: dict[str, dict[str, Any]] = {
 }
 
 
-def of(**numbers: float) -> trunnion.Mechanism:
-    """The press with other dimensions, m."""
-    return trunnion.Mechanism(**{**PRESS, "dimensions": {**PRESS["dimensions"], **numbers}, "measures": FIGURES})
+def of(start: float = 0.0, **numbers: float) -> trunnion.Mechanism:
+    """The press with other dimensions, m, and another start, deg."""
+    drivers = {"O": {**PRESS["drivers"]["O"], "start": f"{start} deg"}}
+    dimensions = {**PRESS["dimensions"], **numbers}
+    return trunnion.Mechanism(**{**PRESS, "dimensions": dimensions, "measures": FIGURES, "drivers": drivers})
 
 
-def sampled(**numbers: Array) -> dict[str, Array]:
+def sampled(model: trunnion.Mechanism, **numbers: Array) -> dict[str, Array]:
     """The figures of many presses at once, as a study has them."""
-    run = prepare(of())
+    run = prepare(model)
     measures = named(run.system.mechanism, FIGURES, run.values)
     places = plan(run, measures, 24)
     kernel = NumpyKernel(run, measures, FrictionMethod())
     courses, _ = kernel.courses(run.values, places.times)
-    spread = {f"dimensions.{name}": value[:, None] for name, value in numbers.items()}
+    spread = {
+        "drivers.O.speed" if name == "speed" else f"dimensions.{name}": value[:, None]
+        for name, value in numbers.items()
+    }
     values = run.system.mechanism.parameter_set.evaluate(spread)
     count, found = len(next(iter(numbers.values()))), {}
     for measure in measures:
@@ -79,11 +84,15 @@ def sampled(**numbers: Array) -> dict[str, Array]:
     return found
 
 
-def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form() -> None:
-    """Near the nominal place, far from it, and where the ram does not come to the load, or is at it throughout."""
+@pytest.mark.parametrize("start", [0.0, 326.9, 327.1, 100.0])
+def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: float) -> None:
+    """Near the nominal place, far from it, and where the ram does not come to the load, or is at it throughout.
+
+    The load begins nominally at 327°, beside the start of some of the turns.
+    """
     touch = TOUCH + np.array([0.0, 2e-5, -3e-4, 4e-3, -2e-2, 9.9e-3, 0.0101, 0.03])
     rod = np.full(len(touch), ROD)
-    found = sampled(touch=touch, rod=rod)
+    found = sampled(of(start), touch=touch, rod=rod)
     way = np.maximum(R + ROD - touch, 0.0)
     np.testing.assert_allclose(found["power"], -FORCE * way / TIME, rtol=1e-9, atol=1e-9)
     angle = np.radians([290.0, 350.0])
@@ -91,7 +100,7 @@ def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form() -> Non
     pressed = np.clip(ram[1] - np.maximum(touch, ram[0]), 0.0, None)
     np.testing.assert_allclose(found["within"], -FORCE * pressed / (TIME / 6), rtol=1e-9, atol=1e-9)
     for k in range(len(touch)):
-        alone = prepare(of(touch=float(touch[k])))
+        alone = prepare(of(start, touch=float(touch[k])))
         exact = figures_of(alone, named(alone.system.mechanism, FIGURES, alone.values), 24, FrictionMethod())
         for name in FIGURES:
             assert found[name][k] == pytest.approx(exact[name], rel=2e-7, abs=1e-9), (name, k)
@@ -132,4 +141,26 @@ def test_pins_in_seats_move_the_place_at_which_the_load_begins(xi: float) -> Non
         trunnion.Mechanism(**{**pin, "tolerances": {"touch": 1e-4}}), ["power"], ["linear"], steps=24
     ).sel(measure="power")
     assert float(study["nominal"]) == pytest.approx(expected["power"], rel=1e-9)
+    assert float(study["worst_case_upper"]) == pytest.approx(FORCE / TIME * 1e-4, rel=1e-6)
+
+
+@pytest.mark.parametrize("touch", [TOUCH, 0.2505])
+def test_a_speed_that_varies_and_a_load_that_is_only_just_not_met(touch: float) -> None:
+    """Useful power F (r + l − touch) n, whether the nominal ram comes to the load or not."""
+    places = touch + np.array([0.0, -1e-3, 1e-3, -4e-3, 8e-3])
+    speed = 4 * np.pi * np.array([1.0, 1 + 1e-6, 0.97, 1.05, 1.0])
+    found = sampled(of(touch=touch), touch=places, speed=speed)
+    expected = -FORCE * np.maximum(R + ROD - places, 0.0) * speed / (2 * np.pi)
+    np.testing.assert_allclose(found["power"], expected, rtol=1e-7, atol=1e-7)
+
+
+def test_a_seat_that_moves_the_load_far() -> None:
+    """A pin on one side of its hole makes the load begin 7° later, near the end of the stroke."""
+    pin, play, touch = of(touch=0.2495).data(), 1e-3, 0.2495
+    pin["joints"]["A"] = {**pin["joints"]["A"], "links": ["crank", "rod"], "pin": {"radius": 0.01, "clearance": play}}
+    pin["joints"]["A"]["seat"] = {"xi": "180 deg"}
+    study = trunnion.tolerance(
+        trunnion.Mechanism(**{**pin, "tolerances": {"touch": 1e-4}}), ["power"], ["linear"], steps=24
+    ).sel(measure="power")
+    assert float(study["nominal"]) == pytest.approx(-FORCE * (R + ROD + play - touch) / TIME, rel=1e-7)
     assert float(study["worst_case_upper"]) == pytest.approx(FORCE / TIME * 1e-4, rel=1e-6)

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import nodes
 from trunnion.measures.figures import Reference, figure
-from trunnion.solve.switches import Mechanisms, bends, parted, tracked
+from trunnion.solve.switches import Mechanisms, bends, nearly_passed, tracked
 
 if TYPE_CHECKING:
     from trunnion.measures.positions import PositionPlan
@@ -30,28 +31,39 @@ LookAtParts = Callable[[Array], Sequence[Array]]  # from times, s, to the parts 
 BESIDE = 1e-9  # of the cycle: on the sides of a place at which the model switches
 JUMP = 1e-6  # of the size of a course: what is less is none
 ROUNDS, PARTS, SMALL = 7, 8, 1e-9  # so often a panel is parted, into how many, from which share of the mean it errs
+AT_ONCE = 64  # mechanisms whose bends are looked for at a time
 MOST = 32  # bends beside jumps that are followed too, as to points of a table
 
 
 def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan, values: Values) -> Reference:
     """The same nominal mechanism, with the places at which the course bends if its figure is a mean and it jumps.
 
-    values: its numbers, with pins in their seats, which move these places.
+    values: its numbers, with pins in their seats, which move these places. Without places, every mechanism has its own
+    looked for over the cycle: a load that the nominal one only just does not meet begins in others.
     """
     run = plan.run
-    if known.against or known.measure.in_time or not run.bends:
+    if known.against or known.measure.in_time or known.measure.of_motion or run.cycle.duration <= 0:
         return known
+    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
+    if nearly_passed(of):
+        return _with_figure(replace(known, bends=(), corner=True), look, of, plan)
     time = plan.bends(values)
+    if not len(time):
+        return known
     sides = look((time + BESIDE * run.cycle.duration * np.array([[-1.0], [1.0]])).reshape(1, -1))
     jumps = np.zeros(len(time), bool)
     for part, whole in zip(sides, known.parts, strict=True):
         jumps |= ~(np.abs(np.diff(part.reshape(2, -1), axis=0)[0]) <= JUMP * np.max(np.abs(whole), initial=0.0))
     if not np.any(jumps):
         return known
-    followed = np.flatnonzero(jumps | (len(time) <= MOST))
-    sharp = replace(known, bends=tuple(run.bends[i] for i in followed), corner=True)
-    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
-    return replace(sharp, figure=float(averaged(sharp, look, own_edges(sharp, of, plan))[0]))
+    told = run.bends
+    if len(told) > MOST and len(told) == len(time):
+        told = [told[i] for i in np.flatnonzero(jumps)]
+    return _with_figure(replace(known, bends=tuple(told), corner=True), look, of, plan)
+
+
+def _with_figure(known: Reference, look: LookAtParts, of: Mechanisms, plan: PositionPlan) -> Reference:
+    return replace(known, figure=float(averaged(known, look, own_edges(known, of, plan))[0]))
 
 
 def settled(known: Reference, look: LookAtParts) -> Reference:
@@ -80,54 +92,41 @@ def averaged(known: Reference, look: LookAtParts, edges: Array) -> Array:
 
 
 def own_edges(known: Reference, of: Mechanisms, plan: PositionPlan) -> Array:
-    """The edges of the mean of every mechanism, times of the nominal one, s, (row, edge): at its own jumps.
+    """The edges of the mean of every mechanism, times of the nominal one, s, (row, edge): those of the nominal one and
+    its own jumps.
 
-    A jump that is not found near that of the nominal mechanism, as it is far away or none, is looked for over the cycle
-    where the drivers are those of the nominal mechanism; edges that are too many are one at the end.
+    A jump that is not found near that of the nominal mechanism, as it is far away or none, is looked for over the
+    cycle. Those outside the window are one at its end.
     """
     edges, cycle = known.window.edges, of.cycles[0]
     assert edges is not None
     own = tracked(of, known.bends, lambda values, time: replace(plan, times=time).moved(values))
-    if cycle.periodic:
-        laps = np.arange(edges[0] // cycle.duration, edges[-1] // cycle.duration + 1) * cycle.duration
-    else:
-        laps = np.zeros(1)
-    time = (np.array([one.time for one in known.bends])[:, None] + laps).ravel()
-    moved = (own[:, :, None] + laps).reshape(len(own), -1)
-    lost = np.any(np.isnan(moved), axis=1)
-    found = _carried(edges, time, np.where(np.isnan(moved), time, moved))
-    if np.any(lost) and plan.moved(of.values) is plan.times:
-        found = _with_anew(found, np.flatnonzero(lost), of, edges)
-    return found
-
-
-def _carried(edges: Array, time: Array, moved: Array) -> Array:
-    """Edges, (row, edge), carried along with some times between them, (time,), that are moved, (row, time)."""
-    within = (time > edges[0]) & (time < edges[-1])
-    order = np.argsort(time[within])
+    lost = np.flatnonzero(np.any(np.isnan(own), axis=1)) if known.bends else np.arange(len(own))
+    if len(lost):
+        anew = _anew(of, lost, plan)
+        own = np.pad(own, ((0, 0), (0, max(0, anew.shape[1] - own.shape[1]))), constant_values=np.nan)
+        own[lost] = np.nan
+        own[lost, : anew.shape[1]] = anew
     first, last = edges[0], edges[-1]
-    ends = np.ones((len(moved), 1))
-    knots = np.concatenate([[first], time[within][order], [last]])
-    there = np.sort(np.clip(moved[:, within][:, order], first, last), axis=1)
-    there = np.concatenate([first * ends, there, last * ends], axis=1)
-    gap = np.clip(np.searchsorted(knots, edges, side="right") - 1, 0, len(knots) - 2)
-    share = (edges - knots[gap]) / (knots[gap + 1] - knots[gap])
-    return np.asarray(there[:, gap] + share * (there[:, gap + 1] - there[:, gap]))
+    if cycle.periodic:
+        own = first + (own - first) % cycle.duration
+    own = np.clip(np.where(np.isnan(own), last, own), first, last)
+    return np.sort(np.concatenate([np.broadcast_to(edges, (len(own), len(edges))), own], axis=1), axis=1)
 
 
-def _with_anew(found: Array, rows: NDArray[np.intp], of: Mechanisms, edges: Array) -> Array:
-    """The edges with those of some mechanisms found from nothing."""
-    some = Mechanisms(of.system, of.assembly, of.picked(rows), [of.cycles[int(row)] for row in rows])
-    cycle, first, last = of.cycles[0], edges[0], edges[-1]
-    anew = [np.clip(_over(parted(times, cycle), cycle.duration, first, last), first, last) for times in bends(some)]
-    count = max(found.shape[1], *(len(one) for one in anew))
-    whole = np.pad(found, ((0, 0), (0, count - found.shape[1])), mode="edge")
-    for row, one in zip(rows, anew, strict=True):
-        whole[row] = np.pad(one, (0, count - len(one)), mode="edge")
+def _anew(of: Mechanisms, rows: NDArray[np.intp], plan: PositionPlan) -> Array:
+    """Where some mechanisms bend, looked for over the cycle, as times of the nominal one, s; NaN after the last."""
+    run, cycle = plan.run, of.cycles[0]
+    ratio, name = np.ones(len(of.cycles)), next(iter(run.system.mechanism.drivers), "")
+    if name and plan.moved(of.values) is not plan.times:
+        own, nominal = (run.system.span(values, name).duration for values in (of.values, run.values))
+        ratio = of.row(np.asarray(primal(own), float) / np.asarray(primal(nominal), float))
+    cycles = [replace(cycle, duration=cycle.duration * float(ratio[row])) for row in rows]
+    found = []
+    for low in range(0, len(rows), AT_ONCE):
+        part = slice(low, low + AT_ONCE)
+        found += bends(Mechanisms(of.system, of.assembly, of.picked(rows[part]), cycles[part]))
+    whole = np.full((len(rows), max((len(one) for one in found), default=0)), np.nan)
+    for row, (one, times) in enumerate(zip(rows, found, strict=True)):
+        whole[row, : len(times)] = times / ratio[one]
     return whole
-
-
-def _over(edges: Array, duration: float, first: float, last: float) -> Array:
-    """The edges of a cycle in all laps that a window touches, rising, with its ends."""
-    laps = np.arange(first // duration, last // duration + 1) * duration
-    return np.concatenate([[first], np.unique(edges + laps[:, None]), [last]])

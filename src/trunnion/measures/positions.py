@@ -20,7 +20,7 @@ from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError
-from trunnion.solve.switches import Mechanisms, tracked
+from trunnion.solve.switches import Mechanisms, bends, tracked
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
@@ -97,12 +97,12 @@ class PositionPlan:
         return _reached(system, values, name, system.drive(before, name, self.times)[0], scaled, span.duration)
 
     def bends(self, values: Values) -> Array:
-        """Times, s, at which a mechanism with other numbers bends or jumps as the nominal one does: of the same
-        positions."""
+        """Times, s, at which a mechanism with other numbers, but the same drivers, bends or jumps, in no order."""
         run = self.run
         of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
         found = tracked(of, run.bends, lambda own, time: replace(self, times=time).moved(own))[0]
-        return np.where(np.isnan(found), [one.time for one in run.bends], found)
+        lost = np.isnan(found)
+        return np.concatenate([found[~lost], bends(of)[0]]) if np.any(lost) else found
 
 
 def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:

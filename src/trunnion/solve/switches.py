@@ -28,7 +28,7 @@ from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
-__all__ = ["Bend", "Mechanisms", "bends", "edges", "parted", "stated_bends", "tracked"]
+__all__ = ["Bend", "Mechanisms", "bends", "edges", "nearly_passed", "parted", "stated_bends", "tracked"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -39,6 +39,7 @@ MOST_SCANNED = 20_000
 MOST_LEVELS = 720  # of one table in a turn: of more points every n-th, so that no node of a panel is far from any
 PANELS = 6  # of a turn: the widest that is integrated in one go
 MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
+NEARLY = 0.1  # of the range of what decides where a load begins
 TRACKED = 72  # of a turn: how far to either side a bend of one mechanism is looked for in others
 ROUNDS = 60
 SETTLED = 1e-11  # of the cycle
@@ -150,6 +151,23 @@ def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Arra
         crossing = _Crossing(rows, function, level, low, high, *ends)
         found[rows, which] = np.where(passed, _located(crossing, values, np.full(len(rows), cycle.duration)), np.nan)
     return found
+
+
+def nearly_passed(of: Mechanisms) -> bool:
+    """Whether a load of one mechanism that does not begin or end would do so with slightly other numbers: what decides
+    it comes within NEARLY of its own range to the level."""
+    scan, cycle = _scans(of.system)[0], of.cycles[0]
+    if not scan.wanted(of.system):
+        return False
+    time = np.linspace(0.0, cycle.duration, SCANNED + 1)[None]
+    for switch in scan.look(scan.walk(of.system, of.values, of.assembly, of.lanes(time))):
+        course = of.shaped(switch.number, time)
+        span = float(np.nanmax(course) - np.nanmin(course)) if np.any(np.isfinite(course)) else 0.0
+        levels = np.array([of.row(level)[0] for level in switch.levels])[[0, -1]]
+        away = np.array([np.nanmin(course) - levels[-1], levels[0] - np.nanmax(course)]) if span > 0 else np.zeros(0)
+        if np.any((away > 0) & (away < NEARLY * span)):
+            return True
+    return False
 
 
 def _width(of: Bend, known: Sequence[Bend], cycle: Cycle) -> float:

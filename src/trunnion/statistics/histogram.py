@@ -19,7 +19,7 @@ __all__ = ["Bins", "count", "quantile"]
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
-LEAST = 1e-13  # a deviation that is rounding, SI
+LEAST = 1e-16  # a deviation that is rounding, SI
 _ONE = 1023 << 52
 """The bits of 1.0."""
 

@@ -215,7 +215,7 @@ def test_play_moves_the_jump(force: str) -> None:
     assert found.figures["coarse"] == pytest.approx(coarse_and_fine(force, 180)[0], rel=1e-12)
 
 
-@pytest.mark.parametrize("steps", [24, 720])
+@pytest.mark.parametrize("steps", [8, 24, 720])
 def test_the_drive_of_a_press_whose_load_jumps(steps: int) -> None:
     """Power in = power out: T = F x'(θ) from 320.3° to 350°, else 0, whatever the steps."""
     r, rod, begin, end = 0.03, 0.2, BEGIN, np.radians(350)

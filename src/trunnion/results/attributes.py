@@ -58,8 +58,9 @@ def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 def whole(result: Described, what: str) -> None:
     """MechanismError for something that is made of all variables of a result, of one that has not kept them."""
-    if KEPT in result.attrs:
-        told = f"this result has kept {len(json.loads(result.attrs[KEPT]))} of its variables: {what} is made of all"
+    kept = next((result.attrs[name] for name in (KEPT, f"kept_{KEPT}") if name in result.attrs), None)
+    if kept is not None:  # the other name is that of a NetCDF 3 file
+        told = f"this result has kept {len(json.loads(kept))} of its variables: {what} is made of all"
         raise MechanismError(Finding(told, KEPT, "analyse without naming variables"))
 
 

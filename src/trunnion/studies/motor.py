@@ -23,6 +23,7 @@ from trunnion.solve.run import Run
 __all__ = ["Motor", "motor"]
 
 Array = NDArray[np.float64]
+BESIDE = 1e-9  # of the cycle: on the sides of a place at which the model switches
 HALVINGS = 30  # of a gap in which the power passes its mean, where the energy is level
 
 
@@ -55,6 +56,10 @@ def motor(run: Run, driver: str, steps: int) -> Motor:
         driven, turned = courses(moments)
         return np.stack([driven, turned**2])
 
+    duration = run.cycle.duration
+    beside = (run.edges[:, None] + BESIDE * duration * np.array([-1.0, 1.0])).ravel()
+    beside = beside % duration if run.cycle.periodic else np.clip(beside, 0.0, duration)
+    peak = float(np.fmax(peak, np.max(np.abs(courses(np.sort(beside))[0]))))  # of a load shorter than a step
     found = integrals(integrands, [run.edges])
     value, error, size = (part[:, 0] / run.cycle.duration for part in (found.value, found.error, found.size))
     mean = Mean(float(value[0]), float(error[0]), float(size[0]), CANCELLED * float(size[0])).net

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 __all__ = ["beyond_first_order", "exact_changes", "figures_with", "on_other_links", "one_sided"]
 
 Array = NDArray[np.float64]
-TRIED, WIDTHS = 64, (1.0, 0.5, 0.25, 0.12, 0.06)  # places of the pins tried at a time, and how far about the best
-PLACES, NONE = 24, 1e-6  # positions at which they are; of the largest value: a change that is none
+TRIED = ((16, 1.0), (64, 1.0), (64, 0.5), (64, 0.25), (64, 0.12), (64, 0.06))  # places of pins, how far about the best
+PLACES, NONE = 720, 1e-6  # positions at which they are; of the largest value: a change that is none
 MUCH = 1.2  # times as much on the other link as on that of the hole
 SLIGHT, GRAVE = (
     0.01,
@@ -106,8 +106,8 @@ def one_sided(effect: Effect, i: int) -> Iterator[Finding]:
     ends = [(name, end, one.radii[k]) for name, one in effect.plays.items() for k, end in enumerate(one.model.ends)]
     best: list[Array] = [np.zeros((1, len(end))) for _, end, _ in ends]
     most, time, size = 0.0, 0.0, float(np.max(np.abs(effect.value[i, known])))
-    for width in WIDTHS:
-        ways = [place + width * rng.standard_normal((TRIED, place.shape[1])) for place in best]
+    for tried, width in TRIED:
+        ways = [place + width * rng.standard_normal((tried, place.shape[1])) for place in best]
         ways = [way / np.sqrt(np.sum(way**2, axis=1, keepdims=True)) for way in ways]
         offsets = {
             f"{HOLE}.{name}.{key}": float(np.ravel(primal(radius))[0]) * way[:, k : k + 1]
@@ -115,18 +115,12 @@ def one_sided(effect: Effect, i: int) -> Iterator[Finding]:
             for k, key in enumerate(end)
         }
         course = kernel.courses({**run.values, **offsets}, effect.time[at])[0][measure.name][0]
-        value = np.broadcast_to(np.asarray(primal(course), float), (TRIED, len(at)))
-        change, size = (
-            np.abs(np.nan_to_num(value - effect.value[i, at])),
-            max(size, float(np.max(np.nan_to_num(value)))),
-        )
+        value = np.nan_to_num(np.broadcast_to(np.asarray(primal(course), float), (tried, len(at))))
+        change, size = np.abs(value - effect.value[i, at]), max(size, float(np.max(np.abs(value))))
         row, column = np.unravel_index(int(np.argmax(change)), change.shape)
         if change[row, column] > most:
-            most, time, best = (
-                float(change[row, column]),
-                float(effect.time[at[column]]),
-                [way[row : row + 1] for way in ways],
-            )
+            most, best = float(change[row, column]), [way[row : row + 1] for way in ways]
+            time, at = float(effect.time[at[column]]), at[max(0, int(column) - 1) : int(column) + 2]
     if most > NONE * size:
         where, dial = f"measures.{measure.name}", run.system.dial(run.values, np.array([time]))
         yield finding_for("play.one_sided", where, found=most, unit=measure.unit(run.system), at=dial.at(0))

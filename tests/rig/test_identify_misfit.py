@@ -14,7 +14,7 @@ import pytest
 from matplotlib.text import Text
 
 import trunnion
-from trunnion.errors import Finding
+from trunnion.errors import Finding, Severity
 from trunnion.rig.identification import findings
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.report import report
@@ -123,6 +123,10 @@ def test_a_wrong_length_is_named_with_its_size(folder: Path) -> None:
     assert found.figures["size"] == pytest.approx(-3e-3, abs=max(3e-4, 1.5 * found.figures["expanded"]))
     assert "a length l smaller than the model's by" in found.what
     assert "--parameter l identifies it" in found.remedy
+    (told,) = [one for one in result.trunnion.findings if one.code == "fit.misfit"]
+    assert told.figures["reduced"] < 9
+    assert told.severity is Severity.ERROR  # as the length moves the friction beyond both uncertainties
+    assert float(result["estimate"][0]) - found.figures["values"]["mu"] > 0.01
 
 
 SPRUNG = """

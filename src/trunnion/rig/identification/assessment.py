@@ -60,9 +60,20 @@ class Assessment:
     @cached_property
     def refuted(self) -> bool:
         """Whether the estimates stand for something else: by the residuals, or since an error of a sensor that explains
-        them is beyond what is stated of it."""
+        them is beyond what is stated of it, or a length of the model that does moves them."""
         spread = self.found.spread
-        return spread.test.gross or bool(spread.beyond) or self.times_stated > FAR
+        return spread.test.gross or bool(spread.beyond) or self.times_stated > FAR or self.moved
+
+    @cached_property
+    def moved(self) -> bool:
+        """Whether an estimate would be another, beyond both uncertainties, with the length that explains a misfit."""
+        first = next(iter(self.found.causes), None)
+        if first is None or first.kind != "length":
+            return False
+        count = self.problem.count
+        half = quantile(self.found.spread.freedom[:count]) * self.deviation[:count]
+        apart, both = np.abs(first.estimates - self.estimate[:count]), np.hypot(half, first.halves)
+        return bool(np.any(apart > both))  # not where one is not known
 
     @cached_property
     def times_stated(self) -> float:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["holding_figures", "holding_multiples", "reverse_figure"]
 
 Array = NDArray[np.float64]
+LITTLE = 1e-3  # of what the useful loads give: what other loads and springs may supply beside it
 HELD = LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD
 
 
@@ -35,7 +36,7 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
     `LockingState`.
     """
     name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads" + _centred(run)
-    delivered, given, error = _reversed_means(run, back)
+    delivered, given, beside, error = _reversed_means(run, back)
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
     if np.any(back.locked):
@@ -43,7 +44,8 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
         return Figure(name, subject, None, place=f"at {places}", note="it locks")
     if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
         return Figure(name, subject, None, note="not every position is solved")
-    if delivered - given > error:  # over a range what masses and springs have stored comes on top
+    # over a range what masses and springs have stored comes on top
+    if delivered - given > error or beside > max(error, LITTLE * given):
         return Figure(name, subject, None, note=_beside(run))
     states = {one for one in PUSHES if one in state}
     value, held = min(delivered / given, 1.0), states <= {LockingState.SELF_LOCKING}
@@ -82,23 +84,23 @@ def _beside(run: Run) -> str:
     return f"{', '.join(others)} supply work too" if others else "more than 1: not solved accurately enough"
 
 
-def _reversed_means(run: Run, back: Passage) -> tuple[float, float, float]:
-    """Mean powers, W, delivered and given, backward, 0 where they cancel, and the error of their difference; that of
-    the loads is known where it locks."""
+def _reversed_means(run: Run, back: Passage) -> tuple[float, float, float, float]:
+    """Mean powers, W, delivered, given, and of loads and springs that are not useful, backward, 0 where they cancel,
+    and the error of the difference of the first two; that of the useful loads is known where it locks."""
     if run.cycle.duration <= 0:
-        delivered, given = float(back.delivered[0]), float(back.given[0])
-        return delivered, given, CANCELLED * abs(given)
+        delivered, given, beside = (float(part[0]) for part in (back.delivered, back.given, back.beside))
+        return delivered, given, beside, CANCELLED * abs(given)
     if np.any(back.locked):  # then there is no mean to be delivered, and of the other one the sign is asked for
-        return float("nan"), float(np.mean(back.given)), 0.0
+        return float("nan"), float(np.mean(back.given)), 0.0, 0.0
 
     def powers(rows: NDArray[np.intp], time: Array) -> Array:
         there = reverse(run, run.walk(time.ravel()), FrictionMethod())
-        return np.stack([there.delivered, there.given]).reshape(2, *time.shape)
+        return np.stack([there.delivered, there.given, there.beside]).reshape(3, *time.shape)
 
     found = run.once("back", lambda: integrals(powers, [run.edges]))
     value, error = found.value[:, 0], np.maximum(found.error[:, 0], CANCELLED * found.size[:, 0])
-    delivered, given = np.where(np.abs(value) <= error, 0.0, value) / run.cycle.duration
-    return float(delivered), float(given), float(np.sum(error)) / run.cycle.duration
+    delivered, given, beside = (np.where(np.abs(value) <= error, 0.0, value) / run.cycle.duration).tolist()
+    return delivered, given, beside, float(np.sum(error[:2])) / run.cycle.duration
 
 
 def holding_multiples(run: Run, time: Array, ahead: Passage, back: Passage) -> Array:

@@ -216,4 +216,4 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
 def _reverse(found: xr.Dataset) -> Passage:
     """The way back as the Dataset has it."""
     delivered, given = found["power_delivered_reverse"].values, found["power_given_reverse"].values
-    return Passage({}, np.isnan(delivered) & np.isfinite(given), delivered, given)
+    return Passage({}, np.isnan(delivered) & np.isfinite(given), delivered, given, np.zeros_like(given))

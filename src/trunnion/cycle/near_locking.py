@@ -195,13 +195,15 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
 class Passage(NamedTuple):
     """Positions passed forward or backward: effort of every driver, where it locks, and what flows where.
 
-    delivered: power that the drivers take out, W; given: power that the useful loads and springs put in, W.
+    delivered: power that the drivers take out, W; given: power that the useful loads and springs put in, W; beside:
+    that of the other ones.
     """
 
     efforts: dict[str, Array]
     locked: NDArray[np.bool_]
     delivered: Array
     given: Array
+    beside: Array
 
 
 def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Passage:
@@ -228,7 +230,9 @@ def passage(back: Backward) -> Passage:
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
     powers = useful_powers(walk.system.mechanism, back.load_powers, back.springs)
     given = sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape))
-    return Passage(efforts, locks(back), delivered, given)
+    every = [*back.load_powers.values(), *(spring.power for spring in back.springs.values())]
+    beside = sum((np.broadcast_to(power, shape) for power in every), np.zeros(shape)) - given
+    return Passage(efforts, locks(back), delivered, given, beside)
 
 
 # ---- over a cycle ---------------------------------------------------------------------------------------------
@@ -282,7 +286,10 @@ def look(run: Run, time: Array, margin: Array, method: FrictionMethod, walked: B
     same = walked is not None and len(times) == len(time) and method.name == plain.name
     if len(times) == len(time) and np.all(margin < 1.0):  # at each of them: there is nothing left to be solved
         more, unknown = np.zeros(len(times)), np.full(len(times), np.nan)
-        ahead, behind = Passage({}, np.ones(len(times), bool), unknown, unknown), reverse(run, run.walk(times), plain)
+        ahead, behind = (
+            Passage({}, np.ones(len(times), bool), unknown, unknown, unknown),
+            reverse(run, run.walk(times), plain),
+        )
     else:
         known = walked if same else None
         key = "both ways", len(times), plain

@@ -20,6 +20,7 @@ from trunnion.solve.run import Run
 
 __all__ = ["beside_the_drive", "findings", "meaning"]
 
+MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
 
@@ -50,11 +51,13 @@ def beside_the_drive(mechanism: Mechanism) -> list[str]:
 
 
 def findings(run: Run, means: Means) -> Iterator[Finding]:
-    """A warning of an efficiency above 1, with the work of each source beside the drives; else a note of loads that
-    act beside the drive and supply work. means: of the cycle."""
-    beside = beside_the_drive(run.system.mechanism)
+    """A warning of an efficiency above 1, with the work of each source beside the drives; else notes of springs that
+    keep work at the end of a range, and of loads that act beside the drive and supply work. means: of the cycle."""
+    mechanism = run.system.mechanism
+    beside, useful = beside_the_drive(mechanism), useful_springs(mechanism)
+    storing = [name for name in mechanism.springs if name not in useful] if not run.cycle.periodic else []
     above = means.efficiency > 1 + ROUNDED + means.efficiency_error
-    if not (above or beside) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
+    if not (above or beside or storing) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
         return
     drive = means.drive_power.net * run.cycle.duration
     every = _work(run, means)
@@ -66,6 +69,9 @@ def findings(run: Run, means: Means) -> Iterator[Finding]:
             "efficiency.above_one", efficiency=means.efficiency, drive=drive, work=work, phrases={"supplies": supplies}
         )
         return
+    for name in storing:
+        if (stored := -every[f"spring {name}"]) > MUCH * drive > 0:
+            yield finding_for("spring.stores", f"springs.{name}", stored=stored, drive=drive)
     for name in beside:
         if (supplied := work.get(f"load {name}")) is not None:
             yield finding_for("load.not_counted", f"loads.{name}", work=supplied, drive=drive)

@@ -175,6 +175,12 @@ CYCLE: dict[str, Sentence] = {
         "its torque jumps at {at}, where its angle passes half a turn from the free angle",
         "whole turns are not counted in this joint",
     ),
+    "spring.stores": Sentence(
+        NOTE,
+        "at the end of the range it has stored {stored:~J} of the {drive:~J} that the drive supplies; the efficiency "
+        "counts them as lost",
+        "mark it useful: true if it stands for the work",
+    ),
     "spring.turned_round": Sentence(
         WARNING,
         "its ends pass each other at {at}: its length falls to about 0, and its force reverses",

@@ -44,7 +44,8 @@ class Swept:
     def stated(self, index: int) -> float | str:
         """The value at an index as a model states it: with a unit, in SI, if it was given in one."""
         value = float(self.values[index])
-        return f"{value!r} {self.unit}" if self.written and self.unit != "1" and np.isfinite(value) else value
+        known = self.written and self.unit not in ("1", "SI") and np.isfinite(value)
+        return f"{value!r} {self.unit}" if known else value
 
     def say(self, index: int) -> str:
         """The value at an index as an equation, in the unit it was given in."""

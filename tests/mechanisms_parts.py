@@ -30,3 +30,23 @@ def body(points: Data, number: int = 1, size: float = 1.0) -> Data:
         "centre": [size * (0.2 + 0.07 * number), size * (0.1 - 0.05 * number)],
         "inertia": size**2 * (0.05 + 0.02 * number),
     }
+
+
+def plunger(r: float, rod: float, pins: Data) -> Data:
+    """A crank that presses a guided ram towards W on the ground. pins: what is stated of each joint that turns."""
+    return {
+        "gravity": [0, 0],
+        "links": {
+            "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "W": [0.2, 0]}},
+            "crank": {"points": {"O": [0, 0], "A": [r, 0]}},
+            "rod": {"points": {"A": [0, 0], "B": [rod, 0]}},
+            "ram": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        },
+        "joints": {
+            "O": {"type": "revolute", "links": ["ground", "crank"], **pins.get("O", {})},
+            "A": {"type": "revolute", "links": ["crank", "rod"], **pins.get("A", {})},
+            "B": {"type": "revolute", "links": ["rod", "ram"], **pins.get("B", {})},
+            "S": {"type": "prismatic", "links": ["ground", "ram"]},
+        },
+        "assembly": {"B": [0.09, 0]},
+    }

@@ -11,7 +11,7 @@ from test_locking import CRITICAL, pushed_slider
 
 import trunnion
 from mechanisms import eccentric_press
-from mechanisms_parts import Data, revolute
+from mechanisms_parts import Data, plunger, revolute
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, ranges, report_figures
 from trunnion.cycle.locking_ends import ends
@@ -376,20 +376,7 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     """
     r, rod, stiffness, pressed, mu, stop = 0.02, 0.08, 5e4, 0.002, 0.1, np.radians(3.0)
     model = {
-        "name": "Clamp",
-        "gravity": [0, 0],
-        "links": {
-            "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "W": [0.2, 0]}},
-            "crank": {"points": {"O": [0, 0], "A": [r, 0]}},
-            "rod": {"points": {"A": [0, 0], "B": [rod, 0]}},
-            "ram": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
-        },
-        "joints": {
-            "O": {"type": "revolute", "links": ["ground", "crank"], "pin": {"radius": 0.004}, "friction": mu},
-            "A": {"type": "revolute", "links": ["crank", "rod"]},
-            "B": {"type": "revolute", "links": ["rod", "ram"]},
-            "S": {"type": "prismatic", "links": ["ground", "ram"]},
-        },
+        **plunger(r, rod, {"O": {"pin": {"radius": 0.004}, "friction": mu}}),
         "springs": {
             "work": {
                 "between": ["ground.W", "ram.B"],
@@ -400,7 +387,6 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
             }
         },
         "drivers": {"O": {"range": ["-60 deg", "3 deg"], "speed": "60 deg/s"}},
-        "assembly": {"B": [0.09, 0]},
     }
     tilt = np.arcsin(r * np.sin(stop) / rod)
     force = stiffness * (r * np.cos(stop) + rod * np.cos(tilt) - (r + rod - pressed)) / np.cos(tilt)

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 import trunnion
 from mechanisms import Array, four_bar
-from mechanisms_parts import revolute
+from mechanisms_parts import plunger, revolute
 from played import changes, offsets_of, with_play
 from trunnion import Mechanism
 from trunnion.measures.measures import named
@@ -174,20 +174,7 @@ def test_a_spring_that_is_just_open_is_not_said_to_be_without_effect(gap: float)
     play, stiffness, r, rod = 2e-5, 1e6, 0.02, 0.08
     pin = {"radius": 0.004, "clearance": play}
     model = {
-        "name": "Clamp",
-        "gravity": [0, 0],
-        "links": {
-            "ground": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}, "W": [0.2, 0]}},
-            "crank": {"points": {"O": [0, 0], "A": [r, 0]}},
-            "rod": {"points": {"A": [0, 0], "B": [rod, 0]}},
-            "ram": {"points": {"B": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
-        },
-        "joints": {
-            "O": {"type": "revolute", "links": ["ground", "crank"], "pin": pin},
-            "A": {"type": "revolute", "links": ["crank", "rod"], "pin": pin},
-            "B": {"type": "revolute", "links": ["rod", "ram"], "pin": pin},
-            "S": {"type": "prismatic", "links": ["ground", "ram"]},
-        },
+        **plunger(r, rod, {joint: {"pin": pin} for joint in "OAB"}),
         "springs": {
             "work": {
                 "between": ["ground.W", "ram.B"],
@@ -198,7 +185,6 @@ def test_a_spring_that_is_just_open_is_not_said_to_be_without_effect(gap: float)
         },
         "drivers": {"O": {"range": ["-60 deg", "0 deg"], "speed": "60 deg/s"}},
         "measures": {"force": {"spring_force": "work", "at": "0 deg"}},
-        "assembly": {"B": [0.09, 0]},
     }
     found = trunnion.play(trunnion.Mechanism(**model), steps=12)
     (told,) = [one for one in found.trunnion.findings if one.code == "play.one_sided"]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import nodes
+from trunnion.measures.corners import BESIDE
 from trunnion.measures.figures import Reference, figure
 from trunnion.solve.switches import Mechanisms, bends, nearly_passed, tracked
 
@@ -28,7 +29,6 @@ __all__ = ["LookAtParts", "averaged", "own_edges", "settled", "with_jumps"]
 
 Array = NDArray[np.float64]
 LookAtParts = Callable[[Array], Sequence[Array]]  # from times, s, to the parts of a course there, all (row, place)
-BESIDE = 1e-9  # of the cycle: on the sides of a place at which the model switches
 JUMP = 1e-6  # of the size of a course: what is less is none
 ROUNDS, PARTS, SMALL = 7, 8, 1e-9  # so often a panel is parted, into how many, from which share of the mean it errs
 AT_ONCE = 64  # mechanisms whose bends are looked for at a time

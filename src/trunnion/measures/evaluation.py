@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.quadrature import NODES
 from trunnion.errors import Status
 from trunnion.measures.averages import LookAtParts, averaged, own_edges, settled, with_jumps
 from trunnion.measures.corners import extreme, raised, sides_of, with_corner
@@ -42,7 +43,6 @@ __all__ = [
 ]
 
 Courses = dict[str, tuple[Number, ...]]
-NODES_OF_A_PANEL = 15
 
 
 class Kernel(Protocol):
@@ -170,7 +170,7 @@ def _averaged(kernel: Kernel, plan: PositionPlan, known: Reference, of: Mechanis
     """Means of a course that jumps, (sample,), so many samples at a time that their arrays stay in cache."""
     edges = own_edges(known, of, plan)
     found = []
-    for rows in np.array_split(np.arange(len(edges)), -(-edges.size * NODES_OF_A_PANEL // CHUNK)):
+    for rows in np.array_split(np.arange(len(edges)), -(-edges.size * len(NODES) // CHUNK)):
         look = _parts_at(kernel, plan, of.picked(rows), known.measure)
         found.append(averaged(known, look, edges[rows]))
     return np.concatenate(found)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.quadrature import CANCELLED, integrals, nodes
 from trunnion.cycle.means import Mean
+from trunnion.measures.corners import BESIDE
 from trunnion.measures.evaluation import courses_of, figures_of
 from trunnion.measures.measures import Measure
 from trunnion.solve.friction_method import FrictionMethod
@@ -23,7 +24,6 @@ from trunnion.solve.run import Run
 __all__ = ["Motor", "motor"]
 
 Array = NDArray[np.float64]
-BESIDE = 1e-9  # of the cycle: on the sides of a place at which the model switches
 HALVINGS = 30  # of a gap in which the power passes its mean, where the energy is level
 
 

@@ -1,10 +1,8 @@
-"""The compiled kernels beside NumPy's: `python -m benchmarks.compiled`, JAX on a CPU or, where it finds one, on a GPU.
+"""The compiled kernels beside NumPy's: `python -m benchmarks.compiled`.
 
 Mechanisms with three numbers that differ from sample to sample: motion, and the drive effort with friction. All kernels
-take turns in one process and the best of several rounds counts. NumPy runs in chunks on one core; the machine code of
-LLVM on one and on all, JAX on all. What the device is and how much of it JAX uses is printed beside: the bytes that
-must be written at least and the operations that the program counts, against what a copy and a chain of products reach
-on the same device in the same run.
+take turns in one process and the best of several rounds counts. NumPy runs in chunks on one core, the machine code of
+LLVM on one and on all.
 """
 
 from __future__ import annotations
@@ -23,11 +21,9 @@ import numpy as np
 
 from trunnion import Mechanism
 from trunnion.cycle.positions import CHUNK
-from trunnion.solve.compiled import CompiledKernel
 from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
-from trunnion.studies.tolerance.compiled_jax import JaxKernel
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 JOBS = (
@@ -36,7 +32,6 @@ JOBS = (
 )  # fmt: skip
 POSITIONS = 360
 SPREAD = 1e-4
-PROBE = 1 << 24  # numbers in the arrays that measure the device
 
 
 class Job(NamedTuple):
@@ -58,7 +53,7 @@ def best(run: Callable[[], Any], rounds: int) -> float:
     return min(times)
 
 
-def by_numpy(kernel: CompiledKernel, values: dict[str, Any], moments: Any, samples: int) -> Any:
+def by_numpy(kernel: VectorKernel, values: dict[str, Any], moments: Any, samples: int) -> Any:
     """The same curves by NumPy, in chunks."""
     rows = max(1, CHUNK // len(moments))
     curves = {name: np.empty((samples, len(moments))) for name in kernel.figures}
@@ -87,7 +82,7 @@ def job(name: str, forces: bool, configurations: int) -> Job:
     return Job(run, forces, mechanism.parameter_set.evaluate(varied), run.cycle.times(POSITIONS))
 
 
-def kernel_of(one: Job, engine: type[CompiledKernel], threads: int | None) -> CompiledKernel:
+def kernel_of(one: Job, threads: int | None) -> VectorKernel:
     """A kernel that gives the angle of the last link, or the effort of the first driver."""
     driver, link = next(iter(one.run.system.mechanism.drivers)), list(one.run.system.mechanism.effective_links)[-1]
 
@@ -95,7 +90,7 @@ def kernel_of(one: Job, engine: type[CompiledKernel], threads: int | None) -> Co
         frame = back.walk.motions[link].frame
         return np.arctan2(frame.s, frame.c)
 
-    return engine(
+    return VectorKernel(
         one.run, {"curve": (lambda back: back.efforts[driver]) if one.forces else angle}, one.forces, threads=threads
     )
 
@@ -103,9 +98,8 @@ def kernel_of(one: Job, engine: type[CompiledKernel], threads: int | None) -> Co
 def measured(one: Job, rounds: int, threads: int | None) -> str:
     """A row of the table: all kernels on one job, in turn."""
     kernels = {
-        "compiled, one thread": kernel_of(one, VectorKernel, 1),
-        "compiled": kernel_of(one, VectorKernel, threads),
-        "jax": kernel_of(one, JaxKernel, threads),
+        "compiled, one thread": kernel_of(one, 1),
+        "compiled": kernel_of(one, threads),
     }
     samples = max(len(value) for value in one.values.values() if np.ndim(value))
     count = samples * len(one.times)
@@ -133,32 +127,6 @@ def measured(one: Job, rounds: int, threads: int | None) -> str:
     return f"{told} | {ratio:.1f} | {first:.2f} | {apart:.0e} | {again:.1%} |"
 
 
-def device(jax: Any, rounds: int) -> tuple[float, float]:
-    """What the device reaches: bytes/s of y = 2 x, and operations/s of a chain of 256 products and sums."""
-    numbers = jax.numpy.linspace(0.0, 1.0, PROBE)
-    copy = jax.jit(lambda x: 2 * x)
-
-    @jax.jit
-    def chain(x: Any) -> Any:
-        for _ in range(128):
-            x = x * 0.999 + 1e-3
-        return x
-
-    for run in (copy, chain):
-        jax.block_until_ready(run(numbers))
-    bandwidth = 16 * PROBE / best(lambda: jax.block_until_ready(copy(numbers)), rounds)
-    return bandwidth, 256 * PROBE / best(lambda: jax.block_until_ready(chain(numbers)), rounds)
-
-
-def operations(kernel: JaxKernel, values: dict[str, Any], moments: Any) -> tuple[float, float]:
-    """Floating-point operations and bytes of memory or cache for one configuration, as the compiler counts them."""
-    arrays = {path: np.asarray(value) for path, value in values.items() if np.ndim(value)}
-    cost = kernel.function(values).lower(arrays, moments).compile().cost_analysis()
-    cost = cost[0] if isinstance(cost, list) else cost
-    lanes = len(next(iter(arrays.values()))) * len(moments)
-    return cost.get("flops", 0.0) / lanes, cost.get("bytes accessed", 0.0) / lanes
-
-
 def processor() -> str:
     """Name of the processor, where the system tells."""
     told = Path("/proc/cpuinfo")
@@ -167,41 +135,24 @@ def processor() -> str:
 
 
 def main() -> None:
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--threads", type=int, default=None, help="all cores if not given")
     parser.add_argument("--configurations", type=int, default=1_000_000)
     options = parser.parse_args()
-    one = jax.devices()[0]
-    print(f"{processor()}, {os.cpu_count()} cores; JAX {jax.__version__} on {one.platform}: {one.device_kind}")
-    bandwidth, speed = device(jax, options.rounds)
-    print(f"the device copies {bandwidth / 1e9:.1f} GB/s and computes {speed / 1e9:.1f} GFLOP/s (float64)\n")
+    print(f"{processor()}, {os.cpu_count()} cores\n")
     print(
         "Microseconds a configuration; ratio of NumPy to compiled, one thread each; first call, s; largest difference"
     )
     print("from NumPy, of the peak; share that NumPy decides.\n")
-    print("| job | NumPy | compiled, one thread | compiled | JAX | ratio | first | difference | NumPy decides |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    print("| job | NumPy | compiled, one thread | compiled | ratio | first | difference | NumPy decides |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for name, forces in JOBS:
         of = job(name, forces, options.configurations)
         print(
             f"| {name}, {'friction' if forces else 'motion'} | {measured(of, options.rounds, options.threads)}",
             flush=True,
         )
-    of = job("durango-fourbar", True, 64 * POSITIONS)
-    kernel = kernel_of(of, JaxKernel, options.threads)
-    assert isinstance(kernel, JaxKernel)
-    flops, touched = operations(kernel, of.values, of.times)
-    seconds = best(lambda: kernel.curves(of.values, of.times), options.rounds)
-    rate = 64 * POSITIONS / seconds
-    print(
-        f"\nJAX, friction of the four-bar: {flops:.0f} operations a configuration, {flops * rate / speed:.0%} of the"
-        f" device's arithmetic; {touched:.0f} bytes between loops, {touched * rate / bandwidth:.0%} of its bandwidth if"
-        " none were in cache"
-    )
 
 
 if __name__ == "__main__":

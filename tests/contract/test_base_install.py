@@ -40,12 +40,10 @@ WORK = [
 ]
 REFUSED = {
     "compiled": ["sweep", FOUR_BAR, "--over", "AB=1.9m,2.0m", "--engine", "compiled"],
-    "gpu": ["tolerance", TOLERANCED, "--engine", "gpu"],
     "parquet": ["analyse", FOUR_BAR, "--out", "a.parquet"],
     "zarr": ["analyse", FOUR_BAR, "--out", "a.zarr"],
     "xlsx": ["analyse", FOUR_BAR, "--out", "a.xlsx"],
     "studio": ["studio", FOUR_BAR],
-    "jax": ["tolerance", TOLERANCED, "--engine", "jax"],
     "tdms": ["data", "lab/mapping.yaml", "lab/run.tdms"],
     "cluster": ["tolerance", TOLERANCED, "--cluster", "local"],
 }

@@ -1,4 +1,4 @@
-"""The compiled kernels against NumPy's, and the gradients of JAX against dual numbers."""
+"""The compiled kernels against NumPy's."""
 
 from __future__ import annotations
 
@@ -15,18 +15,11 @@ import trunnion
 import trunnion.studies.tolerance.kernel
 from mechanisms import DURANGO, eccentric_press
 from trunnion import Mechanism, MechanismError
-from trunnion.algebra.dual import derivative, seed
 from trunnion.errors import Status
-from trunnion.files import cache_directory
 from trunnion.measures.measures import named, outputs
-from trunnion.solve.compiled import CompiledKernel
 from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
-from trunnion.studies.tolerance import compiled_jax
-from trunnion.studies.tolerance.compiled_jax import JaxKernel
-
-jax = pytest.importorskip("jax")
 
 EXAMPLES = DURANGO.parent
 SAMPLES = 5
@@ -35,15 +28,9 @@ SAMPLES = 5
 @pytest.fixture(autouse=True, scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     folder = str(tmp_path_factory.mktemp("compiled"))
-    jax.config.update("jax_compilation_cache_dir", folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", folder)
         yield
-
-
-@pytest.fixture(params=["compiled", pytest.param("jax", marks=pytest.mark.slow)])
-def engine(request: pytest.FixtureRequest) -> type[CompiledKernel]:
-    return {"compiled": VectorKernel, "jax": JaxKernel}[request.param]
 
 
 def figures(run: Run, *names: str) -> dict[str, Callable[[Any], Any]]:
@@ -86,13 +73,13 @@ def free(run: Run) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_guide_beside_its_kink(engine: type[CompiledKernel]) -> None:
+def test_a_guide_beside_its_kink() -> None:
     """Where the load of a guide changes ends the compiled rounds agree with NumPy too, or are taken again."""
     run = prepare(eccentric_press())
     effort = figures(run, "effort:O")
     time = np.linspace(0.05, 6.2, 400)
     values = varied(run, "links.crank.points.P.x")
-    curves, status = engine(run, effort, True).curves(values, time)
+    curves, status = VectorKernel(run, effort, True).curves(values, time)
     expected, statuses = by_numpy(run, values, time, effort)
     agree(curves, expected)
     assert np.array_equal(status, statuses)
@@ -103,13 +90,13 @@ def test_a_guide_beside_its_kink(engine: type[CompiledKernel]) -> None:
     "example",
     ["durango-fourbar", "slider-crank", "whitworth-quick-return", "scotch-yoke", "geared-five-bar", "universal-joint"],
 )
-def test_agrees_with_numpy(engine: type[CompiledKernel], example: str) -> None:
+def test_agrees_with_numpy(example: str) -> None:
     """Of dyads of all kinds, a general group and a closed form in space: motion and forces with friction, by status."""
     run = prepare(trunnion.read(EXAMPLES / f"{example}.yaml"))
     motion = [one.name for one in outputs(run.system)][:1]
     read_off = figures(run, *motion, *(f"effort:{driver}" for driver in run.system.mechanism.drivers))
     values, time = varied(run, *free(run)[:4]), run.cycle.times(72)
-    kernel = engine(run, read_off)
+    kernel = VectorKernel(run, read_off)
     curves, status = kernel.curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     np.testing.assert_array_equal(status, expected_status)
@@ -117,11 +104,11 @@ def test_agrees_with_numpy(engine: type[CompiledKernel], example: str) -> None:
     assert kernel.again < status.size / 2
 
 
-def test_motion_alone(engine: type[CompiledKernel]) -> None:
+def test_motion_alone() -> None:
     run = prepare(trunnion.read(DURANGO))
     read_off = figures(run, "angle:rocker", "coupler.E.x")
     values, time = varied(run, "AB", "BC"), run.cycle.times(90)
-    curves, status = engine(run, read_off, forces=False).curves(values, time)
+    curves, status = VectorKernel(run, read_off, forces=False).curves(values, time)
     back = run.solve(time, values)
     np.testing.assert_array_equal(status, pose_status(back.walk, status.shape))
     agree(curves, by_numpy(run, values, time, read_off)[0])
@@ -129,12 +116,12 @@ def test_motion_alone(engine: type[CompiledKernel]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", ["inverted-slider-crank", "jansen", "rccc"])
-def test_motion_of_other_modules(engine: type[CompiledKernel], example: str) -> None:
+def test_motion_of_other_modules(example: str) -> None:
     """A general group with slides, three loops, a closed form in space."""
     run = prepare(trunnion.read(EXAMPLES / f"{example}.yaml"))
     read_off = figures(run, *(one.name for one in outputs(run.system)))
     values, time = varied(run, *free(run)[:4], spread=1e-4), run.cycle.times(72)
-    curves, status = engine(run, read_off, forces=False).curves(values, time)
+    curves, status = VectorKernel(run, read_off, forces=False).curves(values, time)
     np.testing.assert_array_equal(status, pose_status(run.solve(time, values).walk, status.shape))
     agree(curves, by_numpy(run, values, time, read_off)[0])
 
@@ -155,28 +142,26 @@ def with_law(law: dict[str, Any]) -> Run:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law["law"])
-def test_friction_laws(engine: type[CompiledKernel], law: dict[str, Any]) -> None:
+def test_friction_laws(law: dict[str, Any]) -> None:
     run = with_law(law)
     read_off = figures(run, "effort:A")
     values, time = varied(run, "AB", "joint_defaults.friction.coefficient"), run.cycle.times(36)
-    curves, status = engine(run, read_off).curves(values, time)
+    curves, status = VectorKernel(run, read_off).curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     np.testing.assert_array_equal(status, expected_status)
     agree(curves, expected)
 
 
-def test_bristles_are_left_to_numpy(engine: type[CompiledKernel]) -> None:
+def test_bristles_are_left_to_numpy() -> None:
     run = with_law({"law": "dahl", "coefficient": 0.12, "stiffness": 4e3})
     with pytest.raises(MechanismError, match="memory along the cycle"):
-        engine(run, {})
+        VectorKernel(run, {})
 
 
 @pytest.mark.parametrize(
     ("example", "coefficient"), [("slider-crank", 0.8), ("slider-crank", 2.0), ("toggle-press", 2.0)]
 )
-def test_friction_without_proof_of_one_solution_is_numpys(
-    engine: type[CompiledKernel], example: str, coefficient: float
-) -> None:
+def test_friction_without_proof_of_one_solution_is_numpys(example: str, coefficient: float) -> None:
     """Where friction may lock, no fixed number of rounds decides."""
     model = trunnion.read(EXAMPLES / f"{example}.yaml")
     paths = [path for path in model.parameter_set.entries if path.endswith("friction.coefficient")]
@@ -184,7 +169,7 @@ def test_friction_without_proof_of_one_solution_is_numpys(
     driver = next(iter(model.drivers))
     read_off = figures(run, f"effort:{driver}")
     values, time = varied(run, *free(run)[:2], spread=1e-4), run.cycle.times(36)
-    kernel = engine(run, read_off)
+    kernel = VectorKernel(run, read_off)
     curves, status = kernel.curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     assert kernel.again > 0
@@ -192,12 +177,12 @@ def test_friction_without_proof_of_one_solution_is_numpys(
     agree(curves, expected)
 
 
-def test_failures_are_those_of_numpy(engine: type[CompiledKernel]) -> None:
+def test_failures_are_those_of_numpy() -> None:
     """Lengths so far off that some samples do not assemble and others come near to a dead centre."""
     run = prepare(trunnion.read(DURANGO))
     read_off = figures(run, "angle:rocker", "effort:A")
     values, time = varied(run, "AB", "BC", "CD", spread=0.2), run.cycle.times(90)
-    curves, status = engine(run, read_off).curves(values, time)
+    curves, status = VectorKernel(run, read_off).curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     assert np.any(status == Status.NOT_ASSEMBLED)
     assert np.any(status == Status.SOLVED)
@@ -206,60 +191,27 @@ def test_failures_are_those_of_numpy(engine: type[CompiledKernel]) -> None:
 
 
 @pytest.mark.slow
-def test_any_number_of_samples_and_times_of_their_own(
-    engine: type[CompiledKernel], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Batches that do not come out even, and times that differ from sample to sample."""
-    monkeypatch.setitem(compiled_jax.BATCH, "cpu", 60)  # two samples at a time
+def test_any_number_of_samples_and_times_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Times that differ from sample to sample."""
     run = prepare(trunnion.read(DURANGO))
     read_off = figures(run, "effort:A")
     values = varied(run, "AB")
     time = run.cycle.times(30) + np.linspace(0.0, 0.01, SAMPLES)[:, None]
-    curves, _ = engine(run, read_off).curves(values, time)
+    curves, _ = VectorKernel(run, read_off).curves(values, time)
     back = run.solve(time, values)
     agree(curves, {"effort:A": back.efforts["A"]})
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("figure", ["angle:rocker", "effort:A"])
-def test_gradients_are_those_of_dual_numbers(figure: str) -> None:
-    run = prepare(trunnion.read(DURANGO))
-    read_off = figures(run, figure)
-    time = run.cycle.times(60)[3:27]  # no position with a relative speed of zero
-    values = varied(run, "AB", "BC", "CD")
-    stated = {path: values[path] for path in free(run) if np.ndim(values[path])}
-    slopes = JaxKernel(run, read_off).gradient(values, time, figure, lambda curve: curve.sum())
-    parameters = run.system.mechanism.parameter_set
-    for name in ("AB", "BC"):
-        path = parameters.resolve(name)
-        moved = parameters.evaluate({**stated, path: seed(stated[path])})
-        with np.errstate(all="ignore"):
-            curve = read_off[figure](run.solve(time, moved))
-        chained = sum(slope * derivative(moved[one]) for one, slope in slopes.items())
-        np.testing.assert_allclose(chained, np.sum(derivative(curve), axis=1, keepdims=True), rtol=1e-9)
-
-
-def test_what_only_numpy_does_is_said(engine: type[CompiledKernel]) -> None:
+def test_what_only_numpy_does_is_said() -> None:
     run = prepare(trunnion.read(EXAMPLES / "bennett.yaml"))
     with pytest.raises(MechanismError, match=r"over-constrained.*use the engine numpy"):
-        engine(run, {})
+        VectorKernel(run, {})
 
 
 @pytest.mark.slow
-def test_engines_are_imported_only_where_asked_for() -> None:
-    modules = "trunnion.studies.tolerance.compiled_jax, trunnion.solve.compiled_vectors"
-    code = f"import sys, {modules}; sys.exit(bool({{'jax', 'llvmlite'}} & set(sys.modules)))"
+def test_the_engine_is_imported_only_where_asked_for() -> None:
+    code = "import sys, trunnion.studies.tolerance.kernel; sys.exit('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parent).returncode == 0
-
-
-def test_compiled_functions_are_kept_between_runs(tmp_path: Path) -> None:
-    run = prepare(trunnion.read(DURANGO))
-    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
-    values, time = varied(run, "AB"), run.cycle.times(12)
-    kernel = JaxKernel(run, figures(run, "angle:rocker"), forces=False)
-    kernel.curves(values, time)
-    assert kernel.function(values) is kernel.function(values)
-    assert cache_directory("jax").parts[-2:] == ("trunnion", "jax")
 
 
 def toleranced(engine: str, **options: Any) -> Any:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import trunnion
 from mechanisms import DURANGO
-from trunnion.algebra.traced import UntraceableError, looped
+from trunnion.algebra.namespace import UntraceableError, looped
 from trunnion.engines.graph import BOTH, EXP_RANGE, POSITION, SAMPLE, SINE_RANGE, Graph
 from trunnion.engines.recorded import Recorded, functions, number_of
 from trunnion.solve.compiled_vectors import VectorKernel

@@ -17,8 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.traced import Traced
-
 __all__ = ["Dual", "depth", "derivative", "functions", "parts", "primal", "seed", "spatial"]
 
 
@@ -130,10 +128,10 @@ class Dual:
 
 
 def primal(number: Any) -> Any:
-    """The number without any ε: its innermost real part; of a compiled one, a constant for derivatives."""
+    """The number without any ε: its innermost real part."""
     while isinstance(number, Dual):
         number = number.real
-    return number.held() if isinstance(number, Traced) else number
+    return number
 
 
 def seed(number: Any) -> Dual:
@@ -165,11 +163,8 @@ def parts(number: Any) -> tuple[Any, Any]:
 
 
 def depth(numbers: Iterable[Any]) -> int:
-    """Steps of Newton's method at a solution that carry all derivatives of the numbers along: one for each level of ε.
-
-    Numbers that are compiled may be differentiated later, once.
-    """
-    return max((1 if isinstance(n, Traced) else _depth(n) for n in numbers), default=0)
+    """Steps of Newton's method at a solution that carry all derivatives of numbers along: one for each level of ε."""
+    return max(map(_depth, numbers), default=0)
 
 
 def _shape(number: Any) -> tuple[int, ...]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.traced import kept
 
 __all__ = [
     "condition",
@@ -87,7 +86,7 @@ def _solve(
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
                 for j in range(k + 1, columns):
-                    rows[i][j] = kept(rows[i][j] - factor * rows[k][j])
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
         solutions: list[list[Number]] = []
         for column in range(n, columns):
             x: list[Number] = [0.0] * n
@@ -186,7 +185,7 @@ def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number
             if everywhere:
                 rows[k][j], rows[i][j] = lower, upper
             else:
-                rows[k][j], rows[i][j] = kept(xp.where(swap, lower, upper)), xp.where(swap, upper, lower)
+                rows[k][j], rows[i][j] = xp.where(swap, lower, upper), xp.where(swap, upper, lower)
     return sign
 
 

@@ -1,24 +1,44 @@
 """One kernel, any number: pick the functions that fit the numbers a kernel was given.
 
 A kernel writes `xp = namespace(x, y)` and then `xp.sqrt(x)`; with floats and NumPy arrays that is NumPy, with
-dual numbers `trunnion.algebra.dual`, with JAX arrays `jax.numpy`. Nothing else in a kernel depends on the kind.
+dual numbers `trunnion.algebra.dual`, with numbers that are recorded those of their engine. Nothing else in a kernel
+depends on the kind.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
-from trunnion.algebra.traced import Traced
 
-__all__ = ["Number", "apart", "compiled", "namespace"]
+__all__ = ["Number", "Traced", "UntraceableError", "apart", "compiled", "looped", "namespace"]
 
-# A float, a NumPy or JAX array, or a dual number of them. Operators and `namespace` are all that is assumed.
+# A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
+# assumed.
 Number = Any
+
+
+class UntraceableError(TypeError):
+    """A kernel asks for what only numbers with values have: it cannot be compiled as it stands."""
+
+
+class Traced:
+    """A number that records what a kernel does with it, in the place of a NumPy array.
+
+    It has no value yet, so nothing can be decided by it. Where a kernel looks at all lanes to save work, `np.any` is
+    True and `np.all` is False: the answers that no lane contradicts.
+    """
+
+    __slots__ = ()
+
+    @classmethod
+    def looped(cls, step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
+        """See the function `looped`; rounds: at least 1, and one of the start at least is of this kind."""
+        raise NotImplementedError
 
 
 def namespace(*numbers: Number) -> Any:
@@ -43,3 +63,13 @@ def apart(lanes: Number) -> bool:
     Never among numbers that are compiled: such lanes stay unsolved there, and are computed again with NumPy.
     """
     return not isinstance(lanes, Traced) and bool(np.any(lanes))
+
+
+def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
+    """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
+    if rounds < 1:
+        return list(start)
+    kind = next((type(number) for number in start if isinstance(number, Traced)), None)
+    if kind is None:  # plain numbers; what a round makes of them tells the kind
+        return looped(step, step(list(start)), rounds - 1)
+    return kind.looped(step, start, rounds)

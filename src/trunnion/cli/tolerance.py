@@ -11,6 +11,7 @@ import typer
 from trunnion.cli.model import lines_of, stated
 from trunnion.cli.options import (
     At,
+    Engine,
     File,
     FrictionLaw,
     Jobs,
@@ -77,7 +78,7 @@ def tolerance(
         int | None,
         typer.Option("--chunk", help="Samples per chunk of work; about one second's by default.", show_default=False),
     ] = None,
-    engine: Annotated[str, typer.Option("--engine", help="numpy, compiled, gpu, jax, or auto: by size.")] = "auto",
+    engine: Engine = "auto",
     cluster: Cluster = None,
     checkpoint: Annotated[
         Path | None, typer.Option("--checkpoint", help="File to save the samples done so far.", show_default=False)

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.linalg import solve
-from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.traced import looped
+from trunnion.algebra.namespace import Number, looped, namespace
 from trunnion.dynamics.tables import FIXED
 
 __all__ = ["CompiledLanes", "Settled", "compiled_lanes"]

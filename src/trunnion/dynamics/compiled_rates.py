@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.traced import UntraceableError, looped
+from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.rates import Layout, Rates, Seen, Walks
 from trunnion.dynamics.state import DIFFERENCE, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset

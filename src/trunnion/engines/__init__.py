@@ -1,1 +1,1 @@
-"""How a kernel is run beside NumPy: recorded as a graph, and compiled. No kernel knows."""
+"""How a kernel is run beside NumPy: recorded as a graph, and compiled."""

@@ -5,26 +5,23 @@ s0 to s1 and the positions p0 to p1 of P. What is made of given numbers alone is
 sample alone once a sample, both as plain numbers; what differs by position alone once a call, into a table of the
 caller. The last vector of a row is moved back to end with
 it: so a row holds at least as many positions as a vector.
-
-For a GPU (`threads`) there are no loops: each thread computes one lane, all that it is made of included.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 from llvmlite import ir
 
 from trunnion.engines.graph import BOTH, POSITION, SAMPLE, Graph
-from trunnion.engines.lanes import BYTE, DOUBLE, INT, LONG, Lanes
+from trunnion.engines.lanes import BYTE, DOUBLE, LONG, Lanes
 
-__all__ = ["Program", "program", "thread_number"]
+__all__ = ["Program", "program"]
 
 KINDS = (0, SAMPLE, POSITION, BOTH)  # what numbers differ by
 COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
-PLACE = tuple(f"llvm.nvvm.read.ptx.sreg.{name}.x" for name in ("ctaid", "ntid", "tid"))  # of a thread, in a GPU
 Value = Any  # of llvmlite, which has no types
 
 
@@ -39,19 +36,15 @@ class Program:
     width: int
 
 
-def program(graph: Graph, outputs: Sequence[int], width: int, threads: bool = False) -> Program:
-    """A program that computes some nodes. Numbers become floats of 64 bits, what is true or false and "byte" bytes.
-
-    threads: for a GPU, a thread for each lane; the width is then 1, and the table none.
-    """
-    return (_ThreadWriter if threads else _Writer)(graph, outputs, width).write()
+def program(graph: Graph, outputs: Sequence[int], width: int) -> Program:
+    """A program that computes some nodes. Numbers become floats of 64 bits, what is true or false and "byte" bytes."""
+    return _Writer(graph, outputs, width).write()
 
 
 @dataclass
 class _Writer:
     """One module as it is written."""
 
-    convention: ClassVar[str] = ""
     graph: Graph
     outputs: Sequence[int]
     width: int
@@ -103,7 +96,6 @@ class _Writer:
         double = DOUBLE.as_pointer()
         kinds = [*[LONG] * 5, *[double.as_pointer()] * 5, double]
         function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), name="kernel")
-        function.calling_convention = self.convention
         self.arguments = function.args
         self.b = ir.IRBuilder(function.append_basic_block("entry"))
         tables: dict[tuple[float, ...], Value] = {}
@@ -294,31 +286,3 @@ class _Writer:
         self.b.cbranch(self.b.and_(more, lanes.differ(states, found)), body, after)
         self.b.position_at_end(after)
         return found
-
-
-class _ThreadWriter(_Writer):
-    """A module for a GPU: a thread computes one lane, with all that differs by its sample or position alone."""
-
-    convention = "ptx_kernel"
-
-    def _body(self, live: Sequence[int]) -> None:
-        first, last, low, high, stride = self.arguments[:5]
-        row = self.b.sub(high, low)
-        lane = thread_number(self.b, self.b.mul(self.b.sub(last, first), row))
-        s, p = self.b.add(first, self.b.sdiv(lane, row)), self.b.add(low, self.b.srem(lane, row))
-        place = self.b.add(self.b.mul(s, stride), p)
-        places = dict(zip(KINDS, (ir.Constant(LONG, 0), s, p, place), strict=True))
-        values = {n: value for kind, at in places.items() for n, value in self._loaded(kind, at).items()}
-        self._emit(live, values, self.scalar)
-        for k, n in enumerate(self.outputs):
-            self._output(self.out[k], place, self._of(n, values, self.scalar))
-
-
-def thread_number(b: Any, count: Value) -> Value:
-    """The number of this thread of a GPU; those from the count on end here."""
-    registers = (b.module.globals.get(name) or ir.Function(b.module, ir.FunctionType(INT, []), name) for name in PLACE)
-    block, size, thread = (b.zext(b.call(register, []), LONG) for register in registers)
-    number = b.add(b.mul(block, size), thread)
-    with b.if_then(b.icmp_signed(">=", number, count)):
-        b.ret_void()
-    return number

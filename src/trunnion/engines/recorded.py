@@ -1,7 +1,7 @@
 """Numbers that write down what is done with them: a kernel run once on them becomes a graph.
 
-They stand in the place of NumPy arrays as those of JAX do (`algebra.traced`): no values yet, so nothing can be decided
-by them; `np.any` is True and `np.all` is False.
+They stand in the place of NumPy arrays (`algebra.namespace.Traced`). Lanes that a kernel would treat apart are left as
+they are; who compiles must find them and compute them again with NumPy.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.traced import Traced, UntraceableError
+from trunnion.algebra.namespace import Traced, UntraceableError
 from trunnion.engines.graph import Graph
 
 __all__ = ["Recorded", "number_of"]
+
+OF_ALL_LANES: dict[Any, bool] = {np.any: True, np.all: False}  # the answers that no lane contradicts
 
 
 def number_of(graph: Graph, number: Any) -> int:
@@ -43,7 +45,7 @@ class Recorded(Traced):
     """A node of a graph that behaves as a NumPy array does in a kernel."""
 
     __slots__ = ("graph", "node")
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, graph: Graph, node: int) -> None:
         self.graph = graph
@@ -64,13 +66,7 @@ class Recorded(Traced):
     def dtype(self) -> Any:
         return np.dtype(bool if self.graph.boolean(self.node) else float)
 
-    def held(self) -> Traced:
-        return self
-
-    def kept(self) -> Traced:
-        return self  # every node is computed once
-
-    def astype(self, kind: Any) -> Traced:
+    def astype(self, kind: Any) -> Recorded:
         if np.dtype(kind) == bool:
             return Recorded(self.graph, self.graph.as_boolean(self.node))
         return Recorded(self.graph, self.graph.as_float(self.node))
@@ -85,13 +81,40 @@ class Recorded(Traced):
         found = graph.loop(nodes, [number_of(graph, one) for one in start], rounds)
         return [Recorded(graph, number) for number in found]
 
-    def __getitem__(self, index: Any) -> Traced:
+    def all(self, axis: Any = None) -> Any:
+        return np.all(self, axis=axis)
+
+    def __getitem__(self, index: Any) -> Recorded:
         if index in ((), ...):
             return self
         raise UntraceableError("a part of an array")
 
+    # ---- what needs a value -------------------------------------------------------------------------------------
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise UntraceableError("a number that is being compiled has no value yet")
+
+    __bool__ = __float__ = __int__ = __index__ = __len__ = __iter__ = __array__ = _refuse
+
+    # ---- NumPy's functions --------------------------------------------------------------------------------------
+
     def __array_namespace__(self, api_version: str | None = None) -> Any:
+        """The functions that go with this number, as the array standard names the hook."""
         return functions
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        if any(hasattr(number, "dual") for number in inputs):
+            return NotImplemented
+        if method != "__call__" or options:
+            raise UntraceableError(f"np.{ufunc.__name__} with {method} {', '.join(options)} is not compiled")
+        return getattr(functions, ufunc.__name__)(*inputs)
+
+    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: dict[str, Any]) -> Any:
+        if function in OF_ALL_LANES and not any(value is not None for value in (*args[1:], *options.values())):
+            return OF_ALL_LANES[function]
+        return getattr(functions, function.__name__)(*args, **options)
+
+    # ---- operators ----------------------------------------------------------------------------------------------
 
     __add__ = _operator("add")
     __radd__ = _operator("add", turned=True)

@@ -23,7 +23,7 @@ import numpy as np
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
-from trunnion.algebra.namespace import Number, apart, compiled, namespace
+from trunnion.algebra.namespace import Number, apart, compiled, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.algebra.plane import (
     ZERO_LOAD,
@@ -40,7 +40,6 @@ from trunnion.algebra.plane import (
     relative,
     times,
 )
-from trunnion.algebra.traced import looped
 from trunnion.groups import tree as spanning
 from trunnion.groups.cuts import CutRow, rows
 from trunnion.groups.gear import NUMBERS, ONE, GearPair, GearRow, actions

@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
-from trunnion.algebra.namespace import Number, apart, compiled, namespace
+from trunnion.algebra.namespace import Number, apart, compiled, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.algebra.space import ZERO, Frame, Screw, added, bracket, minus, moment_at, power, times
-from trunnion.algebra.traced import looped
 from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.groups import redundant
 from trunnion.groups.spatial_tree import Element, SpatialTree, entries

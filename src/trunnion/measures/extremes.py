@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 
-__all__ = ["FLAT", "Extreme", "Grid", "Tops", "highest", "largest", "shape_of"]
+__all__ = ["FLAT", "Extreme", "Grid", "largest", "shape_of"]
 
 FLAT = 1e-9  # of its size: a course that changes less has no extremes to tell the place of
 POINTS, FEWER = 7, 5

@@ -36,8 +36,8 @@ from trunnion.solve.switches import Bend
 from trunnion.solve.system import System
 
 __all__ = [
-    "RULES", "Curve", "Reference", "course_of", "figure", "judged", "judged_course", "kept", "known", "moment",
-    "number_at", "reference", "shown", "span",
+    "RULES", "Curve", "Reference", "course_of", "figure", "judged", "kept", "known", "moment", "reference",
+    "shown", "span",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -316,24 +316,13 @@ def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray
         return figures, kept(curve, nominal, figures), shown(curve, nominal)
     with np.errstate(all="ignore"):
         number = _single(nominal, _parts(curve, nominal))
-        return *judged_course(course_of(nominal, number), nominal), number
-
-
-def judged_course(course: Curve, nominal: Reference) -> tuple[Number, NDArray[np.bool_]]:
-    """`figure` and `kept` of a course whose figure is made of one number a position."""
-    measure = nominal.measure
-    if measure.rule == "deviation":
-        above, below = course.both()
-        figures = np.maximum(above, below)
-        return figures, _within(measure, figures, -below, above)
-    figures = _turned(RULES[measure.rule](course), nominal)
-    return figures, _within(measure, figures, figures - nominal.figure, figures - nominal.figure)
-
-
-def number_at(parts: Sequence[Number], meant: Sequence[Number], nominal: Reference) -> Number:
-    """The one number that a figure is made of, at single positions: of a course there and of the nominal one."""
-    there = replace(nominal, parts=tuple(meant))
-    return _single(there, (_near(parts[0], meant[0], TURN),) if nominal.turning else parts)
+        course = course_of(nominal, number)
+        if measure.rule == "deviation":
+            above, below = course.both()
+            figures = np.maximum(above, below)
+            return figures, _within(measure, figures, -below, above), number
+        figures = _turned(RULES[measure.rule](course), nominal)
+        return figures, _within(measure, figures, figures - nominal.figure, figures - nominal.figure), number
 
 
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.traced import UntraceableError
+from trunnion.algebra.namespace import Number, UntraceableError
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import forward

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.traced import looped
+from trunnion.algebra.namespace import Number, looped
 
 __all__ = ["Family", "System", "follow", "followed"]
 

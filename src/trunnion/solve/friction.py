@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.literal import is_zero
-from trunnion.algebra.namespace import Number
+from trunnion.algebra.namespace import Number, looped
 from trunnion.algebra.nested import replaced
-from trunnion.algebra.traced import looped
 from trunnion.joints.friction import LawFunction
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation

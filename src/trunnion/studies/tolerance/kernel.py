@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,54 +18,41 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
 from trunnion.solve.compiled import pays
+from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.studies.tolerance.inputs import Inputs
 
-if TYPE_CHECKING:
-    from trunnion.solve.compiled import CompiledKernel
+__all__ = ["batch_of", "engine_for", "kernel_of", "references"]
 
-__all__ = ["batch_of", "engine_for", "kernel_of", "parts_of", "references"]
-
-
-AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20, "jax": 1 << 20, "gpu": 1 << 22}  # numbers in an array, by engine
+AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20}  # numbers in an array, by engine
 WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
 
 
 @dataclass(frozen=True)
-class OtherKernel:
-    """The same by another engine; what that cannot decide NumPy computes again. numpy: the kernel it stands for."""
+class CompiledCourses:
+    """The same, compiled; what that cannot decide NumPy computes again. numpy: the kernel it stands for."""
 
     numpy: NumpyKernel
-    engine: str
 
     @cached_property
     def _parts(self) -> dict[str, tuple[Measure, int]]:
-        return parts_of(self.numpy)
+        """Measure and number of each part of each course, by a name."""
+        kernel = self.numpy
+        back = kernel.solved(kernel.run.values, np.zeros(1))
+        counts = [len(measure.curve(back)) for measure in kernel.measures]
+        pairs = zip(kernel.measures, counts, strict=True)
+        return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
 
     @cached_property
-    def _compiled(self) -> CompiledKernel:
-        made: type[CompiledKernel]
-        if self.engine == "jax":
-            from trunnion.studies.tolerance import compiled_jax
-
-            made = compiled_jax.JaxKernel
-        elif self.engine == "gpu":
-            from trunnion.solve import compiled_device
-
-            made = compiled_device.DeviceKernel
-        else:
-            from trunnion.solve import compiled_vectors
-
-            made = compiled_vectors.VectorKernel
-
+    def _compiled(self) -> VectorKernel:
         def figure(measure: Measure, k: int) -> Callable[[Backward], Number]:
             return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
         told = repr(list(self._parts.items()))
-        return made(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=told)
+        return VectorKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=told)
 
     def check(self, values: Mapping[str, Number]) -> None:
         """MechanismError for a mechanism that only NumPy takes."""
@@ -81,14 +67,6 @@ class OtherKernel:
         return found, status
 
 
-def parts_of(kernel: NumpyKernel) -> dict[str, tuple[Measure, int]]:
-    """Measure and number of each part of each course, by a name."""
-    found = kernel.solved(kernel.run.values, np.zeros(1))
-    counts = [len(measure.curve(found)) for measure in kernel.measures]
-    pairs = zip(kernel.measures, counts, strict=True)
-    return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
-
-
 def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> str:
     """The engine by its name; of auto the compiled one where it is installed, pays, and can take the mechanism."""
     if engine != "auto":
@@ -96,7 +74,7 @@ def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], co
     if not pays(configurations, WORTH_COMPILING) or any(measure.in_time for measure in numpy.measures):
         return "numpy"
     try:
-        OtherKernel(numpy, "compiled").check(values)
+        CompiledCourses(numpy).check(values)
     except MechanismError:
         return "numpy"
     return "compiled"
@@ -117,7 +95,7 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
         what = f"the measure '{timed}' is of a motion in time"
         raise MechanismError(Finding(what, "engine", "use numpy, which has motions in time, or auto"))
     if engine in AT_ONCE:
-        return OtherKernel(numpy, engine)
+        return CompiledCourses(numpy)
     raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(AT_ONCE)}"))
 
 

@@ -29,7 +29,6 @@ from trunnion.statistics.streams import SobolStream, uniforms
 from trunnion.statistics.tally import Tree, moments_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import batch_of, kernel_of, references
-from trunnion.studies.tolerance.on_device import DeviceReducer, Reduced
 from trunnion.version import __version__
 
 __all__ = ["METHODS", "SampleTally", "Sampling", "towards"]
@@ -213,12 +212,7 @@ class Sampling:
         places = plan(run, self.measures, self.steps)
         inputs = inputs_of(run)
         known = references(MotionKernel(run, self.measures, self.friction), places, inputs)
-        kernel = kernel_of(self.engine, run, self.measures, self.friction)
-        device = None
-        if self.engine == "gpu" and not any(one.corner or one.bends for one in known.values()):
-            bands = [(self.curve_spread[i][0], self.curve_bins(i)) for i in range(len(self.measures))]
-            device = DeviceReducer(MotionKernel(run, self.measures, self.friction), self.positions, known, bands)
-        return Sampler(self, inputs, places, kernel, known, device)
+        return Sampler(self, inputs, places, kernel_of(self.engine, run, self.measures, self.friction), known)
 
 
 def towards(gradients: Array) -> Array:
@@ -248,7 +242,6 @@ class Sampler:
     plan: PositionPlan
     kernel: Kernel
     nominal: Mapping[str, Reference]
-    device: DeviceReducer | None = None
 
     @cached_property
     def _streams(self) -> list[SobolStream]:
@@ -291,18 +284,6 @@ class Sampler:
         full = status.shape
         return {name: tuple(np.broadcast_to(part, full) for part in course) for name, course in courses.items()}, status
 
-    def reduced(self, u: Array) -> Reduced:
-        """What is kept of samples drawn."""
-        if self.device is not None:
-            values = self.inputs.values(u, self.job.rotation)
-            return self.device.reduced(values, self.plan.moved(values), u.shape[1])
-        found, passed, curves, status = self.figures(u)
-        bands = []
-        for i, curve in enumerate(curves):
-            whole = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
-            bands.append(count(whole.T, self.job.curve_bins(i)))
-        return Reduced(found, passed, bands, np.max(status, axis=-1))
-
     def evaluate(self, first: int, last: int) -> SampleTally:
         """The tally of blocks first, …, last − 1."""
         tally = self.job.empty()
@@ -313,13 +294,14 @@ class Sampler:
     def _add(self, tally: SampleTally, block: int) -> None:
         replicate, place = divmod(block, self.job.per_replicate)
         with np.errstate(all="ignore"):
-            found, passed, bands, gravest = self.reduced(self.drawn(block))
+            found, passed, curves, status = self.figures(self.drawn(block))
             lost = np.any(np.isnan(found), axis=0)
             tally.histogram[replicate] += count(found, self.job.bins)
-            for own, counts in zip(tally.band, bands, strict=True):
-                own[: len(counts)] += counts
+            for i, (own, curve) in enumerate(zip(tally.band, curves, strict=True)):
+                apart = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
+                own[: curve.shape[-1]] += count(apart.T, self.job.curve_bins(i))
             if np.any(lost):
-                gravest = gravest[lost]
+                gravest = np.max(status, axis=-1)[lost]
                 cause = np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1)
                 tally.failed[:] += np.bincount(cause, minlength=CAUSES)
             everything = np.concatenate([found, passed, np.min(passed, axis=0)[None]])

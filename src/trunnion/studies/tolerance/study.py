@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.deprecation import renamed
-from trunnion.engines.device import device
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -30,12 +29,11 @@ from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "METHODS", "tolerance"]
 
-ENGINES = ("numpy", "compiled", "gpu", "jax", "auto")
+ENGINES = ("numpy", "compiled", "auto")
 METHODS = ("linear", "worst-case", *SAMPLINGS, "sobol")
 DEFAULT_METHODS = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**15
-FEEDERS = 4  # threads that draw and judge for a GPU
 
 
 @renamed(friction="friction_method")
@@ -67,7 +65,7 @@ def tolerance(
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     friction_method: how friction and reactions are settled; Newton's method if not given.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
-    engine: numpy, compiled, gpu, jax (extras), or auto: compiled where it is installed, pays and can do the mechanism.
+    engine: numpy, compiled, or auto: compiled where it is installed, pays and can do the mechanism.
     target: the yield that is asked for; limits are missed below it, and if none is given where a worst case, a yield
     below 1 or a C_pk below 1 breaks them: errors among the findings.
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.
@@ -78,8 +76,6 @@ def tolerance(
     """
     (methods, notes), stated = _known(methods), engine
     _check(methods, samples, seed, engine, target)
-    if engine == "gpu" and cluster is None:  # that there is one is known before anything takes time
-        device()
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
     job, tally, shares, stopped = None, None, None, False
@@ -87,11 +83,10 @@ def tolerance(
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         if jobs is None:
-            alone = job.samples * job.positions < FEW and cluster is None
-            jobs = 1 if alone or engine == "jax" else FEEDERS if engine == "gpu" else None
+            jobs = 1 if job.samples * job.positions < FEW and cluster is None else None
         ran = runner.run(
             job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
-            threads=engine in ("compiled", "gpu"),
+            threads=engine == "compiled",
         )  # fmt: skip
         tally, stopped = ran.tally, ran.stopped
         notes += [*chosen, *ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]

@@ -1,7 +1,7 @@
-"""`analyse` with its number of positions: `python -m benchmarks.cycles [--most 10000000]`.
+"""`analyse` with its number of positions: `python -m benchmarks.cycles [--most 1000000]`.
 
-The four-bar of Durango et al. with friction, each line in its own process: held in memory, and written to a Parquet
-file in blocks. Time of the second analysis, once the machine code is there; processor time of all threads.
+The four-bar of Durango et al. with friction, each line in its own process, and written to a Parquet file. Time of the
+second analysis, once the machine code is there; processor time of all threads.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ WAYS = {
     "all, float32": {"dtype": "float32"},
     "to a file, effort and status": {"out": "cycle.parquet", "columns": ["A.effort", "status"]},
 }
-HELD = 2_000_000  # positions, the most that are held in memory here
 
 
 def alone(way: str, steps: int) -> None:
@@ -45,7 +44,7 @@ def alone(way: str, steps: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--most", type=int, default=10_000_000, help="positions of the longest file")
+    parser.add_argument("--most", type=int, default=1_000_000, help="positions, at most")
     parser.add_argument("--alone", nargs=2, metavar=("WAY", "STEPS"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.alone:
@@ -54,10 +53,8 @@ def main() -> None:
     shown = Table("kept", title="analyse(), four-bar with friction", title_justify="left", pad_edge=False)
     for title in ("positions", "ms", "ms of CPU", "µs of CPU\na position", "peak, MiB"):
         shown.add_column(title, justify="right")
-    for way, asked in WAYS.items():
-        for steps in (10**power for power in range(3, 9)):
-            if steps > (options.most if "out" in asked else HELD):
-                break
+    for way in WAYS:
+        for steps in (10**power for power in range(3, 8) if 10**power <= options.most):
             command = [sys.executable, "-m", "benchmarks.cycles", "--alone", way, str(steps)]
             told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
             times = [f"{1e3 * told[key]:.1f}" for key in ("seconds", "busy")]

@@ -206,11 +206,13 @@ def test_chunks_are_invisible(name: str, method: FrictionMethod | None, monkeypa
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * scale, err_msg=str(variable))
 
 
-@pytest.mark.parametrize("steps", [0, -3, 10**12])
-def test_senseless_number_of_positions(steps: int) -> None:
+@pytest.mark.parametrize("steps", [0, -3, 10**7 + 1])
+def test_a_number_of_positions_that_memory_cannot_hold(steps: int) -> None:
     with pytest.raises(MechanismError) as error:
         trunnion.analyse(build(four_bar()), steps)
-    assert "steps" in str(error.value)
+    (finding,) = error.value.findings
+    assert finding.where == "steps"
+    assert finding.remedy == "give a whole number from 1 to 10,000,000, for all positions are held in memory"
 
 
 # ---- ordinary extremes ----------------------------------------------------------------------------------------

@@ -183,7 +183,7 @@ def test_a_failing_writer_leaves_nothing(
     if suffix != ".zarr":
         path.write_text("before")
 
-    def breaks(path: Path, units_row: bool, columns: Any, in_parts: bool) -> None:
+    def breaks(result: Any, path: Path, units_row: bool, columns: Any) -> None:
         if path.exists():
             path.write_text("half")
         raise OSError(28, "No space left on device")
@@ -200,7 +200,7 @@ def test_a_failing_writer_leaves_nothing(
 
 
 def test_interrupted_while_writing(result: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(path: Path, units_row: bool, columns: Any, in_parts: bool) -> None:
+    def interrupted(result: Any, path: Path, units_row: bool, columns: Any) -> None:
         path.write_text("half")
         raise KeyboardInterrupt
 

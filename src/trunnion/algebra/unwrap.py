@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["START", "Tail", "unwrap_row"]
+__all__ = ["unwrap_row"]
 
 CHUNK = 8192  # positions at a time, to save memory
 
 
-class Tail(NamedTuple):
-    """The last solved position of a row: turns added, angle before that, its rate, its number counted from the end."""
-
-    turns: float = 0
-    last: float = np.nan
-    rate: float = 0.0
-    at: int = -1
-
-
-START = Tail()
-
-
-def unwrap_row(angle: NDArray[np.float64], rate: NDArray[np.float64], step: float, after: Tail = START) -> Tail:
+def unwrap_row(angle: NDArray[np.float64], rate: NDArray[np.float64], step: float) -> None:
     """Add whole turns in place so that the angle follows its rate from position to position (`step` s apart).
 
-    A gap of NaN is bridged to the nearest turn. Some positions at a time, to save memory. after: what came before;
-    returned is what the positions after these follow.
+    A gap of NaN is bridged to the nearest turn. Some positions at a time, to save memory.
     """
-    turns, last, last_rate, last_at = after
+    turns, last, last_rate, last_at = 0.0, np.nan, 0.0, -1
     for low in range(0, len(angle), CHUNK):
         part = angle[low : low + CHUNK]
         solved = np.flatnonzero(np.isfinite(part))
@@ -46,4 +31,3 @@ def unwrap_row(angle: NDArray[np.float64], rate: NDArray[np.float64], step: floa
         added = np.cumsum(np.rint((expected - (values - before)) / (2 * np.pi)))
         part[solved] = values + 2 * np.pi * (turns + added)
         turns, last, last_rate, last_at = turns + added[-1], values[-1], rates[-1], int(solved[-1]) + low
-    return Tail(turns, last, last_rate, last_at - len(angle))

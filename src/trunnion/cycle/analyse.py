@@ -47,9 +47,7 @@ def analyse(
     variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
     are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
     float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
-    out: files to write, as by `save`, whose other arguments are `saved`. Beyond `blocks.BLOCK` positions .csv,
-    .parquet, .zarr and .nc are solved and written a block at a time, so that memory does not grow with their number;
-    the Dataset then has as many positions as a block, and a finding says what is of these alone.
+    out: files to write, as by `save`, whose other arguments are `saved`.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
     unknown, or the engine is not installed or cannot do the mechanism.
@@ -76,13 +74,10 @@ def analysed(
     if run.determinacy is not None:
         run.determinacy.refuse()
     if out:
-        from trunnion.cycle import blocks  # and all that writes files
         from trunnion.results.export import check_format
 
         for path in out:
             check_format(path)
-        if blocks.blocked(run, steps, out):
-            return blocks.written(run, steps, out, method, progress, engine, kept, saved)
     found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
     result = summary.result_of(run, found, kept)
     for path in out:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.unwrap import START, Tail, unwrap_row
+from trunnion.algebra.unwrap import unwrap_row
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import useful_powers
@@ -109,23 +109,19 @@ def fill_efforts(arrays: Into, back: Backward, window: slice) -> None:
         put(arrays["gear_force"], i, back.gears[name].force, window)
 
 
-def unwrap(
-    arrays: Arrays, system: System, values: Values, time: NDArray[np.float64], tails: dict[str, Tail] | None = None
-) -> None:
+def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.float64]) -> None:
     """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations.
 
-    A driven rotation is the prescribed coordinate itself, whole turns included. tails: of the angles before these
-    positions, and then of these.
+    A driven rotation is the prescribed coordinate itself, whole turns included.
     """
     if not arrays["link_angle"].strides[-1]:  # nobody reads them
         return
-    tails = {} if tails is None else tails
     angles = arrays["link_angle"]
     order = list(system.mechanism.links)
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
     for link, angle, rate in zip(order, angles, arrays["link_angle_velocity"], strict=True):
         if link != system.mechanism.fixed_link:
-            tails[link] = unwrap_row(angle, rate, step, tails.get(link, START))
+            unwrap_row(angle, rate, step)
     for i, (name, (_, (first, second))) in enumerate(system.joints.items()):
         rotation = arrays["joint_rotation"][i]
         np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)

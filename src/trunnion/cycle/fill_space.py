@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.space import moment_at, quaternion
-from trunnion.algebra.unwrap import START, Tail, unwrap_row
+from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.cycle import fill
 from trunnion.joints.pairs import PAIRS
@@ -93,24 +93,17 @@ def fill_forces(arrays: fill.Into, back: Backward, window: slice) -> None:
     fill.fill_efforts(arrays, back, window)
 
 
-def unwrap(
-    arrays: Arrays, system: System, values: Values, time: NDArray[np.float64], tails: dict[str, Tail] | None = None
-) -> None:
-    """Rotations of joints on one axis without jumps of a whole turn; a driven one is the prescribed coordinate.
-
-    tails: of the rotations before these positions, and then of these.
-    """
+def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.float64]) -> None:
+    """Rotations of joints on one axis without jumps of a whole turn; a driven one is the prescribed coordinate."""
     if not arrays["joint_rotation"].strides[-1]:  # nobody reads them
         return
-    tails = {} if tails is None else tails
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         pair, rotation = PAIRS[kind], arrays["joint_rotation"][i]
         if name in system.mechanism.drivers and system.turns(name):
             rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
         elif pair.angle:
-            rate = arrays["joint_rotation_velocity"][i]
-            tails[name] = unwrap_row(rotation, rate, step, tails.get(name, START))
+            unwrap_row(rotation, arrays["joint_rotation_velocity"][i], step)
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         if PAIRS[kind].threaded:  # its slide follows the whole turns
             pitch = float(np.ravel(values[f"joints.{name}.pitch"])[0])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.unwrap import START, Tail, unwrap_row
+from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of, figures_of
 from trunnion.measures.measures import Measure, named
@@ -25,7 +25,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Watched", "positions_told", "values_at", "watched"]
+__all__ = ["VARIABLES", "Watched", "positions_told", "watched"]
 
 Array = NDArray[np.float64]
 # the model's measures, each in its own unit, in the attributes `measure_units` and `measure_figure_units`
@@ -186,14 +186,13 @@ def values_at(
     measures: Sequence[Measure],
     time: Array,
     method: FrictionMethod,
-    tails: dict[str, Tail] | None = None,
     compiled: bool = False,
 ) -> Array:
     """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers.
 
-    tails: of those that are angles before these times, and then of these; compiled: see `courses_of`.
+    compiled: see `courses_of`.
     """
-    system, tails = run.system, {} if tails is None else tails
+    system = run.system
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
         return values
@@ -207,5 +206,5 @@ def values_at(
         if measure.turning(system):
             rate = np.broadcast_to(np.asarray(measure.coordinate(system).rate(walk), float), time.shape)
             step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-            tails[measure.name] = unwrap_row(values[i], rate, step, tails.get(measure.name, START))
+            unwrap_row(values[i], rate, step)
     return values

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.quadrature import Effort
-from trunnion.algebra.unwrap import Tail
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.compiled import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors
@@ -34,7 +33,7 @@ from trunnion.solve.system import Dial, Values
 __all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"]
 
 
-MOST_STEPS = 100_000_000
+MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
 SEATED_AT_ONCE = 1 << 17  # positions whose seats the compiled engine settles together
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
 COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks for more, as a jump does that seats move
@@ -42,7 +41,7 @@ COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks 
 
 def check_steps(steps: int) -> None:
     if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
-        remedy = f"give a whole number from 1 to {MOST_STEPS:,}"
+        remedy = f"give a whole number from 1 to {MOST_STEPS:,}, for all positions are held in memory"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
 
 
@@ -78,20 +77,18 @@ def positions(
     averaged: bool = True,
     engine: str = "auto",
     wanted: Collection[str] | None = None,
-    among: int = 0,
 ) -> Positions:
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
     margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
-    are, which ask for many positions more; they are NaN if not. engine: see `compiled.cycle_kernels`. wanted: the
-    variables that will be read beside those that the books of the cycle are made of, all if not given; among: how many
-    positions there will be in all, if more.
+    are, which ask for many positions more; they are NaN if not. engine: see `compiled.compiles`. wanted: the
+    variables that will be read beside those that the books of the cycle are made of, all if not given.
     """
     check_steps(steps)
     _refuse_seats(run)
     method = replace(method or FrictionMethod(), margin_up_to=MARGIN if margin else 0.0)
     steps = steps if run.cycle.duration > 0 else 1
-    found = stretch(run, run.cycle.times(steps), method, engine, wanted, progress=progress, among=among)
+    found = stretch(run, run.cycle.times(steps), method, engine, wanted, progress)
     if not averaged:
         return found
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
@@ -108,21 +105,16 @@ def stretch(
     method: FrictionMethod,
     engine: str = "auto",
     wanted: Collection[str] | None = None,
-    tails: dict[str, Tail] | None = None,
     progress: Callable[[int], None] | None = None,
-    among: int = 0,
 ) -> Positions:
-    """The same at some times of the cycle, s, in a row and equally spaced; the means are NaN.
-
-    tails: of the angles before these times, and then of these; among: how many times there are in all, if more.
-    """
+    """The same at some times of the cycle, s, in a row and equally spaced; the means are NaN."""
     steps, wanted = len(time), None if wanted is None else needed(wanted, run.system, run.erring)
     labels = fill_of(run.system).labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
     parts = [part for part, there in (("seats", run.seats), ("errors", run.erring)) if there]
     arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts, wanted)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    compiled = compiles(engine, run, max(steps, among), method) and _fill_compiled(
+    compiled = compiles(engine, run, steps, method) and _fill_compiled(
         arrays, ideal, run, time, method, causes, engine == "auto"
     )
     back = None
@@ -138,7 +130,7 @@ def stretch(
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
-    fill_of(run.system).unwrap(arrays, run.system, run.values, time, tails)
+    fill_of(run.system).unwrap(arrays, run.system, run.values, time)
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     meant = still(ideal) if run.erring else None
     dial = run.system.dial(run.values, time)

@@ -42,15 +42,9 @@ if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
 __all__ = [
-    "BALANCED",
-    "balance",
-    "books",
-    "dataset_of",
     "effort_units",
-    "figures",
     "inputs",
     "model_notes",
-    "peak",
     "references",
     "result_of",
     "scene_of",

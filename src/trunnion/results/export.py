@@ -20,13 +20,14 @@ courses have one row a condition and position: `condition`, what was set, `phase
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import json
 import math
 import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -44,10 +45,9 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["FORMATS", "UNITS", "check_format", "check_units", "frame", "in_parts", "save", "saving"]
+__all__ = ["FORMATS", "UNITS", "check_format", "check_units", "frame", "save"]
 
 Columns = Callable[["xr.Dataset", str], list[Column]]  # of a table by name; of the file's own if that is empty
-Add = Callable[["xr.Dataset"], None]  # writes a result, or the next positions of one
 UNITS = ("si", "model")
 BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measurement")  # no column has one unit there
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
@@ -82,120 +82,59 @@ def _guarded(frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
-@contextmanager
-def _csv(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iterator[Add]:
+def _csv(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    found = columns(result, "")
     with path.open("w", encoding="utf-8", newline="") as file:
-        begun = False
-
-        def add(result: xr.Dataset) -> None:
-            nonlocal begun
-            found = columns(result, "")
-            for frame in map(_guarded, frames(found)):
-                if not begun:
-                    frame.head(0).to_csv(file, index=False)
-                if not begun and units_row:
-                    import csv
-
-                    units = [guarded(unit) for _, unit, _ in found]
-                    csv.writer(file, lineterminator="\n").writerow(units)
-                begun = True
-                frame.to_csv(file, index=False, header=False)
-
-        yield add
+        for k, rows in enumerate(map(_guarded, frames(found))):
+            if not k:
+                rows.head(0).to_csv(file, index=False)
+                if units_row:
+                    csv.writer(file, lineterminator="\n").writerow([guarded(unit) for _, unit, _ in found])
+            rows.to_csv(file, index=False, header=False)
 
 
-@contextmanager
-def _parquet(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iterator[Add]:
+def _parquet(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     with ExitStack() as stack:
         writer = None
-
-        def add(result: xr.Dataset) -> None:
-            nonlocal writer
-            for frame in frames(columns(result, "")):
-                rows = pa.Table.from_pandas(frame, preserve_index=False)
-                writer = writer or stack.enter_context(pq.ParquetWriter(path, rows.schema))
-                writer.write_table(rows)
-
-        yield add
+        for part in frames(columns(result, "")):
+            rows = pa.Table.from_pandas(part, preserve_index=False)
+            writer = writer or stack.enter_context(pq.ParquetWriter(path, rows.schema))
+            writer.write_table(rows)
 
 
-def _hdf() -> bool:
-    """Whether the packages for NetCDF 4 are installed."""
-    return all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))
-
-
-@contextmanager
-def _netcdf(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iterator[Add]:
-    engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if _hdf() else "scipy"
-    begun = False
-
-    def add(result: xr.Dataset) -> None:
-        nonlocal begun
-        if engine == "scipy" and KEPT in result.attrs:  # SciPy's writer takes this name for its own variables
-            result = result.copy(deep=False)
-            result.attrs[f"kept_{KEPT}"] = result.attrs.pop(KEPT)
-        if begun:
-            _append(result, path)
-        elif in_parts:
-            result.to_netcdf(path, engine=engine, unlimited_dims=["position"])
-        else:
-            try:
-                made = result.to_netcdf(engine=engine)
-            except ValueError:  # of an xarray that cannot make it in memory
-                result.to_netcdf(path, engine=engine)
-            else:  # by Python: where the disk is full, the HDF5 library takes the process with it
-                path.write_bytes(made)
-        begun = True
-
-    yield add
-
-
-def _append(result: xr.Dataset, path: Path) -> None:
-    """Further positions at the end of a NetCDF file, and what the result says now."""
-    import h5netcdf
-
-    with h5netcdf.File(path, "a") as file:
-        before = file.dimensions["position"].size
-        file.resize_dimension("position", before + result.sizes["position"])
-        for name, variable in result.variables.items():
-            if "position" in variable.dims:
-                file.variables[str(name)][..., before:] = variable.values
-        file.attrs.update(result.attrs)
-
-
-@contextmanager
-def _zarr(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iterator[Add]:
-    path.unlink()  # a Zarr store is a folder
-    begun = False
-
-    def add(result: xr.Dataset) -> None:
-        nonlocal begun
-        own = [name for name, one in result.variables.items() if begun and "position" not in one.dims]
-        along = "position" if begun else None
-        result.drop_vars(own).to_zarr(path, append_dim=along, zarr_format=2)  # 3 has no stable text arrays yet
-        begun = True
-
+def _netcdf(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    four = all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py"))  # else NetCDF 3
+    engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if four else "scipy"
+    if engine == "scipy" and KEPT in result.attrs:  # SciPy's writer takes this name for its own variables
+        result = result.copy(deep=False)
+        result.attrs[f"kept_{KEPT}"] = result.attrs.pop(KEPT)
     try:
-        yield add
+        made = result.to_netcdf(engine=engine)
+    except ValueError:  # of an xarray that cannot make it in memory
+        result.to_netcdf(path, engine=engine)
+    else:  # by Python: where the disk is full, the HDF5 library takes the process with it
+        path.write_bytes(made)
+
+
+def _zarr(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    path.unlink()  # a Zarr store is a folder
+    try:
+        result.to_zarr(path, zarr_format=2)  # 3 has no stable text arrays yet
     except BaseException:
         shutil.rmtree(path, ignore_errors=True)
         raise
 
 
-@contextmanager
-def _json(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iterator[Add]:
-    def add(result: xr.Dataset) -> None:
-        data = result.to_dict()
-        for section in ("coords", "data_vars"):
-            for entry in data[section].values():
-                entry["data"] = _plain(entry["data"])
-        with path.open("w", encoding="utf-8") as file:
-            json.dump(data, file, ensure_ascii=False, allow_nan=False)
-
-    yield add
+def _json(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    data = result.to_dict()
+    for section in ("coords", "data_vars"):
+        for entry in data[section].values():
+            entry["data"] = _plain(entry["data"])
+    with path.open("w", encoding="utf-8") as file:
+        json.dump(data, file, ensure_ascii=False, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:
@@ -205,16 +144,12 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-@contextmanager
-def _xlsx(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iterator[Add]:
-    def add(result: xr.Dataset) -> None:
-        tables = {name: columns(result, name) for name in KINDS[kind_of(result)]}
-        write_workbook(path, tables, str(result.attrs.get("name", "")))
-
-    yield add
+def _xlsx(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
+    tables = {name: columns(result, name) for name in KINDS[kind_of(result)]}
+    write_workbook(path, tables, str(result.attrs.get("name", "")))
 
 
-Writer = Callable[[Path, bool, Columns, bool], AbstractContextManager[Add]]
+Writer = Callable[["xr.Dataset", Path, bool, Columns], None]
 
 # extension: writer, the package it needs and the extra that brings it
 FORMATS: dict[str, tuple[Writer, str, str]] = {
@@ -225,13 +160,6 @@ FORMATS: dict[str, tuple[Writer, str, str]] = {
     ".parquet": (_parquet, "pyarrow", "parquet"),
     ".xlsx": (_xlsx, "xlsxwriter", "xlsx"),
 }
-IN_PARTS = (".csv", ".nc", ".zarr", ".parquet")
-
-
-def in_parts(path: str | os.PathLike[str]) -> bool:
-    """Whether a file can be written some positions at a time."""
-    suffix = Path(path).suffix.lower()
-    return suffix in IN_PARTS and (suffix != ".nc" or _hdf())
 
 
 def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> None:
@@ -277,24 +205,6 @@ def save(
     if units == "model" and kind_of(result) in BY_ROW:
         what = f"tables of a result of kind {kind_of(result)} name the unit in each row"
         raise MechanismError(Finding(what, "units", "write them in SI, without units='model'"))
-    with saving(path, units_row, columns, units) as add:
-        add(result)
-
-
-@contextmanager
-def saving(
-    path: str | os.PathLike[str],
-    units_row: bool = False,
-    columns: Sequence[str] | None = None,
-    units: str = "si",
-    in_parts: bool = False,
-) -> Iterator[Add]:
-    """What writes a result by the file's extension, whole or not at all; see `save`.
-
-    in_parts: a cycle, some positions at a time, one after the other; only in a format of IN_PARTS.
-    """
-    check_format(path)
-    check_units(units)
     suffix = Path(path).suffix.lower()
     writer, _, _ = FORMATS[suffix]
     if suffix == ".zarr" and Path(path).is_dir():
@@ -306,5 +216,5 @@ def saving(
         found = selected(result, columns if table in ("", own) else None, table or own)
         return in_model_units(result, found) if units == "model" else found
 
-    with whole(path) as temporary, writer(temporary, units_row, chosen, in_parts) as add:
-        yield add
+    with whole(path) as temporary:
+        writer(result, temporary, units_row, chosen)

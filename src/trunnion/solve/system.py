@@ -97,14 +97,9 @@ class Cycle:
     periodic: bool
     turns: float = 1.0
 
-    def times(self, steps: int, some: range | None = None) -> np.ndarray:
-        """`steps` equally spaced times, s; the end is left out where it repeats the start. some: those of them."""
-        if some is None:
-            return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
-        found = np.arange(some.start, some.stop) * (self.duration / max(1, steps - (not self.periodic)))
-        if not self.periodic and some.stop == steps > 1:
-            found[-1] = self.duration
-        return found
+    def times(self, steps: int) -> np.ndarray:
+        """`steps` equally spaced times, s; the end is left out where it repeats the start."""
+        return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
 
     def mean(self, values: NDArray[np.float64]) -> float:
         """Mean of values at `times`: plain over a period, by trapezoids over a range; NaN with a gap."""

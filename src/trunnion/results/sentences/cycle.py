@@ -129,20 +129,6 @@ CYCLE: dict[str, Sentence] = {
         "the RMS over the cycle, {rms:~{unit}}, exceeds the largest value at any position, {largest:~{unit}}",
         "use more --steps: a peak between two positions is in the means, but not in the extremes",
     ),
-    "cycle.in_blocks": Sentence(
-        NOTE,
-        "the files have all {steps:,} positions; extremes and counts in the summary are of all, findings, strokes, "
-        "what decides of locking and the backdriven efficiency of {looked:,} positions of the same cycle",
-    ),
-    "cycle.unseen": Sentence(
-        ERROR,
-        lambda states, steps, looked: (
-            f"of the {steps:,} positions in the files "
-            + ", ".join(f"{count:,} {agreeing(count, 'is', 'are')} {name}" for name, count in states.items())
-            + f"; none of the {looked:,} that findings are of is, so that no finding tells where and why"
-        ),
-        "see the status in the files, and analyse there more closely",
-    ),
     "load.drives": Sentence(
         WARNING, "this resistance is negative {at}: it drives the joint", "use max(0 N, …), or a load with a sign"
     ),

@@ -2,7 +2,6 @@
 
 Both are the whole of `trunnion.analyse`, Dataset and findings included, in turns; what the seats add is counted in
 times of the ideal analysis. The seats take the ideal mechanism, the rounds, the travel of the seats and the last walk.
-The engine is the one that `auto` finds.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import trunnion
 from trunnion import Mechanism
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-LIMIT = 2.0  # times the ideal analysis, added, where the compiled engine is installed
+LIMIT = 2.0  # times the ideal analysis, added
 MODELS = {  # positions; the four-bar of Durango et al. states no play
     "toleranced-slider-crank": 100_000,
     "fourbar-with-play": 100_000,

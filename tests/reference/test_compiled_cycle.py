@@ -14,7 +14,6 @@ import pytest
 import trunnion
 from mechanisms import DURANGO
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.cycle import positions as positions_module
 from trunnion.cycle.compiled import compiles
 from trunnion.cycle.positions import Positions, positions
 from trunnion.solve.compiled_vectors import VectorKernel
@@ -29,7 +28,6 @@ OF_THE_ITERATION = {
     "friction_change",
     "friction_residual",
     "friction_contraction",
-    "seat_change",
 }
 ROUNDING = {"power_residual", "closure_residual"}
 AGREE = 1e-9  # of the peak
@@ -49,14 +47,6 @@ def both(mechanism: Mechanism, steps: int) -> tuple[Positions, Positions]:
     return one, other
 
 
-# what play adds is small: it is held against what it is added to
-ADDED_TO = {
-    "joint_slide_velocity": "point_velocity", "joint_slide_acceleration": "point_acceleration",
-    "reaction_force_change": "reaction_force", "drive_effort_change": "drive_effort",
-    "friction_power_change": "friction_power",
-}  # fmt: skip
-
-
 def agree(one: Positions, other: Positions) -> None:
     """Statuses are equal, numbers agree to AGREE of the largest of their variable, and there is none for none."""
     np.testing.assert_array_equal(one.arrays["status"], other.arrays["status"])
@@ -65,8 +55,6 @@ def agree(one: Positions, other: Positions) -> None:
         np.testing.assert_array_equal(np.isfinite(a), np.isfinite(b), err_msg=name)
         known = np.isfinite(a)
         peak = np.max(np.abs(a[known]), initial=0.0)
-        if "seat_offset" in one.arrays and name in ADDED_TO:
-            peak = np.nanmax(np.abs(one.arrays[ADDED_TO[name]]))
         if peak > 1e-11:
             most = np.max(np.abs(a[known] - b[known]))
             assert most <= (MARGINS if name in ("locking_margin", "efficiency_instant") else AGREE) * peak, name
@@ -140,72 +128,18 @@ def test_what_only_numpy_does_is_said() -> None:
     assert trunnion.analyse(mechanism, 10, method).sizes["position"] == 10  # auto: NumPy
 
 
-# ---- pins in seats --------------------------------------------------------------------------------------------
-
-
-def seated(example: str) -> Mechanism:
-    mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")
-    if example == "durango-fourbar":
-        mechanism = mechanism.with_values({"joint_defaults.pin.clearance": "0.05 mm"})
-    return mechanism.with_seats("loaded")
-
-
-SEATED = ["fourbar-with-play", "durango-fourbar", "toleranced-slider-crank"]
-MORE_SEATED = [
-    "rssr-with-play", "pezzuti-cardan", "pezzuti-cardan-as-built", "piston-by-cost", "tilting-gudgeon-pin",
-    "worn-gudgeon-pin", "fourbar-by-grades",
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("steps", [90, 3000])
-@pytest.mark.parametrize("example", [*SEATED, *(pytest.param(one, marks=pytest.mark.slow) for one in MORE_SEATED)])
-def test_pins_in_loaded_seats_agree(example: str, steps: int) -> None:
-    """Steps of 4°, with neighbours of their own, and steps that are each other's neighbours."""
-    one, other = both(seated(example), steps)
-    assert np.nanmax(np.abs(one.arrays["seat_offset"])) > 0
-    assert other.compiled
-    np.testing.assert_array_equal(one.arrays["seat_rounds"], other.arrays["seat_rounds"])
-    agree(one, other)
-
-
-def test_pins_in_seats_that_are_given_agree() -> None:
+def test_pins_in_seats_are_left_to_numpy() -> None:
+    """They settle in rounds, at each position as many as it needs; those that are given too, for they travel."""
     mechanism = trunnion.read(EXAMPLES / "fourbar-with-play.yaml")
     given = mechanism.with_seats("free").with_values({"joints.B.seat": {"xi": "30 deg"}})
-    one, other = both(given, 90)
-    assert len(np.unique(one.arrays["seat_offset"][np.isfinite(one.arrays["seat_offset"])])) > 1
-    agree(one, other)
-
-
-@pytest.mark.parametrize("steps", [1, 5, 1003])
-def test_few_positions_and_many_parts_agree(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer positions than a vector holds, alone and at the end of several parts; other parts of NumPy's."""
-    monkeypatch.setattr(positions_module, "SEATED_AT_ONCE", 500)
-    agree(*both(seated("fourbar-with-play"), steps))
-
-
-def test_measures_with_pins_in_seats_agree() -> None:
-    """Of the slider's place and the drive torque, in steps that are each other's neighbours."""
-    one, other = (
-        trunnion.analyse(seated("toleranced-slider-crank"), 3000, engine=engine).measure_value.values
-        for engine in ("numpy", "compiled")
-    )
-    peak = np.nanmax(np.abs(one), axis=1, keepdims=True)
-    np.testing.assert_allclose(other / peak, one / peak, atol=1e-9)
-
-
-def test_means_with_pins_in_seats_agree() -> None:
-    one, other = (
-        positions(prepare(seated("fourbar-with-play")), 90, engine=engine) for engine in ("numpy", "compiled")
-    )
-    assert other.means.efficiency == pytest.approx(one.means.efficiency, rel=1e-9)
-    assert one.means.efficiency != pytest.approx(one.ideal.efficiency, rel=1e-6)
-
-
-def test_seats_are_compiled_from_fewer_positions_on() -> None:
-    run = prepare(seated("durango-fourbar"))
-    assert compiles("auto", run, 100_000)
-    assert not compiles("auto", run, 10_000)
-    assert not compiles("auto", prepare(trunnion.read(DURANGO)), 100_000)
+    for model in (mechanism.with_seats("loaded"), given):
+        assert not compiles("auto", prepare(model), 10**6)
+        with pytest.raises(MechanismError, match="pins in seats settle in rounds") as caught:
+            trunnion.analyse(model, 12, engine="compiled")
+        (finding,) = caught.value.findings
+        assert finding.where.endswith(".seat")
+        assert finding.remedy == "use the engine numpy"
+    assert compiles("auto", prepare(mechanism.with_seats("free")), 10**6)
 
 
 # ---- machine code that is kept --------------------------------------------------------------------------------

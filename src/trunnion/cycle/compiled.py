@@ -29,7 +29,6 @@ ENGINES = ("auto", "numpy", "compiled")
 WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
 FOLLOWED = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
 PROBED = 64  # positions at which it is seen whether margins are followed
-SEATED = 2.0  # times as soon does it pay with pins in seats: NumPy takes six times as long, compiling three times
 # variables that may have no finite value in a solved position
 UNDEFINED = ("efficiency_instant", "locking_margin", "contact_position")
 
@@ -127,17 +126,22 @@ class CycleKernel:
 
 
 def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
-    """Whether the compiled engine is to be tried. MechanismError if there is no such engine.
+    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or it cannot.
 
     method: of friction, where a locking margin is asked for at each position.
     """
     if engine not in ENGINES:
         raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
+    if engine == "compiled" and run.seats:
+        what = "pins in seats settle in rounds, at each position as many as it needs: that is not compiled"
+        raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
     if engine != "auto":
         return engine == "compiled"
-    weight = SEATED if run.seats else 1.0
+    if run.seats:
+        return False
+    weight = 1.0
     if method is not None and positions * FOLLOWED >= WORTH_COMPILING:
-        weight *= _weight(run, method)
+        weight = _weight(run, method)
     return pays(int(positions * weight), WORTH_COMPILING)
 
 

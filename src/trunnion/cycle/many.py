@@ -14,7 +14,7 @@ from trunnion.cycle.positions import IDEAL
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import CONDITIONS, Arrays, fill_chunk, fill_lanes, link_numbers, write
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import MechanismError
 from trunnion.results import variables as results
 from trunnion.solve.compiled import lanes_of
 from trunnion.solve.compiled_vectors import literals
@@ -40,9 +40,6 @@ class Many:
     _kernels: dict[object, CycleKernel] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.engine == "compiled" and self.run.seats:
-            what = "pins in seats follow the load: of many mechanisms that is not compiled"
-            raise MechanismError(Finding(what, f"joints.{self.run.seats[0].joint}.seat", "use the engine numpy"))
         self.compiled = compiles(self.engine, self.run, self.configurations)
 
     def filled(

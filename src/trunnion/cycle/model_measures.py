@@ -92,11 +92,8 @@ def positions_told(valid: NDArray[np.bool_]) -> str:
     return "" if np.all(valid) else f"of {np.count_nonzero(valid)} of {len(valid)} positions"
 
 
-def watched(
-    run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None, compiled: bool = False
-) -> Watched:
-    """The model's measures over the cycle. time: positions of the result, s; status: theirs, if known; compiled:
-    whether pins settle in their seats by the compiled engine.
+def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None) -> Watched:
+    """The model's measures over the cycle. time: positions of the result, s; status: theirs, if known.
 
     A figure at a position where a pin loses contact is NaN: it is that of a seat which would jump.
     """
@@ -107,7 +104,7 @@ def watched(
         except MechanismError as error:
             told = f"the measure '{name}' is left out: {error.findings[0].what}"
             findings.append(Finding(told, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
-    values = values_at(run, measures, time, method, compiled=compiled)
+    values = _values_at(run, measures, time, method)
     stated = [one for one in measures if one.rule != "deviation"]
     with np.errstate(all="ignore"):
         of_cycle = figures_of(run, stated, steps, method) if stated else {}
@@ -181,23 +178,14 @@ def _had(run: Run, name: str, steps: int) -> Measure:
     return measure
 
 
-def values_at(
-    run: Run,
-    measures: Sequence[Measure],
-    time: Array,
-    method: FrictionMethod,
-    compiled: bool = False,
-) -> Array:
-    """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers.
-
-    compiled: see `courses_of`.
-    """
+def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod) -> Array:
+    """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers."""
     system = run.system
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
         return values
     with np.errstate(all="ignore"):
-        courses = courses_of(run, measures, time, method, compiled)[0]
+        courses = courses_of(run, measures, time, method)[0]
         walk = forward(system, run.values, run.chosen.assembly, time)
     for i, measure in enumerate(measures):
         if len(courses[measure.name]) > 1:

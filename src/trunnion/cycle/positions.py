@@ -21,12 +21,11 @@ from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers,
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled_seats import CompiledLooks, Travelling, as_inputs
-from trunnion.solve.eccentricity_rate import Lanes, around, lanes, part_of
+from trunnion.solve.eccentricity_rate import Lanes, around, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import Seats, by_numpy, seats_of, settle
+from trunnion.solve.seating import Seated, settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
@@ -34,7 +33,6 @@ __all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"
 
 
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
-SEATED_AT_ONCE = 1 << 17  # positions whose seats the compiled engine settles together
 SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
 COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks for more, as a jump does that seats move
 
@@ -51,7 +49,7 @@ class Positions:
 
     means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
     one walk that they all came of, where it was one and pins lie in no seats; ideal_arrays: what the means of the ideal
-    mechanism are made of; compiled: whether the compiled engine found them.
+    mechanism are made of.
     """
 
     arrays: Arrays
@@ -65,7 +63,6 @@ class Positions:
     losses: list[contact_loss.Loss]
     walked: Backward | None = None
     ideal_arrays: Arrays = field(default_factory=dict)
-    compiled: bool = False
 
 
 def positions(
@@ -94,7 +91,7 @@ def positions(
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     return replace(
         found,
-        means=_means(run, found.arrays, quick, compiled=found.compiled and bool(run.seats)),
+        means=_means(run, found.arrays, quick),
         ideal=_means(run, found.ideal_arrays, quick, ideal=True) if run.erring else None,
     )
 
@@ -134,17 +131,17 @@ def stretch(
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     meant = still(ideal) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal, compiled)
+    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal)
 
 
-def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False, compiled: bool = False) -> Means:
+def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
     """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
     if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
         return still(arrays)
-    return run.once(("means", method, ideal, compiled), lambda: _averaged(run, method, ideal, compiled))
+    return run.once(("means", method, ideal), lambda: _averaged(run, method, ideal))
 
 
-def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> Means:
+def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
     """Means over the cycle, which do not depend on the positions that are asked for."""
     of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
     if ideal or not run.seats:
@@ -155,7 +152,7 @@ def _averaged(run: Run, method: FrictionMethod, ideal: bool, compiled: bool) -> 
 
     def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
         seen = around(time.ravel(), run.cycle)
-        found = settle(run, seen, method, CompiledLooks(run, seen.times, method) if compiled else None)
+        found = settle(run, seen, method)
         valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
         powers = _powers(found.back, time)
         if np.all(valid):
@@ -220,7 +217,7 @@ def _fill_as_built(
     for name, array in ideal.items():
         array[..., window] = scratch[name]
     if run.seats:
-        seated = settle(run, seen, method, by_numpy(run, seen, method, meant))
+        seated = settle(run, seen, method, meant)
         back = seated.back
         fill_chunk(arrays, back, part, window, causes)
         _note_seats(arrays, seated, window, causes)
@@ -232,7 +229,7 @@ def _fill_as_built(
     return back
 
 
-def _note_seats(arrays: Arrays, seated: Seats, window: slice, causes: diagnosis.Causes) -> None:
+def _note_seats(arrays: Arrays, seated: Seated, window: slice, causes: diagnosis.Causes) -> None:
     """What the iteration came to in one chunk, beside the walk with the pins in their seats."""
     causes.note_seats(seated.offsets, seated.sticks, window.start)
     arrays["seat_rounds"][window] = seated.rounds
@@ -252,8 +249,6 @@ def _fill_compiled(
     or_not: bool,
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
-    if run.seats:
-        return _fill_seated(arrays, ideal, run, time, method, causes, or_not)
     try:
         own = _kernel(run, run.values, time, arrays, method)
     except MechanismError:
@@ -263,7 +258,7 @@ def _fill_compiled(
     left = own.fill(arrays, run.values, time)[1]
     _fill_rest(arrays, left, lambda lanes: run.solve(time[lanes], method=method), time, causes)
     if run.erring:
-        _fill_beside_ideal(arrays, ideal, run, time, slice(0, len(time)), method)
+        _fill_beside_ideal(arrays, ideal, run, time, method)
     return True
 
 
@@ -272,61 +267,25 @@ def _fill_beside_ideal(
     ideal: Arrays,
     run: Run,
     time: NDArray[np.float64],
-    window: slice,
     method: FrictionMethod,
 ) -> None:
-    """The ideal mechanism at some positions, compiled, and what differs from it."""
-    quick, system, part = replace(method, margin_up_to=0.0), run.system, time[window]
+    """The ideal mechanism at all positions, compiled, and what differs from it."""
+    quick, system, everywhere = replace(method, margin_up_to=0.0), run.system, slice(0, len(time))
     labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-    meant = results.allocate(labels, len(part), absent, wanted={*IDEAL, *COMPARED})
-    left = _kernel(run, run.ideal_values, part, meant, quick).fill(meant, run.ideal_values, part)[1]
-    _fill_rest(meant, left, lambda lanes: run.ideal(part[lanes], quick), part)
+    meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
+    left = _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)[1]
+    _fill_rest(meant, left, lambda lanes: run.ideal(time[lanes], quick), time)
     for name, array in ideal.items():
-        array[..., window] = meant[name]
-    fill_errors(arrays, meant, link_numbers(system), window)
-    blank(arrays, arrays["status"][window].astype(np.int8), window)
-
-
-def _fill_seated(
-    arrays: Arrays,
-    ideal: Arrays,
-    run: Run,
-    time: NDArray[np.float64],
-    method: FrictionMethod,
-    causes: diagnosis.Causes,
-    or_not: bool,
-) -> bool:
-    """The same with pins in seats, as many positions at a time as memory should hold twice."""
-    for low in range(0, len(time), SEATED_AT_ONCE):
-        window = slice(low, min(low + SEATED_AT_ONCE, len(time)))
-        part, some = time[window], {name: array[..., window] for name, array in arrays.items()}
-        seen = lanes(part, run.cycle)
-        try:
-            seats = seats_of(run, seen, CompiledLooks(run, seen.times, method))
-            inputs = {**run.values, **as_inputs(seats.offsets, seats.moving)}
-            own = _kernel(run, inputs, part, some, method)
-        except MechanismError:
-            if or_not:
-                return False
-            raise
-
-        def solved(places: NDArray[np.intp], seats: Seats = seats, low: int = low) -> Backward:
-            own = places - low
-            offsets = {path: numbers[own] for path, numbers in seats.offsets.items()}
-            return run.at(time[places], offsets, method, travel=part_of(seats.moving, own, whole=True))
-
-        _fill_rest(arrays, own.fill(some, inputs, part)[1] + low, solved, time, causes)
-        _note_seats(arrays, seats, window, causes)
-        _fill_beside_ideal(arrays, ideal, run, time, window, method)
-    return True
+        array[...] = meant[name]
+    fill_errors(arrays, meant, link_numbers(system), everywhere)
+    blank(arrays, arrays["status"].astype(np.int8), everywhere)
 
 
 def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:
     """The compiled kernel of some variables, made once for numbers of one kind."""
     read = tuple(name for name, array in arrays.items() if array.strides[-1])
-    of = Travelling(run.system, run.values, run.cycle, run.chosen) if len(values) > len(run.values) else run
-    key = "compiled", values is run.values, len(values), method, read
-    return run.once(key, lambda: CycleKernel(of, values, time, arrays, write, method))
+    key = "compiled", values is run.values, method, read
+    return run.once(key, lambda: CycleKernel(run, values, time, arrays, write, method))
 
 
 def _fill_rest(

@@ -20,7 +20,6 @@ from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan, plan
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled_seats import CompiledLooks
 from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -96,19 +95,18 @@ class NumpyKernel:
 
 
 def courses_of(
-    run: Run, measures: Sequence[Measure], time: NDArray[np.float64], method: FrictionMethod, compiled: bool = False
+    run: Run, measures: Sequence[Measure], time: NDArray[np.float64], method: FrictionMethod
 ) -> tuple[Courses, NDArray[np.int8]]:
     """The course of each measure of the mechanism itself at some times, s, and their statuses; pins lie in their seats.
 
-    What was asked of the method's margin is left to the measures. compiled: whether the pins settle by that engine.
+    What was asked of the method's margin is left to the measures.
     """
     kernel = NumpyKernel(run, tuple(measures), replace(method, margin_up_to=0.0))
     if not run.seats:
         return kernel.courses(run.values, time)
     seen = lanes(time, run.cycle)
     with np.errstate(all="ignore"):
-        looks = CompiledLooks(run, seen.times, kernel.method) if compiled else None
-        seated = settle(run, seen, kernel.method, looks)
+        seated = settle(run, seen, kernel.method)
         status = status_of(seated.back, time.shape)
         np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
         found = {

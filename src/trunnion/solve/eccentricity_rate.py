@@ -202,10 +202,9 @@ def _pairs(even: NDArray[np.bool_], own: Lane, step: int) -> tuple[Lane, Lane]:
     return before, after
 
 
-def part_of(found: Mapping[str, Travel], lanes: Lane, whole: bool = False) -> dict[str, Travel]:
-    """The velocities at some of the positions, as if the links were not accelerated by it; whole: as they are."""
-
-    def part(numbers: Any) -> Any:
-        return each(numbers, lambda number: sliced(number, lanes))
-
-    return {link: Travel(part(one.twist), part(one.acceleration) if whole else None) for link, one in found.items()}
+def part_of(found: Mapping[str, Travel], lanes: Lane) -> dict[str, Travel]:
+    """The velocities at some of the positions, as if the links were not accelerated by it."""
+    return {
+        link: Travel(each(travelling.twist, lambda number: sliced(number, lanes)), None)
+        for link, travelling in found.items()
+    }

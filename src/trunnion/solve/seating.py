@@ -12,7 +12,7 @@ import functools
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 from trunnion.solve.seats import GivenSeat
 
 __all__ = [
-    "ROUNDS", "TOLERANCE", "ByNumpy", "Looks", "Pressed", "Seated", "Seats", "by_numpy", "centred", "loads_of",
-    "seats_of", "settle", "wanted",
+    "ROUNDS", "TOLERANCE", "Seated", "loads_of", "settle",
 ]  # fmt: skip
 
 ROUNDS = 10  # most of the iteration
@@ -58,44 +57,21 @@ class Pressed(NamedTuple):
     speeds: Array
 
 
-class Looks(Protocol):
-    """The walks that seats are settled by, by NumPy or compiled.
-
-    first, meant: the ideal mechanism at all lanes, what it presses and the motion of every link.
-    """
-
-    first: Pressed
-    meant: Mapping[str, Any]
-
-    def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
-        """With the pins at offsets, as they travel there."""
-
-    def moved(self, time: Array, offsets: Mapping[str, Array], rates: Mapping[str, Array]) -> Mapping[str, Moved]:
-        """How every link moves with the pins at offsets, and what their rates add."""
-
-
 @dataclass(frozen=True)
-class Seats:
-    """Where the pins of some positions lie.
+class Seated:
+    """Where the pins of some positions lie, and the walk with them there.
 
-    offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; moving: how the links also move as the seats travel;
-    rounds: of the iteration; change: that one more round would make, of the clearances; sticks: positions
-    at which only the travel of the seats decides the sense of a friction, the joint itself being all but at rest;
-    told: at which the accelerations contain the travel of the seats.
+    offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; rounds: of the iteration; change: that one more round
+    would make, of the clearances; sticks: positions at which only the travel of the seats decides the sense of a
+    friction, the joint itself being all but at rest; told: at which the accelerations contain the travel of the seats;
+    loads: of the pin on each end of its hole, N, by joint.
     """
 
     offsets: dict[str, Array]
-    moving: dict[str, Travel]
     rounds: NDArray[np.intp]
     change: Array
     sticks: NDArray[np.bool_]
     told: NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Seated(Seats):
-    """The same with the walk there, and the loads of the pin on each end of its hole, N, by joint."""
-
     back: Backward
     loads: dict[str, list[Vector]]
 
@@ -131,58 +107,38 @@ def _share(back: Backward, joint: str) -> Number | None:
     return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 
-class ByNumpy:
-    """`Looks` of a run by NumPy."""
+def settle(run: Run, seen: Lanes, method: FrictionMethod, ideal: Backward | None = None) -> Seated:
+    """The positions of some lanes with every pin in its seat.
 
-    def __init__(self, run: Run, method: FrictionMethod, first: Pressed, meant: Mapping[str, Any]) -> None:
-        self._run, self._method = run, method
-        self.first, self.meant = first, meant
-
-    def pressed(self, time: Array, offsets: Mapping[str, Array], travel: Mapping[str, Travel] | None = None) -> Pressed:
-        return _told(self._run, self._run.at(time, offsets, self._method, travel=travel), len(time))
-
-    def moved(self, time: Array, offsets: Mapping[str, Array], rates: Mapping[str, Array]) -> Mapping[str, Moved]:
-        return rate.moved(self._run, {**self._run.values, **offsets}, rates, time)
-
-
-def settle(run: Run, seen: Lanes, method: FrictionMethod, looks: Looks | None = None) -> Seated:
-    """The positions of some lanes with every pin in its seat. looks: by which they settle, by NumPy if not given."""
-    found = seats_of(run, seen, looks or by_numpy(run, seen, method))
-    back = run.at(seen.times[seen.own], found.offsets, method, travel=found.moving)
-    loads = {seat.joint: loads_of(back, seat) for seat in run.seats}
-    return Seated(**vars(found), back=back, loads=loads)
-
-
-def by_numpy(run: Run, seen: Lanes, method: FrictionMethod, start: Backward | None = None) -> ByNumpy:
-    """`Looks` at some lanes by NumPy. start: motion and reactions of the ideal mechanism at all of them, if known."""
-    quick = replace(method, margin_up_to=0.0)
-    start = start or run.ideal(seen.times, quick)
-    return ByNumpy(run, quick, _told(run, start, len(seen.times)), start.walk.motions)
-
-
-def seats_of(run: Run, seen: Lanes, looks: Looks) -> Seats:
-    """The seats of the positions of some lanes.
-
-    They are those of the loads with the pins held; the travel of the seats comes with the last walk.
+    The seats are those of the loads with the pins held; their travel comes with the last walk. ideal: motion and
+    reactions of the ideal mechanism at all lanes, if they are solved already.
     """
-    count, time, offsets = len(seen.times), seen.times[seen.own], looks.first.offsets
+    quick = replace(method, margin_up_to=0.0)
+    ideal = ideal or run.ideal(seen.times, quick)
+    count, time = len(seen.times), seen.times[seen.own]
+    offsets, speeds = _told(run, ideal, count)
     rounds, change = np.zeros(count, np.intp), np.zeros(count)
     loaded = any(seat.given is None for seat in run.seats)
     sticks = np.zeros(len(time), bool)
     senses = np.zeros((len(rubbing(run.system)), count))
     if loaded:
-        _iterate(run, seen.times, looks, offsets, rounds, change, np.arange(count), senses)
-    moving, told = travel(run, seen, offsets, looks.meant, looks.moved)
+        _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(count), senses)
+
+    def moved(time: Array, offsets: Mapping[str, Array], rates: Mapping[str, Array]) -> Mapping[str, Moved]:
+        return rate.moved(run, {**run.values, **offsets}, rates, time)
+
+    moving, told = travel(run, seen, offsets, ideal.walk.motions, moved)
     mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
     rounds, change = rounds[seen.own], change[seen.own]
     if loaded and moving:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        left = np.flatnonzero(_slow(looks.first.speeds)[seen.own] & (rounds < ROUNDS))
+        left = np.flatnonzero(_slow(speeds)[seen.own] & (rounds < ROUNDS))
         part = {path: numbers[left] for path, numbers in mine.items()}
-        turned = np.sign(looks.pressed(time[left], part, part_of(moving, left)).speeds)
+        turned = np.sign(_pressed_at(run, time[left], part, quick, part_of(moving, left)).speeds)
         left = left[np.any(turned != senses[:, seen.own[left]], axis=0)]
         sticks[left] = True
-        _iterate(run, time, looks, mine, rounds, change, left, senses[:, seen.own], moving)
-    return Seats(mine, moving, rounds, change, sticks, told)
+        _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
+    back = run.at(time, mine, method, travel=moving)
+    return Seated(mine, rounds, change, sticks, told, back, {seat.joint: loads_of(back, seat) for seat in run.seats})
 
 
 def _slow(speeds: Array) -> NDArray[np.bool_]:
@@ -194,7 +150,7 @@ def _slow(speeds: Array) -> NDArray[np.bool_]:
 def _iterate(
     run: Run,
     time: Array,
-    looks: Looks,
+    method: FrictionMethod,
     offsets: dict[str, Array],
     rounds: NDArray[np.intp],
     change: Array,
@@ -215,7 +171,7 @@ def _iterate(
     last, earlier, kept = np.full(len(left), 1 / MARGIN), None, left
     while len(left):
         part = {path: numbers[left] for path, numbers in offsets.items()}
-        goal, speeds = looks.pressed(time[left], part, part_of(moving, left) if moving else None)
+        goal, speeds = _pressed_at(run, time[left], part, method, part_of(moving, left) if moving else None)
         senses[:, left] = np.sign(speeds)
         rounds[left] += 1
         now = _change(run.seats, part, goal)
@@ -259,9 +215,21 @@ def _at_the_wall(
     return ahead
 
 
+def _pressed_at(
+    run: Run,
+    time: Array,
+    offsets: Mapping[str, Array],
+    method: FrictionMethod,
+    travel: Mapping[str, Travel] | None = None,
+) -> Pressed:
+    """What reactions press with the pins at offsets, as they travel there."""
+    return _told(run, run.at(time, offsets, method, travel=travel), len(time))
+
+
 def _told(run: Run, back: Backward, count: int) -> Pressed:
-    """What a walk by NumPy says of the seats."""
-    offsets = {path: centred(_row(number, count)) for path, number in wanted(run.seats, back).items()}
+    """What a walk says of the seats; a pin whose load is not known (locked, not assembled) is left in the middle."""
+    rows = {path: _row(number, count) for path, number in _wanted(run.seats, back).items()}
+    offsets = {path: np.where(np.isfinite(row), row, 0.0) for path, row in rows.items()}
     speeds = [_row(back.slips[joint].speed, count) for joint in rubbing(run.system)]
     return Pressed(offsets, np.array(speeds).reshape(len(speeds), count))
 
@@ -270,13 +238,7 @@ def _row(number: Number, count: int) -> Array:
     return np.array(np.broadcast_to(primal(number), (count,)), float)
 
 
-def centred(offsets: Array) -> Array:
-    """The same array; a pin whose load is not known (locked, not assembled) is left in the middle."""
-    offsets[~np.isfinite(offsets)] = 0.0
-    return offsets
-
-
-def wanted(found: Sequence[GivenSeat], back: Backward) -> dict[str, Number]:
+def _wanted(found: Sequence[GivenSeat], back: Backward) -> dict[str, Number]:
     """The seats into which the reactions of a walk press the pins, and those that are given."""
     least = NO_LOAD * _largest_reaction(back)
     offsets: dict[str, Number] = {}

@@ -47,8 +47,8 @@ def trunnion_side(job: Job) -> Side | None:
 
 
 def compiled_side(job: Job, threads: int = 1) -> Side | None:
-    """The same numbers by the compiled engine; None where it is not installed."""
-    if not version("trunnion") or not version("llvmlite"):
+    """The same numbers by the compiled engine; None where Trunnion is not installed."""
+    if not version("trunnion"):
         return None
     from trunnion.solve.compiled import Lanes
     from trunnion.solve.compiled_vectors import VectorKernel

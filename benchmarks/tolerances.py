@@ -15,7 +15,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -164,7 +163,7 @@ def peer(console: Console) -> None:
         ("Trunnion, angle and torque with friction", fourbar(), BOTH),
     ):
         found = study(mechanism, measures, steps=steps)
-        for engine in ("numpy", "compiled") if find_spec("llvmlite") else ("numpy",):
+        for engine in ("numpy", "compiled"):
             job = found.sampling("monte-carlo", samples, 1, engine)
             sampler = found.sampler(job)
             sampler.evaluate(0, 1)

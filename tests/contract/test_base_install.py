@@ -39,7 +39,6 @@ WORK = [
     ["schema"],
 ]
 REFUSED = {
-    "compiled": ["sweep", FOUR_BAR, "--over", "AB=1.9m,2.0m", "--engine", "compiled"],
     "parquet": ["analyse", FOUR_BAR, "--out", "a.parquet"],
     "zarr": ["analyse", FOUR_BAR, "--out", "a.zarr"],
     "xlsx": ["analyse", FOUR_BAR, "--out", "a.xlsx"],

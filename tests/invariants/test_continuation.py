@@ -92,7 +92,6 @@ def test_continuation_never_claims_a_solution_beyond_the_fold() -> None:
 @pytest.mark.parametrize("seed", range(2))
 def test_compiled_steps_lead_as_far(seed: int) -> None:
     """The same way, recorded and compiled: a lane stops at the same fold, or goes on where the other does."""
-    pytest.importorskip("llvmlite")
     from trunnion.engines.graph import POSITION, Graph
     from trunnion.engines.machine_code import MachineCode, vector_width
     from trunnion.engines.program import program

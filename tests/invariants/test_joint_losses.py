@@ -98,7 +98,6 @@ def test_they_are_parameters() -> None:
 
 
 def test_the_compiled_engine_has_them() -> None:
-    pytest.importorskip("llvmlite")
     base, over = lossy(slider_crank(0.1), LOSSES), {"S.losses.constant": [0.0, 20.0], "Q.losses.viscous": [0.0, 1e-3]}
     one, other = (sweep(base, over, steps=36, engine=engine) for engine in ("numpy", "compiled"))
     for name in ("drive_effort_max", "friction_power_mean", "reaction_max"):

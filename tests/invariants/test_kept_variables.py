@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +15,9 @@ from trunnion.results import variables as results
 EXAMPLES = DURANGO.parent
 STEPS = 60
 ASKED = [["reaction_force"], ["joint_rotation", "point_position"], ["locking_margin"], ["drive_effort_lower"], []]
-compiled = pytest.param("compiled", marks=pytest.mark.skipif(find_spec("llvmlite") is None, reason="an extra"))
 
 
-@pytest.mark.parametrize("engine", ["numpy", compiled])
+@pytest.mark.parametrize("engine", ["numpy", "compiled"])
 @pytest.mark.parametrize("example", ["durango-fourbar", "drawing-press", "rssr", "fourbar-by-grades"])
 def test_what_is_kept_is_what_the_whole_result_has(example: str, engine: str) -> None:
     mechanism = trunnion.read(EXAMPLES / f"{example}.yaml")

@@ -88,7 +88,6 @@ def test_in_space() -> None:
 
 
 def test_the_compiled_engine_has_them() -> None:
-    pytest.importorskip("llvmlite")
     model = pressed(PRESS.format("S.slide"))
     one, other = (sweep(model, {"rod.mass": [0.4, 0.5]}, steps=36, engine=engine) for engine in ("numpy", "compiled"))
     assert other["drive_effort_max"].values == pytest.approx(one["drive_effort_max"].values, rel=1e-9)

@@ -12,7 +12,7 @@ import trunnion
 from timed import LINEAR, slider_crank, wheel
 from trunnion.dynamics import batch, lanes
 from trunnion.dynamics.batch import figures_in_time, one_by_one
-from trunnion.dynamics.compiled_lanes import CompiledLanes, compiled_lanes
+from trunnion.dynamics.compiled_lanes import CompiledLanes
 from trunnion.dynamics.course import FIGURES, Courses
 from trunnion.dynamics.lanes import LaneState, picked_drive
 from trunnion.dynamics.rates import Layout, Rates, Walks
@@ -99,7 +99,6 @@ def test_the_flywheel_of_the_theory() -> None:
 
 def test_machine_code_and_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same accelerations and friction forces of every lane, also where it leaves all lanes to NumPy."""
-    pytest.importorskip("llvmlite")
     run, count = prepare(slider_crank(drivers={"O": {"speed": 100, "start": 0.3, "motor": MOTORS["geared"]}})), 37
     values, motion = spread(run.system.mechanism, count, links__crank__inertia=0.1), FreeMotion.of(run)
     nominal, own = tabulates(motion, places(motion)), batch._drive(motion, values)
@@ -110,8 +109,7 @@ def test_machine_code_and_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     turn = draw.uniform(0.0, 2 * np.pi, count)
     stretch, speed = np.sum(tables.low <= turn[:, None], axis=1) - 1, draw.uniform(-150.0, 150.0, count)
     at = LaneState(0.0 * turn, turn, speed, 0.0 * turn, np.maximum(stretch, 0), 0.0 * turn, 0.0 * turn, no, no)
-    code = compiled_lanes([rub.load.across is None for rub in tables.rubs], count)
-    assert code is not None
+    code = CompiledLanes(tuple(rub.load.across is None for rub in tables.rubs), count)
     found = []
     for compiled in (None, code, code):
         one = lanes.Lanes(tables, rows, picked_drive(own, rows), np.zeros((count, len(tables.rubs))), compiled)

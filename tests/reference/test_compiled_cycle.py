@@ -20,8 +20,6 @@ from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import prepare
 
-pytest.importorskip("llvmlite")
-
 EXAMPLES = DURANGO.parent
 OF_THE_ITERATION = {
     "friction_iterations",

@@ -136,7 +136,6 @@ def test_the_reaction_in_play_is_the_contact_force() -> None:
 
 
 def test_machine_code_has_the_rates_of_the_walks() -> None:
-    pytest.importorskip("llvmlite")
     for mechanism in (rattling(), both_pins(), loose_slider(), rubbing(SMOOTH), rubbing(0.1)):
         motion, row = _opened(mechanism)
         compiled = compiled_rates(motion)

@@ -17,14 +17,12 @@ from numpy.typing import NDArray
 import trunnion
 from mechanisms import DURANGO
 from trunnion.algebra.namespace import UntraceableError, looped
+from trunnion.engines import machine_code
 from trunnion.engines.graph import BOTH, EXP_RANGE, POSITION, SAMPLE, SINE_RANGE, Graph
+from trunnion.engines.program import program
 from trunnion.engines.recorded import Recorded, functions, number_of
 from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import prepare
-
-pytest.importorskip("llvmlite")
-machine_code = pytest.importorskip("trunnion.engines.machine_code")
-program = pytest.importorskip("trunnion.engines.program").program
 
 Array = NDArray[np.float64]
 SPECIAL = np.array([0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 1e-300, 5.0, -2.5])

@@ -108,8 +108,6 @@ def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: f
 
 @pytest.mark.parametrize("engine", ["numpy", "compiled"])
 def test_a_study_has_the_part_of_the_place_at_which_the_load_begins(engine: str) -> None:
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
     half, numbers = 2e-4, ("r", "rod", "touch")
     model = trunnion.Mechanism(
         **{**PRESS, "tolerances": dict.fromkeys(numbers, half), "measures": {"up": FIGURES["power"]}}

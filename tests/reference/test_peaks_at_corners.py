@@ -86,8 +86,6 @@ def test_the_peak_and_its_derivatives_are_those_where_the_load_begins(load: str,
 
 @pytest.mark.parametrize("engine", ["numpy", "compiled"])
 def test_samples_have_the_scatter_of_a_monte_carlo_of_the_formula(engine: str) -> None:
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
     result = trunnion.tolerance(model(), methods=("linear", "monte-carlo"), samples=10_000, steps=72, engine=engine)
     rng = np.random.default_rng(3)
     drawn = peak(

@@ -104,7 +104,6 @@ def test_every_module_is_a_driver_and_compiled() -> None:
     motion, row = _opened(tilting())
     assert all(len(module.links) == 1 for module in motion.system.plan.modules)
     assert len(motion.names) == 5
-    pytest.importorskip("llvmlite")
     compiled = compiled_rates(motion)
     assert compiled is not None
     rng = np.random.default_rng(4)

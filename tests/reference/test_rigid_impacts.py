@@ -244,7 +244,6 @@ def trammel(clearance: float = 2e-4, friction: float = 0.05) -> Mechanism:
 
 def test_machine_code_of_closed_contacts_and_walks() -> None:
     """Rates, works, forces of contacts and what impulses come to, for contacts that fly, slip and stick."""
-    pytest.importorskip("llvmlite")
     mechanism = trammel()
     run = prepare(mechanism)
     motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, ["H", "V"]))

@@ -151,8 +151,6 @@ def test_seed_and_only_the_seed_changes_samples() -> None:
 @pytest.mark.parametrize("engine", ["numpy", "compiled"])
 def test_memory_does_not_grow_with_the_samples(engine: str) -> None:
     """Samples are drawn, judged, counted and dropped block by block: four times as many need no more at any time."""
-    if engine == "compiled":
-        pytest.importorskip("llvmlite")
     found = study(fourbar(loaded=True, tolerances={"l3": "±1 mm"}, measures={"peak": {"effort": "A", "as": "maximum"}}))
     first = found.sampling("monte-carlo", 1, 5, engine)
     few, many = (found.sampling("monte-carlo", blocks * first.block_size, 5, engine) for blocks in (3, 12))

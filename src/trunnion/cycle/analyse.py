@@ -41,16 +41,16 @@ def analyse(
     steps: equally spaced positions; over a full turn the end is not repeated. Returns a Dataset with the names,
     units and dims of `results.VARIABLES`; positions without an answer are NaN and have a status.
     friction_method: how friction and reactions are settled; Newton's method if not given.
-    progress: called with the number of positions done. engine: numpy, compiled (an extra: machine code, which pays
-    from some 10⁵ positions on, where locking margins are followed from some 10³ on), or auto: compiled where it is
-    installed, pays and can do the mechanism.
+    progress: called with the number of positions done. engine: numpy, compiled (machine code, which pays
+    from some 10⁵ positions on, where locking margins are followed from some 10³ on), or auto: compiled where it
+    pays and can do the mechanism.
     variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
     are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
     float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
     out: files to write, as by `save`, whose other arguments are `saved`.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
-    unknown, or the engine is not installed or cannot do the mechanism.
+    unknown, or the engine cannot do the mechanism.
     """
     kept = Kept.read(variables, dtype)
     paths = [out] if isinstance(out, (str, os.PathLike)) else out

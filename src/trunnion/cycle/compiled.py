@@ -13,7 +13,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.variables import VARIABLES
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled import Figure, Lanes, pays
+from trunnion.solve.compiled import Figure, Lanes
 from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -142,7 +142,7 @@ def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | Non
     weight = 1.0
     if method is not None and positions * FOLLOWED >= WORTH_COMPILING:
         weight = _weight(run, method)
-    return pays(int(positions * weight), WORTH_COMPILING)
+    return positions * weight >= WORTH_COMPILING
 
 
 def _weight(run: Run, method: FrictionMethod) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from trunnion.algebra.linalg import solve
 from trunnion.algebra.namespace import Number, looped, namespace
 from trunnion.dynamics.tables import FIXED
 
-__all__ = ["CompiledLanes", "Settled", "compiled_lanes"]
+__all__ = ["CompiledLanes", "Settled"]
 
 Array = NDArray[np.float64]
 Numbers = Sequence[Number]
@@ -39,13 +38,8 @@ class Settled(NamedTuple):
     settled: NDArray[np.bool_]
 
 
-def compiled_lanes(pins: Sequence[bool], lanes: int) -> CompiledLanes | None:
-    """For contacts in pins and in guides; None without llvmlite."""
-    return CompiledLanes(tuple(map(bool, pins)), lanes) if len(pins) and find_spec("llvmlite") else None
-
-
 class CompiledLanes:
-    """The program, and room for the numbers of at most so many lanes."""
+    """The program for contacts in pins and in guides, and room for the numbers of at most so many lanes."""
 
     def __init__(self, pins: tuple[bool, ...], lanes: int) -> None:
         from trunnion.engines.machine_code import vector_width

@@ -15,7 +15,6 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any, cast
 
 import numpy as np
@@ -68,7 +67,7 @@ def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
 
 def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
     """The rates as machine code; None where they cannot be: losses in gears, brakes, clutches, friction with a memory
-    or at rest of one coordinate, an assembly that is followed, no llvmlite."""
+    or at rest of one coordinate, an assembly that is followed."""
     resting = motion.sticking and len(motion.names) == 1
     if resting or motion.bristles or not compilable(motion):
         return None
@@ -77,9 +76,9 @@ def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
 
 
 def compilable(motion: FreeMotion) -> bool:
-    """Whether it may be: without losses in gears, brakes, clutches and an assembly that is followed, with llvmlite."""
+    """Whether it may be: without losses in gears, brakes, clutches and an assembly that is followed."""
     lossy = any(drive.brake or drive.clutched or drive.efficiency < 1.0 for drive in motion.drives.values())
-    return not (lossy or motion.followed or find_spec("llvmlite") is None)
+    return not (lossy or motion.followed)
 
 
 class CompiledRates:

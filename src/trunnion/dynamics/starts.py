@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from trunnion.dynamics.compiled_lanes import compiled_lanes
+from trunnion.dynamics.compiled_lanes import CompiledLanes
 from trunnion.dynamics.course import NODES, Courses
 from trunnion.dynamics.lanes import Lanes, LaneState, picked_drive
 from trunnion.dynamics.motor import Drive
@@ -87,7 +87,7 @@ class Starts:
         self.next = np.zeros(count, np.intp)
         self._pass_breaks(np.arange(count))
         pins = [rub.load.across is None for rub in self.tables.rubs]
-        self.compiled = compiled_lanes(pins, count)
+        self.compiled = CompiledLanes(tuple(pins), count) if pins else None
         self.found: list[tuple[Rows, Array]] = []
 
     # ---- the whole way ----------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +35,7 @@ from trunnion.solve.status import (
 )
 from trunnion.solve.system import Values, law_of, rubbing
 
-__all__ = ["Array", "CompiledKernel", "Figure", "Lanes", "lanes_of", "pays"]
+__all__ = ["Array", "CompiledKernel", "Figure", "Lanes", "lanes_of"]
 
 Array = NDArray[np.float64]
 Figure = Callable[[Backward], Number]  # one number of every position, of the motion (`back.walk`) or of the forces
@@ -57,8 +56,8 @@ class CompiledKernel(ABC):
     run: the prepared mechanism; figures: by name, what to read off each walk; forces: whether one of them needs more
     than the motion; threads: at a time, by default one for each core; gravest: status from which on NumPy computes a
     lane again; undefined: figures that may have no finite value; described: tells these figures from all others of the
-    model, so that machine code that was kept is found without recording anything. Raises MechanismError if the engine
-    is not installed, or the mechanism has what only NumPy does.
+    model, so that machine code that was kept is found without recording anything. Raises MechanismError if
+    the mechanism has what only NumPy does.
     """
 
     def __init__(
@@ -80,12 +79,7 @@ class CompiledKernel(ABC):
         self.gravest, self.undefined = gravest, undefined
         self.described = described and f"{described} {list(self.figures)}"
         self.again = 0  # lanes that NumPy computed again, so far
-        self.prepare()
         _check(run, self.method)
-
-    @abstractmethod
-    def prepare(self) -> None:
-        """Load the engine; MechanismError if it is not installed."""
 
     @abstractmethod
     def check(self, values: Values, time: Array | None = None) -> None:
@@ -162,11 +156,6 @@ class CompiledKernel(ABC):
         with np.errstate(all="ignore"):
             status = status_of(back, row.shape) if self.forces else pose_status(back.walk, row.shape)
             return {name: figure(back) for name, figure in self.figures.items()}, status
-
-
-def pays(configurations: int, least: int) -> bool:
-    """Whether compiling may pay for so many configurations: not below the least, nor where it is not installed."""
-    return configurations >= least and find_spec("llvmlite") is not None
 
 
 def lanes_of(value: Number, rows: NDArray[np.intp], columns: NDArray[np.intp] | None = None) -> Number:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Finding, MechanismError
 from trunnion.solve.compiled import Array, CompiledKernel, Lanes, lanes_of
 from trunnion.solve.system import Values, law_of, rubbing
 
@@ -41,14 +40,8 @@ class _Inputs(NamedTuple):
 class VectorKernel(CompiledKernel):
     """Recorded once and compiled by LLVM for vectors of lanes: one program for all values of the same numbers."""
 
-    def prepare(self) -> None:
-        """Load LLVM; MechanismError if it is not installed."""
-        try:
-            import llvmlite as _  # noqa: F401
-        except ImportError:
-            what = "the engine compiled needs the package llvmlite, which is not installed"
-            remedy = "pip install 'trunnion[compiled]', or use the engine numpy"
-            raise MechanismError(Finding(what, "engine", remedy)) from None
+    def __init__(self, *asked: Any, **more: Any) -> None:
+        super().__init__(*asked, **more)
         self._programs: dict[tuple[Any, ...], MachineCode] = {}
         self._recording = Lock()
         self._graphs: dict[tuple[Any, ...], tuple[Graph, list[int]]] = {}

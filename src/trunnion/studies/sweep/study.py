@@ -57,7 +57,7 @@ def sweep(
     friction_method: how friction and reactions are settled; Newton's method if not given.
     margin: whether the locking margin is looked for as well, which takes many times as long as all else.
     measures: names of the model's, or written as for `play`, each with one figure a cycle; none if not given.
-    engine: numpy, compiled (an extra), or auto: compiled where it is installed, pays and can do the mechanism.
+    engine: numpy, compiled, or auto: compiled where it pays and can do the mechanism.
     Returns a Dataset with a dimension for each name, last, its coordinate in SI, and the variables of `FIGURES`. Where
     any position of the cycle has no answer they are NaN, but for the locking margin of positions that lock: `status`
     and `without_answer` tell. Extremes leave out what `analyse` leaves out of its summary: positions with a relative

@@ -17,7 +17,6 @@ from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled import pays
 from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
@@ -68,10 +67,10 @@ class CompiledCourses:
 
 
 def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> str:
-    """The engine by its name; of auto the compiled one where it is installed, pays, and can take the mechanism."""
+    """The engine by its name; of auto the compiled one where it pays and can take the mechanism."""
     if engine != "auto":
         return engine
-    if not pays(configurations, WORTH_COMPILING) or any(measure.in_time for measure in numpy.measures):
+    if configurations < WORTH_COMPILING or any(measure.in_time for measure in numpy.measures):
         return "numpy"
     try:
         CompiledCourses(numpy).check(values)

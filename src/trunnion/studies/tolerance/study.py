@@ -65,7 +65,7 @@ def tolerance(
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     friction_method: how friction and reactions are settled; Newton's method if not given.
     jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
-    engine: numpy, compiled, or auto: compiled where it is installed, pays and can do the mechanism.
+    engine: numpy, compiled, or auto: compiled where it pays and can do the mechanism.
     target: the yield that is asked for; limits are missed below it, and if none is given where a worst case, a yield
     below 1 or a C_pk below 1 breaks them: errors among the findings.
     Returns a Dataset over (measure, parameter, position, …) of `result.VARIABLES`; SI, each measure in its own unit.

@@ -21,9 +21,9 @@ import numpy as np
 
 from trunnion import Mechanism
 from trunnion.cycle.positions import CHUNK
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.walk_kernel import WalkKernel
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 JOBS = (
@@ -53,16 +53,16 @@ def best(run: Callable[[], Any], rounds: int) -> float:
     return min(times)
 
 
-def by_numpy(kernel: VectorKernel, values: dict[str, Any], moments: Any, samples: int) -> Any:
+def by_numpy(kernel: WalkKernel, values: dict[str, Any], moments: Any, samples: int) -> Any:
     """The same curves by NumPy, in chunks."""
     rows = max(1, CHUNK // len(moments))
     curves = {name: np.empty((samples, len(moments))) for name in kernel.figures}
     for low in range(0, samples, rows):
         part = {path: value[low : low + rows] if np.ndim(value) else value for path, value in values.items()}
         shape = (min(rows, samples - low), len(moments))
-        back = kernel.by_numpy(part, moments)
-        _ = status_of(back, shape) if kernel.forces else pose_status(back.walk, shape)
         with np.errstate(all="ignore"):
+            back = kernel.back(part, moments)
+            _ = status_of(back, shape) if kernel.forces else pose_status(back.walk, shape)
             for name, figure in kernel.figures.items():
                 curves[name][low : low + rows] = figure(back)
     return curves
@@ -82,7 +82,7 @@ def job(name: str, forces: bool, configurations: int) -> Job:
     return Job(run, forces, mechanism.parameter_set.evaluate(varied), run.cycle.times(POSITIONS))
 
 
-def kernel_of(one: Job, threads: int | None) -> VectorKernel:
+def kernel_of(one: Job, threads: int | None) -> WalkKernel:
     """A kernel that gives the angle of the last link, or the effort of the first driver."""
     driver, link = next(iter(one.run.system.mechanism.drivers)), list(one.run.system.mechanism.effective_links)[-1]
 
@@ -90,7 +90,7 @@ def kernel_of(one: Job, threads: int | None) -> VectorKernel:
         frame = back.walk.motions[link].frame
         return np.arctan2(frame.s, frame.c)
 
-    return VectorKernel(
+    return WalkKernel(
         one.run, {"curve": (lambda back: back.efforts[driver]) if one.forces else angle}, one.forces, threads=threads
     )
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from benchmarks.drawn import planar, spatial
 from trunnion import Mechanism, MechanismError
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import prepare
 from trunnion.solve.status import status_of
+from trunnion.solve.walk_kernel import WalkKernel
 
 DRAWN = {"planar": planar.drawn, "spatial": spatial.drawn}
 SAMPLES, POSITIONS, SPREAD = 3, 24, 1e-4
@@ -47,7 +47,7 @@ def compared(space: str, seed: int) -> Found:
     try:
         mechanism = Mechanism.model_validate(DRAWN[space](seed)[1])
         run = prepare(mechanism)
-        kernel = VectorKernel(run, _figures(run))
+        kernel = WalkKernel(run, _figures(run))
     except MechanismError as error:
         return Found(refused=error.findings[0].what)
     rng, entries = np.random.default_rng(seed), mechanism.parameter_set.entries

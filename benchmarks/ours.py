@@ -50,8 +50,8 @@ def compiled_side(job: Job, threads: int = 1) -> Side | None:
     """The same numbers by the compiled engine; None where Trunnion is not installed."""
     if not version("trunnion"):
         return None
-    from trunnion.solve.compiled import Lanes
-    from trunnion.solve.compiled_vectors import VectorKernel
+    from trunnion.engines.kernel import Lanes
+    from trunnion.solve.walk_kernel import WalkKernel
 
     mechanism = Mechanism.read(MODEL)
     prepared = prepare(mechanism.with_friction("off") if job == "frictionless" else mechanism)
@@ -62,7 +62,7 @@ def compiled_side(job: Job, threads: int = 1) -> Side | None:
             return lambda back: list(_rows_of_motion(back.walk))[k]
         return lambda back: list(_rows_of_forces(back))[k]
 
-    kernel = VectorKernel(
+    kernel = WalkKernel(
         prepared, {name: figure(k) for k, name in enumerate(columns)}, job != "motion", threads=threads, described=job
     )
 

@@ -293,7 +293,7 @@ _ENGINES = (
     ),
     Fault(
         "doubtful-lane-of-another-sample",
-        "solve/compiled.py",
+        "engines/kernel.py",
         "return flat[rows] if len(flat) > 1",
         "return flat[0 * rows] if len(flat) > 1",
         ("tests/reference/test_compiled.py",),
@@ -321,16 +321,16 @@ _ENGINES = (
     ),
     Fault(
         "compiled-cycle-keeps-zero-slip",
-        "cycle/compiled.py",
+        "cycle/cycle_kernel.py",
         "gravest=Status.SOLVED,",
         "gravest=Status.LOCKED,",
         ("tests/reference/test_compiled_cycle.py",),
     ),
     Fault(
         "kept-code-of-other-figures",
-        "solve/compiled.py",
-        'self.described = described and f"{described} {list(self.figures)}"',
-        "self.described = described",
+        "solve/walk_kernel.py",
+        "asked = described, list(figures), forces,",
+        "asked = described, forces,",
         ("tests/reference/test_compiled_cycle.py",),
     ),
     Fault(

@@ -17,9 +17,9 @@ from mechanisms import DURANGO, eccentric_press
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Status
 from trunnion.measures.measures import named, outputs
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.walk_kernel import WalkKernel
 
 EXAMPLES = DURANGO.parent
 SAMPLES = 5
@@ -79,7 +79,7 @@ def test_a_guide_beside_its_kink() -> None:
     effort = figures(run, "effort:O")
     time = np.linspace(0.05, 6.2, 400)
     values = varied(run, "links.crank.points.P.x")
-    curves, status = VectorKernel(run, effort, True).curves(values, time)
+    curves, status = WalkKernel(run, effort, True).curves(values, time)
     expected, statuses = by_numpy(run, values, time, effort)
     agree(curves, expected)
     assert np.array_equal(status, statuses)
@@ -96,7 +96,7 @@ def test_agrees_with_numpy(example: str) -> None:
     motion = [one.name for one in outputs(run.system)][:1]
     read_off = figures(run, *motion, *(f"effort:{driver}" for driver in run.system.mechanism.drivers))
     values, time = varied(run, *free(run)[:4]), run.cycle.times(72)
-    kernel = VectorKernel(run, read_off)
+    kernel = WalkKernel(run, read_off)
     curves, status = kernel.curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     np.testing.assert_array_equal(status, expected_status)
@@ -108,7 +108,7 @@ def test_motion_alone() -> None:
     run = prepare(trunnion.read(DURANGO))
     read_off = figures(run, "angle:rocker", "coupler.E.x")
     values, time = varied(run, "AB", "BC"), run.cycle.times(90)
-    curves, status = VectorKernel(run, read_off, forces=False).curves(values, time)
+    curves, status = WalkKernel(run, read_off, forces=False).curves(values, time)
     back = run.solve(time, values)
     np.testing.assert_array_equal(status, pose_status(back.walk, status.shape))
     agree(curves, by_numpy(run, values, time, read_off)[0])
@@ -121,7 +121,7 @@ def test_motion_of_other_modules(example: str) -> None:
     run = prepare(trunnion.read(EXAMPLES / f"{example}.yaml"))
     read_off = figures(run, *(one.name for one in outputs(run.system)))
     values, time = varied(run, *free(run)[:4], spread=1e-4), run.cycle.times(72)
-    curves, status = VectorKernel(run, read_off, forces=False).curves(values, time)
+    curves, status = WalkKernel(run, read_off, forces=False).curves(values, time)
     np.testing.assert_array_equal(status, pose_status(run.solve(time, values).walk, status.shape))
     agree(curves, by_numpy(run, values, time, read_off)[0])
 
@@ -146,7 +146,7 @@ def test_friction_laws(law: dict[str, Any]) -> None:
     run = with_law(law)
     read_off = figures(run, "effort:A")
     values, time = varied(run, "AB", "joint_defaults.friction.coefficient"), run.cycle.times(36)
-    curves, status = VectorKernel(run, read_off).curves(values, time)
+    curves, status = WalkKernel(run, read_off).curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     np.testing.assert_array_equal(status, expected_status)
     agree(curves, expected)
@@ -155,7 +155,7 @@ def test_friction_laws(law: dict[str, Any]) -> None:
 def test_bristles_are_left_to_numpy() -> None:
     run = with_law({"law": "dahl", "coefficient": 0.12, "stiffness": 4e3})
     with pytest.raises(MechanismError, match="memory along the cycle"):
-        VectorKernel(run, {})
+        WalkKernel(run, {})
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_friction_without_proof_of_one_solution_is_numpys(example: str, coeffici
     driver = next(iter(model.drivers))
     read_off = figures(run, f"effort:{driver}")
     values, time = varied(run, *free(run)[:2], spread=1e-4), run.cycle.times(36)
-    kernel = VectorKernel(run, read_off)
+    kernel = WalkKernel(run, read_off)
     curves, status = kernel.curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     assert kernel.again > 0
@@ -182,7 +182,7 @@ def test_failures_are_those_of_numpy() -> None:
     run = prepare(trunnion.read(DURANGO))
     read_off = figures(run, "angle:rocker", "effort:A")
     values, time = varied(run, "AB", "BC", "CD", spread=0.2), run.cycle.times(90)
-    curves, status = VectorKernel(run, read_off).curves(values, time)
+    curves, status = WalkKernel(run, read_off).curves(values, time)
     expected, expected_status = by_numpy(run, values, time, read_off)
     assert np.any(status == Status.NOT_ASSEMBLED)
     assert np.any(status == Status.SOLVED)
@@ -197,7 +197,7 @@ def test_any_number_of_samples_and_times_of_their_own(monkeypatch: pytest.Monkey
     read_off = figures(run, "effort:A")
     values = varied(run, "AB")
     time = run.cycle.times(30) + np.linspace(0.0, 0.01, SAMPLES)[:, None]
-    curves, _ = VectorKernel(run, read_off).curves(values, time)
+    curves, _ = WalkKernel(run, read_off).curves(values, time)
     back = run.solve(time, values)
     agree(curves, {"effort:A": back.efforts["A"]})
 
@@ -205,7 +205,7 @@ def test_any_number_of_samples_and_times_of_their_own(monkeypatch: pytest.Monkey
 def test_what_only_numpy_does_is_said() -> None:
     run = prepare(trunnion.read(EXAMPLES / "bennett.yaml"))
     with pytest.raises(MechanismError, match=r"over-constrained.*use the engine numpy"):
-        VectorKernel(run, {})
+        WalkKernel(run, {})
 
 
 @pytest.mark.slow

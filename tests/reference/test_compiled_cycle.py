@@ -14,11 +14,11 @@ import pytest
 import trunnion
 from mechanisms import DURANGO
 from trunnion import Mechanism, MechanismError, Status
-from trunnion.cycle.compiled import compiles
+from trunnion.cycle.cycle_kernel import compiles
 from trunnion.cycle.positions import Positions, positions
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import prepare
+from trunnion.solve.walk_kernel import WalkKernel
 
 EXAMPLES = DURANGO.parent
 OF_THE_ITERATION = {
@@ -143,12 +143,12 @@ def test_pins_in_seats_are_left_to_numpy() -> None:
 # ---- machine code that is kept --------------------------------------------------------------------------------
 
 
-def kernel_of(figure: str, described: str | None = "efforts") -> VectorKernel:
+def kernel_of(figure: str, described: str | None = "efforts") -> WalkKernel:
     run = prepare(trunnion.read(DURANGO))
-    return VectorKernel(run, {figure: lambda back: back.efforts["A"]}, described=described)
+    return WalkKernel(run, {figure: lambda back: back.efforts["A"]}, described=described)
 
 
-def curve(kernel: VectorKernel) -> Any:
+def curve(kernel: WalkKernel) -> Any:
     run = kernel.run
     (found,) = kernel.curves(run.values, run.cycle.times(24))[0].values()
     return found[0]
@@ -158,8 +158,8 @@ def test_kept_code_is_found_without_recording(monkeypatch: pytest.MonkeyPatch, t
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     first = curve(kernel_of("one"))
     recorded: list[int] = []
-    plain = VectorKernel._recorded
-    monkeypatch.setattr(VectorKernel, "_recorded", lambda self, inputs: recorded.append(1) or plain(self, inputs))
+    plain = WalkKernel._recorded
+    monkeypatch.setattr(WalkKernel, "_recorded", lambda self, inputs: recorded.append(1) or plain(self, inputs))
     assert np.array_equal(curve(kernel_of("one")), first)
     assert not recorded
     curve(kernel_of("other"))  # other figures
@@ -176,7 +176,7 @@ def test_a_sweep_again_records_nothing(over: dict[str, Any], monkeypatch: pytest
     """Neither to see whether it can be compiled, nor with times of each mechanism."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     first = trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled")
-    monkeypatch.setattr(VectorKernel, "_recorded", lambda self, inputs: pytest.fail("it was recorded again"))
+    monkeypatch.setattr(WalkKernel, "_recorded", lambda self, inputs: pytest.fail("it was recorded again"))
     assert trunnion.sweep(trunnion.read(DURANGO), over, 24, engine="compiled").identical(first)
 
 
@@ -259,7 +259,7 @@ def test_friction_settled_otherwise_is_left_to_numpy(
     with pytest.raises(MechanismError) as caught:
         trunnion.analyse(mechanism, 12, method, engine="compiled")
     assert caught.value.findings[0].where == "engine"
-    monkeypatch.setattr("trunnion.cycle.compiled.WORTH_COMPILING", 1)
+    monkeypatch.setattr("trunnion.cycle.cycle_kernel.WORTH_COMPILING", 1)
     found, expected = (
         positions(prepare(mechanism), 12, method, averaged=False, engine=engine) for engine in ("auto", "numpy")
     )
@@ -268,7 +268,7 @@ def test_friction_settled_otherwise_is_left_to_numpy(
 
 
 def test_auto_takes_numpy_where_a_mechanism_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trunnion.cycle.compiled.WORTH_COMPILING", 1)
+    monkeypatch.setattr("trunnion.cycle.cycle_kernel.WORTH_COMPILING", 1)
     mechanism = trunnion.read(EXAMPLES / "bennett.yaml")  # over-constrained
     one, other = (trunnion.analyse(mechanism, 8, engine=engine) for engine in ("auto", "numpy"))
     assert np.array_equal(one["reaction_force"], other["reaction_force"], equal_nan=True)

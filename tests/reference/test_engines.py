@@ -21,8 +21,8 @@ from trunnion.engines import machine_code
 from trunnion.engines.graph import BOTH, EXP_RANGE, POSITION, SAMPLE, SINE_RANGE, Graph
 from trunnion.engines.program import program
 from trunnion.engines.recorded import Recorded, functions, number_of
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.run import prepare
+from trunnion.solve.walk_kernel import WalkKernel
 
 Array = NDArray[np.float64]
 SPECIAL = np.array([0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 1e-300, 5.0, -2.5])
@@ -254,7 +254,7 @@ def test_rows_shorter_than_a_vector(samples: int, positions: int) -> None:
     lengths = run.values[path] * (1 + 1e-3 * np.arange(samples)[:, None])
     values = run.system.mechanism.parameter_set.evaluate({path: lengths})
     time = np.linspace(0.1, 0.4, positions)
-    curves, status = VectorKernel(run, {"effort": lambda back: back.efforts["A"]}).curves(values, time)
+    curves, status = WalkKernel(run, {"effort": lambda back: back.efforts["A"]}).curves(values, time)
     assert status.shape == (samples, positions)
     np.testing.assert_allclose(curves["effort"], run.solve(time, values).efforts["A"], rtol=1e-12)
 
@@ -264,7 +264,7 @@ def test_the_same_bits_by_any_number_of_threads() -> None:
     path = run.system.mechanism.path_of("AB")
     values = {**run.values, path: run.values[path] * (1 + 1e-3 * np.random.default_rng(8).normal(size=(600, 1)))}
     found = [
-        VectorKernel(run, {"effort": lambda back: back.efforts["A"]}, threads=threads).curves(values, time)[0]["effort"]
+        WalkKernel(run, {"effort": lambda back: back.efforts["A"]}, threads=threads).curves(values, time)[0]["effort"]
         for time in (run.cycle.times(180),)
         for threads in (1, 3)
     ]
@@ -275,7 +275,7 @@ def test_angles_beyond_the_range_are_left_to_numpy() -> None:
     """After 10⁵ rad of the drive the sine of a compiled kernel is no number, and NumPy's is used."""
     run = prepare(trunnion.read(DURANGO))
     turns = run.cycle.times(8) + 20_000 * run.cycle.duration
-    kernel = VectorKernel(run, {"effort": lambda back: back.efforts["A"]})
+    kernel = WalkKernel(run, {"effort": lambda back: back.efforts["A"]})
     curves, status = kernel.curves(dict(run.values), turns)
     assert kernel.again == 8
     assert np.array_equal(curves["effort"][0], run.solve(turns, run.values).efforts["A"])

@@ -18,7 +18,7 @@ from trunnion.algebra.quadrature import CANCELLED, Effort, integrals
 from trunnion.errors import Status
 from trunnion.solve.switches import Mechanisms, edges
 
-__all__ = ["AVERAGED", "MOST_SUPPOSED", "SUPPOSED", "Mean", "Means", "Powers", "means_of", "still", "unknown"]
+__all__ = ["AVERAGED", "IDEAL", "MOST_SUPPOSED", "SUPPOSED", "Mean", "Means", "Powers", "means_of", "still", "unknown"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -26,6 +26,7 @@ Powers = Callable[[Rows, Array], Mapping[str, Array]]
 
 # what `Powers` has of each lane and node, NaN where there is no answer
 AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
+IDEAL = (*AVERAGED, "status")  # what the means of the ideal mechanism are made of
 SUPPOSED = "supposed_power"  # and may have, W: by how much that through the drivers differs from what stands in for it
 MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
 NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits

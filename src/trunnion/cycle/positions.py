@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.quadrature import Effort
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
-from trunnion.cycle.compiled import CycleKernel, compiles
+from trunnion.cycle.cycle_kernel import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.kept import needed
-from trunnion.cycle.means import AVERAGED, MOST_SUPPOSED, SUPPOSED, Means, means_of, still, unknown
+from trunnion.cycle.means import AVERAGED, IDEAL, MOST_SUPPOSED, SUPPOSED, Means, means_of, still, unknown
 from trunnion.cycle.near_locking import LOOKED
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
-from trunnion.cycle.written import Arrays, fill_chunk, fill_lanes, link_numbers, write
+from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
@@ -29,7 +29,7 @@ from trunnion.solve.seating import Seated, settle
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
-__all__ = ["IDEAL", "Arrays", "Positions", "check_steps", "positions", "stretch"]
+__all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
 
 
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
@@ -78,7 +78,7 @@ def positions(
     """The numbers of every variable of `results` at equally spaced positions, their statuses and causes.
 
     margin: whether the locking margin is looked for; it is infinite if not. averaged: whether the means over the cycle
-    are, which ask for many positions more; they are NaN if not. engine: see `compiled.compiles`. wanted: the
+    are, which ask for many positions more; they are NaN if not. engine: see `cycle_kernel.compiles`. wanted: the
     variables that will be read beside those that the books of the cycle are made of, all if not given.
     """
     check_steps(steps)
@@ -191,9 +191,6 @@ def _refuse_seats(run: Run) -> None:
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
-IDEAL = (*AVERAGED, "status")  # what the means of the ideal mechanism are made of
-
-
 def _fill_as_built(
     arrays: Arrays,
     ideal: Arrays,
@@ -255,8 +252,7 @@ def _fill_compiled(
         if or_not:
             return False
         raise
-    left = own.fill(arrays, run.values, time)[1]
-    _fill_rest(arrays, left, lambda lanes: run.solve(time[lanes], method=method), time, causes)
+    own.fill(arrays, run.values, time, causes)
     if run.erring:
         _fill_beside_ideal(arrays, ideal, run, time, method)
     return True
@@ -273,8 +269,7 @@ def _fill_beside_ideal(
     quick, system, everywhere = replace(method, margin_up_to=0.0), run.system, slice(0, len(time))
     labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
     meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
-    left = _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)[1]
-    _fill_rest(meant, left, lambda lanes: run.ideal(time[lanes], quick), time)
+    _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)
     for name, array in ideal.items():
         array[...] = meant[name]
     fill_errors(arrays, meant, link_numbers(system), everywhere)
@@ -285,17 +280,4 @@ def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays,
     """The compiled kernel of some variables, made once for numbers of one kind."""
     read = tuple(name for name, array in arrays.items() if array.strides[-1])
     key = "compiled", values is run.values, method, read
-    return run.once(key, lambda: CycleKernel(run, values, time, arrays, write, method))
-
-
-def _fill_rest(
-    arrays: Arrays,
-    left: NDArray[np.intp],
-    solve: Callable[[NDArray[np.intp]], Backward],
-    time: NDArray[np.float64],
-    causes: diagnosis.Causes | None = None,
-) -> None:
-    """Those positions that the compiled engine leaves to NumPy. solve: the walk of some of them."""
-    for low in range(0, len(left), CHUNK):
-        lanes = left[low : low + CHUNK]
-        fill_lanes(arrays, solve(lanes), time[lanes], (lanes,), causes)
+    return run.once(key, lambda: CycleKernel(run, values, time, arrays, method))

@@ -25,8 +25,8 @@ from trunnion.algebra.namespace import Number, UntraceableError, looped
 from trunnion.dynamics.rates import Layout, Rates, Seen, Walks
 from trunnion.dynamics.state import DIFFERENCE, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
+from trunnion.engines.kernel import literals
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled_vectors import literals
 
 __all__ = [
     "CompiledRates",

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.cycle import jumps
-from trunnion.cycle.many import Many
+from trunnion.cycle.cycle_kernel import Many
 from trunnion.cycle.means import AVERAGED, Means, means_of, still
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.cycle.summary import effort_units, model_notes

@@ -17,10 +17,10 @@ from trunnion.measures.figures import Reference, known, reference
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
+from trunnion.solve.walk_kernel import WalkKernel
 from trunnion.studies.tolerance.inputs import Inputs
 
 __all__ = ["batch_of", "engine_for", "kernel_of", "references"]
@@ -45,13 +45,13 @@ class CompiledCourses:
         return {f"{measure.name} {k}": (measure, k) for measure, count in pairs for k in range(count)}
 
     @cached_property
-    def _compiled(self) -> VectorKernel:
+    def _compiled(self) -> WalkKernel:
         def figure(measure: Measure, k: int) -> Callable[[Backward], Number]:
             return lambda back: measure.curve(back.walk if measure.of_motion else back)[k]
 
         figures = {name: figure(*part) for name, part in self._parts.items()}
         told = repr(list(self._parts.items()))
-        return VectorKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=told)
+        return WalkKernel(self.numpy.run, figures, self.numpy.forces, self.numpy.method, described=told)
 
     def check(self, values: Mapping[str, Number]) -> None:
         """MechanismError for a mechanism that only NumPy takes."""

@@ -1,0 +1,255 @@
+"""The variables of a cycle, or of the cycles of many mechanisms, by the compiled engine.
+
+What is written of one walk into the arrays of a result is recorded once and run everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.namespace import Number
+from trunnion.cycle.deviations import COMPARED, fill_errors
+from trunnion.cycle.diagnosis import Causes
+from trunnion.cycle.means import IDEAL
+from trunnion.cycle.unanswered import blank
+from trunnion.cycle.variables import fill_of
+from trunnion.cycle.written import CONDITIONS, Arrays, fill_chunk, fill_lanes, link_numbers, write
+from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.results import variables as results
+from trunnion.results.variables import VARIABLES
+from trunnion.solve.backward import Backward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.memory import CHUNK
+from trunnion.solve.run import Run
+from trunnion.solve.system import System, Values
+from trunnion.solve.walk_kernel import Figure, WalkKernel
+
+__all__ = ["ENGINES", "CycleKernel", "Many", "compiles"]
+
+Cell = tuple[str, tuple[int, ...]]  # variable, and place in its array but for the position
+
+ENGINES = ("auto", "numpy", "compiled")
+WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
+FOLLOWED = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
+PROBED = 64  # positions at which it is seen whether margins are followed
+# variables that may have no finite value in a solved position
+UNDEFINED = ("efficiency_instant", "locking_margin", "contact_position")
+
+
+class _Flags(NamedTuple):
+    """Of one variable: whether it is there, and whether anybody reads it."""
+
+    writeable: bool
+    read: bool
+
+
+class _Row(NamedTuple):
+    """One variable of `Cells`."""
+
+    name: str
+    flags: _Flags
+    numbers: dict[Cell, Number]
+
+    def __setitem__(self, place: Any, number: Number) -> None:
+        *cell, _ = place if isinstance(place, tuple) else (place,)
+        self.numbers[self.name, tuple(cell)] = number
+
+
+class _Cells(dict[str, _Row]):
+    """Stands for the arrays of a result while one walk is written into them, and keeps the number of every cell."""
+
+    def __init__(self, flags: Mapping[str, _Flags]) -> None:
+        self.numbers: dict[Cell, Number] = {}
+        super().__init__((name, _Row(name, own, self.numbers)) for name, own in flags.items())
+
+
+class CycleKernel:
+    """Every variable of a cycle at many positions.
+
+    run: the prepared mechanism, with these values; time: one that will be asked for, s; arrays: those of a result, for
+    what is read of them. Raises MechanismError as `WalkKernel` does.
+    """
+
+    def __init__(
+        self, run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod
+    ) -> None:
+        # not the arrays: the kernel and its figures hold each other, so whatever they hold is freed late
+        self._flags = {name: _Flags(array.flags.writeable, bool(array.strides[-1])) for name, array in arrays.items()}
+        self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
+        with np.errstate(all="ignore"):
+            numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
+        read = (cell for cell, number in numbers.items() if self._wanted(cell, number))
+        self._names = {f"{name}{list(place)}": (name, place) for name, place in read}
+        self._kernel = WalkKernel(
+            run,
+            {name: self._figure(cell) for name, cell in self._names.items()},
+            method=method,
+            gravest=Status.SOLVED,
+            undefined=[name for name, (variable, _) in self._names.items() if variable in UNDEFINED],
+            described="cycle",
+        )
+        self._kernel.check(values, time)
+
+    def fill(self, arrays: Arrays, values: Values, time: NDArray[np.float64], causes: Causes | None = None) -> None:
+        """Fill arrays, (…, position) or (…, mechanism, position), at these times, s; by NumPy where that decides.
+
+        causes: to note what the positions decided by NumPy have to say.
+        """
+        several = arrays["status"].ndim == 2
+        shape = arrays["status"].shape if several else (1, *arrays["status"].shape)
+        doubtful, curves = np.empty(shape, bool), {}
+        for name, (variable, place) in self._names.items():
+            whole = arrays[variable].dtype != float
+            curves[name] = np.empty(shape) if whole else arrays[variable][place].reshape(shape)
+        self._kernel.fill(values, time, Lanes(curves, arrays["status"].reshape(shape), doubtful))
+        for name, (variable, place) in self._names.items():
+            if arrays[variable].dtype != float:
+                arrays[variable][place] = curves[name].reshape(arrays["status"].shape)
+        rows, columns = np.nonzero(doubtful)
+        for low in range(0, len(rows), CHUNK):
+            row, column = rows[low : low + CHUNK], columns[low : low + CHUNK]
+            times = time_of(time, row, column)
+            back = self._kernel.back({path: lanes_of(value, row) for path, value in values.items()}, times)
+            fill_lanes(arrays, back, times, (row, column) if several else (column,), causes)
+
+    def _wanted(self, cell: Cell, number: Number) -> bool:
+        """Whether a cell is read, and not 0 whatever the values are, as most arrays are before."""
+        none = isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part != "seats"
+        return self._flags[cell[0]].read and not none
+
+    def _cells(self, back: Backward) -> Mapping[Cell, Number]:
+        """The number of every cell, of one walk; those of the last one are remembered, for figures ask one by one."""
+        if self._last[0] is not back:
+            into = _Cells(self._flags)
+            write(into, back, back.walk.time, slice(None))
+            self._last = back, into.numbers
+        return self._last[1]
+
+    def _figure(self, cell: Cell) -> Figure:
+        return lambda back: self._cells(back)[cell]
+
+
+def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
+    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or it cannot.
+
+    method: of friction, where a locking margin is asked for at each position.
+    """
+    if engine not in ENGINES:
+        raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
+    if engine == "compiled" and run.seats:
+        what = "pins in seats settle in rounds, at each position as many as it needs: that is not compiled"
+        raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))
+    if engine != "auto":
+        return engine == "compiled"
+    if run.seats:
+        return False
+    weight = 1.0
+    if method is not None and positions * FOLLOWED >= WORTH_COMPILING:
+        weight = _weight(run, method)
+    return positions * weight >= WORTH_COMPILING
+
+
+def _weight(run: Run, method: FrictionMethod) -> float:
+    """How many plain positions take NumPy as long as one with its locking margin."""
+    if not method.margin_up_to:
+        return 1.0
+
+    def share() -> float:
+        """Of the positions those without a bound on their friction that would say at once that none locks."""
+        with np.errstate(all="ignore"):
+            back = run.solve(run.cycle.times(PROBED), method=replace(method, margin_up_to=0.0))
+            problems = [settled.problem for settled in back.settled if settled.problem is not None]
+            shares = [np.mean(np.asarray(one.bound()) * method.margin_up_to >= 1.0) for one in problems]
+        return float(max(shares, default=0.0))
+
+    return 1.0 + FOLLOWED * run.once(("margins followed", method), share)
+
+
+@dataclass
+class Many:
+    """Mechanisms with the structure and the assembly of a run.
+
+    engine: see `compiles`; auto falls back on NumPy where a mechanism cannot be compiled. configurations:
+    about how many there will be.
+    """
+
+    run: Run
+    engine: str = "auto"
+    configurations: int = 0
+    _kernels: dict[object, CycleKernel] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.compiled = compiles(self.engine, self.run, self.configurations)
+
+    def filled(
+        self,
+        values: Values,
+        ideal: Values | None,
+        time: NDArray[np.float64],
+        shape: tuple[int, int],
+        wanted: Collection[str],
+        method: FrictionMethod,
+        quick: FrictionMethod,
+    ) -> tuple[Arrays, Arrays]:
+        """Variables of `results` by name, (…, mechanism, position); the same of the mechanisms without errors.
+
+        values: every number, (mechanism, 1) where they vary; ideal: without errors, if any has some; the first arrays
+        then hold the differences too. time: (mechanism, position) or (position,), s; wanted: what will be read, of the
+        rest there is nothing. method, quick: for the mechanisms and for those without errors.
+        """
+        if ideal is None:
+            return self.arrays(values, time, shape, wanted, method), {}
+        wanted, parts, system = {*wanted, *IDEAL, *COMPARED}, ["errors"], self.run.system
+        own = self.arrays(values, time, shape, wanted, method, parts)
+        meant = self.arrays(ideal, time, shape, wanted, quick, parts)
+        fill_errors(own, meant, link_numbers(system), slice(None))
+        blank(own, own["status"].astype(np.int8), slice(None))
+        return own, meant
+
+    def arrays(
+        self,
+        values: Values,
+        time: NDArray[np.float64],
+        shape: tuple[int, int],
+        wanted: Collection[str],
+        method: FrictionMethod,
+        parts: Sequence[str] = (),
+    ) -> Arrays:
+        """Variables by name, and the condition of every module."""
+        arrays = _allocated(self.run.system, shape, {*wanted, "status"}, parts)
+        known = frozenset(literals(values).items())  # what is 0 with these is left out
+        kernel = self._kernel(arrays, values, time, method, (frozenset(wanted), tuple(parts), method, known))
+        if kernel is None:
+            fill_chunk(arrays, self.run.solve(time, values, method), time, slice(None))
+            return arrays
+        kernel.fill(arrays, values, time)
+        return arrays
+
+    def _kernel(
+        self, arrays: Arrays, values: Values, time: NDArray[np.float64], method: FrictionMethod, key: object
+    ) -> CycleKernel | None:
+        if not self.compiled:
+            return None
+        if key not in self._kernels:
+            try:
+                self._kernels[key] = CycleKernel(self.run, values, time, arrays, method)
+            except MechanismError:
+                if self.engine == "compiled":
+                    raise
+                self.compiled = False
+                return None
+        return self._kernels[key]
+
+
+def _allocated(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
+    """Arrays to be filled, (…, mechanism, position)."""
+    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
+    flat = results.allocate(labels, shape[0] * shape[1], absent, parts, wanted)
+    found = {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
+    return found | {CONDITIONS: np.zeros((len(system.plan.modules), *shape))}

@@ -308,8 +308,8 @@ _ENGINES = (
     Fault(
         "loop-ends-with-its-first-lane-at-rest",
         "engines/lanes.py",
-        'return self.b.icmp_signed("!=", self.b.bitcast(found, whole), ir.Constant(whole, 0))',
-        "return self.b.extract_element(found, ir.Constant(INT, 0))",
+        'return self.b.icmp_signed("!=", self.b.bitcast(lanes, whole), ir.Constant(whole, 0))',
+        "return self.b.extract_element(lanes, ir.Constant(INT, 0))",
         ("tests/reference/test_engines.py", "tests/reference/test_compiled_cycle.py"),
     ),
     Fault(

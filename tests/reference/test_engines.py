@@ -354,3 +354,23 @@ def test_a_loop_goes_on_while_any_lane_changes() -> None:
     found, rounds = np.empty((1, 8)), np.array([0.0, 3.0, 49.0, 7.0, 2.0, 60.0, 1.0, 0.0])
     code.run({"x": rounds}, [found], (0, 1), (0, 8))
     assert found[0].tolist() == np.minimum(rounds, 50.0).tolist()
+
+
+def test_a_loop_leaves_alone_the_lanes_that_are_done() -> None:
+    """Each lane has its own number of rounds, and none is made where all are done; the same with and without values."""
+    calls, needed = [], np.array([0.0, 3.0, 49.0, 7.0, 2.0, 60.0, 1.0, np.nan])
+
+    def counted(limit: Any) -> Any:
+        def step(state: list[Any]) -> list[Any]:
+            calls.append(1)
+            return [state[0] + 1.0, state[0] - limit]
+
+        return looped(step, [0.0 * limit, -1.0], 50, lambda state: np.logical_not(state[0] < limit))
+
+    plain = counted(needed)
+    assert len(calls) == 50
+    calls.clear()
+    assert counted(np.array([2.0, 3.0]))[0].tolist() == [2.0, 3.0]
+    assert len(calls) == 3
+    for number, expected in zip(compiled(counted, needed), plain, strict=True):
+        np.testing.assert_array_equal(np.ravel(number), np.broadcast_to(expected, needed.shape))

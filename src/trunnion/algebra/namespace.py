@@ -20,6 +20,8 @@ __all__ = ["Number", "Traced", "UntraceableError", "apart", "compiled", "looped"
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
 Number = Any
+Step = Callable[[list[Any]], list[Any]]  # one round of a loop
+Done = Callable[[list[Any]], Any]  # of its state, by lane
 
 
 class UntraceableError(TypeError):
@@ -36,7 +38,7 @@ class Traced:
     __slots__ = ()
 
     @classmethod
-    def looped(cls, step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
+    def looped(cls, step: Step, start: Sequence[Any], rounds: int, done: Done | None) -> list[Any]:
         """See the function `looped`; rounds: at least 1, and one of the start at least is of this kind."""
         raise NotImplementedError
 
@@ -65,11 +67,23 @@ def apart(lanes: Number) -> bool:
     return not isinstance(lanes, Traced) and bool(np.any(lanes))
 
 
-def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
-    """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
-    if rounds < 1:
-        return list(start)
-    kind = next((type(number) for number in start if isinstance(number, Traced)), None)
-    if kind is None:  # plain numbers; what a round makes of them tells the kind
-        return looped(step, step(list(start)), rounds - 1)
-    return kind.looped(step, start, rounds)
+def looped(step: Step, start: Sequence[Number], rounds: int, done: Done | None = None) -> list[Number]:
+    """step(… step(start)), at most so many rounds. start, and what a step makes of it: lists of numbers.
+
+    done: whether a lane is done; it then stays as it is, whatever the lanes beside it need, and where all are no
+    further round is made. Numbers that are recorded have the step compiled once.
+    """
+    state = list(start)
+    for k in range(rounds):
+        kind = next((type(number) for number in state if isinstance(number, Traced)), None)
+        if kind is not None:
+            return kind.looped(step, state, rounds - k, done)
+        stays = np.False_ if done is None else done(state)
+        if np.all(stays):
+            break
+        further = step(state)
+        if np.any(stays):
+            pairs = zip(state, further, strict=True)
+            further = [new if new is old else namespace(old, new).where(stays, old, new) for old, new in pairs]
+        state = further
+    return state

@@ -35,11 +35,21 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True)
 class Loop:
-    """A part of the graph that is run `rounds` times: its state before a round and what the round makes of it."""
+    """A part of the graph that is run `rounds` times: its state before a round and what the round makes of it.
+
+    done: whether a lane is done after the round, so that no further one is made where all are; if it is not given, the
+    loop ends where a round changes nothing any more.
+    """
 
     rounds: int
     states: tuple[int, ...]
     results: tuple[int, ...]
+    done: int | None = None
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """All that a round is to compute."""
+        return self.results if self.done is None else (*self.results, self.done)
 
 
 FOLDED: dict[str, Callable[..., Any]] = {
@@ -208,8 +218,17 @@ class Graph:
 
     # ---- loops ------------------------------------------------------------------------------------------------
 
-    def loop(self, step: Callable[[list[int]], list[int]], start: Sequence[int], rounds: int) -> list[int]:
-        """step(… step(start)): the nodes of one step, made once and run `rounds` times."""
+    def loop(
+        self,
+        step: Callable[[list[int]], list[int]],
+        start: Sequence[int],
+        rounds: int,
+        done: Callable[[list[int]], int] | None = None,
+    ) -> list[int]:
+        """step(… step(start)): the nodes of one step, made once and run `rounds` times at most.
+
+        done: by lane, of a state; a lane that is done stays as it is.
+        """
         start = [self.as_float(number) for number in start]
         if rounds < 1:
             return start
@@ -221,14 +240,19 @@ class Graph:
             self.loops.append(Loop(0, (), ()))  # its number is taken, also for loops within
             states = tuple(self.node("state", (), (index, k), differs, 1 << index) for k in range(len(start)))
             results = tuple(self.as_float(number) for number in step(list(states)))
+            ends = None
+            if done is not None:
+                stays = done(list(states))
+                results = tuple(self.where(stays, *pair) for pair in zip(states, results, strict=True))
+                ends = done(list(results))
             most = differs
             for number in results:
                 most |= self.differs[number]
             if most == differs:
                 break
             differs = most
-        self.loops[index] = Loop(rounds, states, results)
-        outer = [n for n in self._outside(results, index) if self.value(n) is None]
+        made = self.loops[index] = Loop(rounds, states, results, ends)
+        outer = [n for n in self._outside(made.outputs, index) if self.value(n) is None]
         loop = self.node("loop", (*start, *outer), index)
         return [self.node("result", (loop,), k) for k in range(len(start))]
 

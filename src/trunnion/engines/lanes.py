@@ -139,11 +139,14 @@ class Lanes:
         """Whether any bit of any lane does: one plain bit."""
         pairs = [[self.b.bitcast(one, self.long) for one in pair] for pair in zip(some, others, strict=True)]
         bits = functools.reduce(self.b.or_, [self.b.xor(*pair) for pair in pairs])
-        found = self.b.icmp_signed("!=", bits, self.whole(0))
+        return self.any(self.b.icmp_signed("!=", bits, self.whole(0)))
+
+    def any(self, lanes: Value) -> Value:
+        """Whether a bit is set in any lane: one plain bit."""
         if self.width == 1:
-            return found
+            return lanes
         whole = ir.IntType(self.width)
-        return self.b.icmp_signed("!=", self.b.bitcast(found, whole), ir.Constant(whole, 0))
+        return self.b.icmp_signed("!=", self.b.bitcast(lanes, whole), ir.Constant(whole, 0))
 
     def larger(self, a: Value, b: Value, sign: str = ">") -> Value:
         """The larger of two, NaN if one is; with < the smaller."""

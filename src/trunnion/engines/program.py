@@ -264,7 +264,7 @@ class _Writer:
         return getattr(lanes, op)(*a)
 
     def _loop(self, args: tuple[int, ...], index: int, values: dict[int, Value], lanes: Lanes) -> list[Value]:
-        """A loop of the graph: what it comes to after its rounds, or those after which one changes nothing any more."""
+        """A loop of the graph: what it comes to after its rounds, or those after which all lanes are done."""
         loop, int_ = self.graph.loops[index], ir.IntType(32)
         start = [self._of(n, values, lanes) for n in args[: len(loop.states)]]
         before = self.b.block
@@ -275,7 +275,7 @@ class _Writer:
         count.add_incoming(ir.Constant(int_, 0), before)
         states = [self.b.phi(lanes.double) for _ in start]
         inner = dict(values) | dict(zip(loop.states, states, strict=True))
-        self._emit(self.graph.inside(loop.results, index), inner, lanes)
+        self._emit(self.graph.inside(loop.outputs, index), inner, lanes)
         found = [self._of(n, inner, lanes) for n in loop.results]
         for state, first, next_ in zip(states, start, found, strict=True):
             state.add_incoming(first, before)
@@ -283,6 +283,10 @@ class _Writer:
         further = self.b.add(count, ir.Constant(int_, 1))
         count.add_incoming(further, self.b.block)
         more = self.b.icmp_signed("<", further, ir.Constant(int_, loop.rounds))
-        self.b.cbranch(self.b.and_(more, lanes.differ(states, found)), body, after)
+        if loop.done is None:
+            left = lanes.differ(states, found)
+        else:
+            left = lanes.any(self.b.xor(self._of(loop.done, inner, lanes), lanes.constant(True)))
+        self.b.cbranch(self.b.and_(more, left), body, after)
         self.b.position_at_end(after)
         return found

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.namespace import Traced, UntraceableError
+from trunnion.algebra.namespace import Done, Step, Traced, UntraceableError
 from trunnion.engines.graph import Graph
 
 __all__ = ["Recorded", "number_of"]
@@ -72,14 +72,21 @@ class Recorded(Traced):
         return Recorded(self.graph, self.graph.as_float(self.node))
 
     @classmethod
-    def looped(cls, step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
+    def looped(cls, step: Step, start: Sequence[Any], rounds: int, done: Done | None) -> list[Any]:
         graph = _graph_of(start)
 
-        def nodes(numbers: list[int]) -> list[int]:
-            return [number_of(graph, one) for one in step([Recorded(graph, number) for number in numbers])]
+        def recorded(numbers: Sequence[int]) -> list[Any]:
+            return [Recorded(graph, number) for number in numbers]
 
-        found = graph.loop(nodes, [number_of(graph, one) for one in start], rounds)
-        return [Recorded(graph, number) for number in found]
+        def further(numbers: list[int]) -> list[int]:
+            return [number_of(graph, number) for number in step(recorded(numbers))]
+
+        def stays(numbers: list[int]) -> int:
+            assert done is not None
+            return graph.as_boolean(number_of(graph, done(recorded(numbers))))
+
+        first = [number_of(graph, number) for number in start]
+        return recorded(graph.loop(further, first, rounds, stays if done is not None else None))
 
     def all(self, axis: Any = None) -> Any:
         return np.all(self, axis=axis)

@@ -23,7 +23,7 @@ import numpy as np
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
-from trunnion.algebra.namespace import Number, apart, compiled, looped, namespace
+from trunnion.algebra.namespace import Number, apart, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.algebra.plane import (
     ZERO_LOAD,
@@ -44,7 +44,7 @@ from trunnion.groups import tree as spanning
 from trunnion.groups.cuts import CutRow, rows
 from trunnion.groups.gear import NUMBERS, ONE, GearPair, GearRow, actions
 from trunnion.groups.protocol import Elements
-from trunnion.groups.tree import FEW, OUTER, GroupJoint, Step, across, size_of
+from trunnion.groups.tree import OUTER, GroupJoint, Step, across, size_of
 
 __all__ = ["OUTER", "General", "GeneralPose", "GroupJoint"]
 
@@ -176,7 +176,7 @@ class General:
             return list(q)
         size = self.size(elements)
         scale = [TURN_LIMIT if kind == "turn" else 0.3 * size for kind in self.kept_kinds]
-        q, moved_by = self._iterate(elements, q, drive, scale, FEW if compiled(q) else QUICK)
+        q, moved_by = self._iterate(elements, q, drive, scale, QUICK)
         late = ~(moved_by <= NEARLY)
         if rounds and apart(late):
             q, moved_by = self._finish_late(elements, q, drive, scale, late, rounds)
@@ -188,16 +188,14 @@ class General:
         self, elements: Elements, q: list[Number], drive: Numbers, scale: Numbers, rounds: int
     ) -> tuple[list[Number], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its scale), at most `rounds`."""
-        if compiled(q):
-            q, rounds = looped(lambda now: self._step(elements, now, drive, scale), q, rounds - 1), 1
-        last: Number = np.inf
-        for _ in range(rounds):
-            before = [q[i] for i in self.free]
-            q = self._step(elements, q, drive, scale)
-            moves = (np.abs(q[i] - b) / s for i, b, s in zip(self.free, before, scale, strict=True))
-            last = functools.reduce(np.maximum, moves)
-            if not np.any(last > NEARLY):
-                break
+
+        def step(state: list[Number]) -> list[Number]:
+            *before, _ = state
+            after = self._step(elements, before, drive, scale)
+            moves = (np.abs(after[i] - before[i]) / s for i, s in zip(self.free, scale, strict=True))
+            return [*after, functools.reduce(np.maximum, moves)]
+
+        *q, last = looped(step, [*q, np.inf], rounds, lambda state: np.logical_not(state[-1] > NEARLY))
         return q, last
 
     def _finish_late(

@@ -26,13 +26,13 @@ from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import depth, primal
-from trunnion.algebra.namespace import Number, apart, compiled, looped, namespace
+from trunnion.algebra.namespace import Number, apart, looped, namespace
 from trunnion.algebra.nested import each, flat, replaced
 from trunnion.algebra.space import ZERO, Frame, Screw, added, bracket, minus, moment_at, power, times
 from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.groups import redundant
 from trunnion.groups.spatial_tree import Element, SpatialTree, entries
-from trunnion.groups.tree import FEW, OUTER
+from trunnion.groups.tree import OUTER
 from trunnion.joints.spatial import MOTIONS
 
 __all__ = ["SpatialGroup", "SpatialPose"]
@@ -125,7 +125,7 @@ class SpatialGroup(SpatialTree):
         q = [[namespace(v).asarray(v, float) for v in joint] for joint in q]
         if not self.free or not self.chords:
             return q
-        q, moved_by = self._iterate(elements, q, size, FEW if compiled(v for joint in q for v in joint) else QUICK)
+        q, moved_by = self._iterate(elements, q, size, QUICK)
         late = ~(moved_by <= NEARLY)
         if rounds and apart(late):
             q, moved_by = self._finish_late(elements, q, size, late, rounds)
@@ -138,13 +138,18 @@ class SpatialGroup(SpatialTree):
         self, elements: Sequence[Element], q: list[list[Number]], size: Number, rounds: int
     ) -> tuple[list[list[Number]], Number]:
         """Newton steps until no lane moves by more than NEARLY (of its limit), at most `rounds`."""
-        if compiled(v for joint in q for v in joint):
-            q, rounds = self._looped(elements, q, size, rounds - 1), 1
-        last: Number = np.inf
-        for _ in range(rounds):
-            q, last = self._limited_step(elements, q, size)
-            if not np.any(last > NEARLY):
-                break
+
+        def nested(numbers: Sequence[Number]) -> list[list[Number]]:
+            rest = iter(numbers)
+            return [[next(rest) for _ in joint] for joint in q]
+
+        def step(state: list[Number]) -> list[Number]:
+            after, moved_by = self._limited_step(elements, nested(state[:-1]), size)
+            return [*(v for joint in after for v in joint), moved_by]
+
+        start = [*(v for joint in q for v in joint), np.inf]
+        *numbers, last = looped(step, start, rounds, lambda state: np.logical_not(state[-1] > NEARLY))
+        q = nested(numbers)
         return q, np.broadcast_to(last, np.broadcast_shapes(np.shape(last), *(np.shape(v) for j in q for v in j)))
 
     def _limited_step(
@@ -155,20 +160,6 @@ class SpatialGroup(SpatialTree):
         last = self._largest(steps)
         shrink = 1 / np.maximum(last, 1.0)
         return self._advanced(q, [[s * shrink for s in joint] for joint in steps], size), last
-
-    def _looped(
-        self, elements: Sequence[Element], q: list[list[Number]], size: Number, rounds: int
-    ) -> list[list[Number]]:
-        """So many steps of numbers that are compiled, the step compiled once."""
-
-        def nested(flat_: Sequence[Number]) -> list[list[Number]]:
-            rest = iter(flat_)
-            return [[next(rest) for _ in joint] for joint in q]
-
-        def step(flat_: list[Number]) -> list[Number]:
-            return [v for joint in self._limited_step(elements, nested(flat_), size)[0] for v in joint]
-
-        return nested(looped(step, [v for joint in q for v in joint], rounds))
 
     def _largest(self, steps: list[list[Number]]) -> Number:
         """Largest entry of scaled steps in terms of its limit."""

@@ -13,10 +13,9 @@ from trunnion.algebra.plane import Frame, turned
 from trunnion.groups.protocol import Elements
 from trunnion.joints.pairs import PAIRS, Pair
 
-__all__ = ["FEW", "OUTER", "GroupJoint", "Step", "across", "grow", "size_of"]
+__all__ = ["OUTER", "GroupJoint", "Step", "across", "grow", "size_of"]
 
 OUTER = -1  # stands for every link outside the module: all are known, so they count as one
-FEW = 3  # rounds of Newton's method where it is compiled: as many as a small change of the dimensions asks for
 
 
 class GroupJoint(NamedTuple):

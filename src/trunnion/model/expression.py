@@ -104,6 +104,10 @@ class Expression:
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
 
+    def __reduce__(self) -> tuple[Callable[..., Expression], tuple[ast.expr, Mapping[str, Literal | str]]]:
+        """Compiled anew in another process: closures cannot be pickled."""
+        return _expression, (self._tree, self._operands)
+
     def renamed(self, names: Mapping[str, str]) -> Expression:
         """The same that speaks of some by other names."""
         return _expression(self._tree, {key: names.get(str(one), one) for key, one in self._operands.items()})

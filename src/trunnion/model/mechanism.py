@@ -28,7 +28,7 @@ from trunnion.model.findings import repair, schema_findings
 from trunnion.model.friction_override import with_law
 from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
-from trunnion.model.names import nearest
+from trunnion.model.names import nearest, strict_keywords
 from trunnion.model.numbers import Numbers
 from trunnion.model.parameters import Location
 from trunnion.model.parts import (
@@ -71,6 +71,7 @@ _JOINT_PARTS: Mapping[str, type[Part]] = {
 }
 
 
+@strict_keywords
 class Mechanism(Numbers):
     """A linkage: dimensions, links, joints, drivers, loads. See the sections' classes in `model.parts`.
 
@@ -479,6 +480,7 @@ def _canonical(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+@strict_keywords
 def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
     """The mechanism of a YAML, JSON or TOML file.
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, inputs, references
-from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
 from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.sentences import finding_for
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "MOST_POINTS", "Swept", "sweep"]
 
 
-@renamed(method="friction_method")
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def sweep(
     mechanism: Mechanism,

@@ -101,9 +101,16 @@ def sweep(
 
 
 def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], found: list[Finding]) -> list[Finding]:
-    """The findings, with those of plain numbers where the model states a unit in place of others of the same number."""
-    numbers, plain = mechanism.parameter_set, [one for one in swept if not one.written]
-    bare = [finding for one in plain for finding in bare_number(numbers, one.path, float(one.values[-1]))]
+    """The findings, with what the largest value of each number says of its unit in place of what every value does."""
+    bare: list[Finding] = []
+    for one in swept:
+        value = float(max(one.values, key=abs))
+        if not one.written:
+            checked = mechanism.with_values({one.path: value}).checked
+            doubts = [doubt for doubt in checked if (doubt.where, doubt.severity) == (one.path, Severity.WARNING)]
+            doubts = [*bare_number(mechanism.parameter_set, one.path, value)] or doubts
+            more = f" (the largest of {len(one.values)} values)" if len(one.values) > 1 else ""
+            bare += [replace(doubt, what=doubt.what + more) for doubt in doubts]
     return [*(one for one in found if one.where not in {own.where for own in bare}), *bare]
 
 

@@ -14,6 +14,7 @@ import xarray as xr
 
 from trunnion.errors import Finding
 from trunnion.files import whole
+from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.export import frame, save
 from trunnion.results.figure import Figure as Figure
@@ -30,6 +31,7 @@ __all__ = ["Accessor"]
 
 
 @xr.register_dataset_accessor("trunnion")  # type: ignore[no-untyped-call]
+@strict_keywords
 class Accessor:
     """A result of Trunnion, read."""
 

@@ -13,6 +13,7 @@ import pytest
 
 import trunnion
 from mechanisms import MODELS
+from trunnion.accessor import Accessor
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(trunnion, name) for name in trunnion.__all__ if inspect.isroutine(getattr(trunnion, name))},
@@ -33,11 +34,6 @@ MOVED = {
     "identify": "trunnion.rig", "observe": "trunnion.rig", "prepare": "trunnion.solve.run",
     "read_measured": "trunnion.rig", "vocabulary": "trunnion.cycle.vocabulary",
 }  # fmt: skip
-RENAMED = [
-    ("analyse", "method", "friction_method"), ("sweep", "method", "friction_method"),
-    ("rig.identify", "method", "friction_method"), ("rig.compare", "friction", "friction_method"),
-    ("tolerance", "friction", "friction_method"), ("allocate", "friction", "friction_method"),
-]  # fmt: skip
 
 
 def test_the_names_fit_one_page() -> None:
@@ -99,22 +95,58 @@ def test_there_are_no_other_names() -> None:
         trunnion.rig.analyze  # type: ignore[attr-defined]  # noqa: B018
 
 
-@pytest.mark.parametrize(("function", "old", "new"), RENAMED)
-def test_an_old_keyword_works_and_says_the_new_one(function: str, old: str, new: str) -> None:
-    made = FUNCTIONS[function]
-    assert new in inspect.signature(made).parameters
-    with pytest.warns(DeprecationWarning, match=f"'{old}' is now '{new}'"), pytest.raises((TypeError, AttributeError)):
-        made(**{old: None})  # nothing else is given: the call itself fails
-    with pytest.raises(TypeError, match="both"):
-        made(**{old: None, new: None})
+CLASSES = [trunnion.Mechanism, trunnion.FrictionMethod, trunnion.rig.Observation, Accessor]
+METHODS = {
+    f"{made.__name__}.{name}": getattr(made, name)
+    for made in CLASSES
+    for name, member in vars(made).items()
+    if not name.startswith("_") and (inspect.isfunction(member) or isinstance(member, classmethod))
+}
 
 
-def test_an_old_keyword_does_what_the_new_one_does() -> None:
+@pytest.mark.parametrize("name", [*sorted(FUNCTIONS), *sorted(METHODS), "FrictionMethod"])
+def test_an_unknown_keyword_names_the_nearest(name: str) -> None:
+    public = {**FUNCTIONS, **METHODS, "FrictionMethod": trunnion.FrictionMethod}[name]
+    parameters = inspect.signature(public).parameters.values()
+    known = [one.name for one in parameters if one.kind is not one.VAR_KEYWORD and one.name not in ("self", "cls")]
+    if any(one.kind is one.VAR_KEYWORD for one in parameters):
+        return  # options of a view, see below
+    for argument in known:
+        with pytest.raises(TypeError, match=f"takes no argument '{argument}_' — did you mean .*'{argument}'"):
+            public(**{f"{argument}_": None})
+    with pytest.raises(TypeError, match="no argument 'friction'"):
+        public(friction="off")
+
+
+@pytest.mark.parametrize("model", ["durango-fourbar", "rssr"])
+def test_friction_is_not_switched_off_by_a_keyword(model: str) -> None:
+    mechanism = trunnion.read(f"examples/{model}.yaml")
+    for verb in (trunnion.analyse, trunnion.sweep, trunnion.tolerance, trunnion.allocate, trunnion.rig.compare):
+        with pytest.raises(TypeError, match=r"give it mechanism.with_friction\('off'\)"):
+            verb(mechanism, friction="off")
+    with pytest.raises(trunnion.MechanismError, match="no method 'off'"):
+        trunnion.FrictionMethod("off")  # type: ignore[arg-type]
+
+
+def test_the_options_of_a_view_are_its_own(tmp_path: Path) -> None:
     mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
-    settled = trunnion.FrictionMethod("successive-approximation")
-    new = trunnion.analyse(mechanism, 4, friction_method=settled)
-    with pytest.warns(DeprecationWarning, match="friction_method"):
-        assert trunnion.analyse(mechanism, 4, method=settled).identical(new)  # type: ignore[call-arg]
+    cycle = trunnion.analyse(mechanism, 6)
+    for draw in (trunnion.plot, trunnion.report):
+        with pytest.raises(TypeError, match="of a cycle takes no argument 'ideall' — did you mean 'ideal'"):
+            draw(cycle, ideall=cycle)
+    with pytest.raises(TypeError, match="did you mean 'ideal'"):
+        cycle.trunnion.report(idea=cycle)
+    with pytest.raises(TypeError, match="did you mean 'measure'"):
+        trunnion.sweep(mechanism, {"A.speed": [1, 2]}, 6).trunnion.plot(measures="efficiency")
+
+
+@pytest.mark.parametrize("keyword", [{"columns": ["all"]}, {"units_row": True}, {"units": "model"}])
+def test_what_is_said_of_a_file_needs_one(keyword: dict[str, Any], tmp_path: Path) -> None:
+    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
+    with pytest.raises(trunnion.MechanismError, match="no effect without a file"):
+        trunnion.analyse(mechanism, 6, **keyword)
+    trunnion.analyse(mechanism, 6, out=tmp_path / "cycle.csv", **keyword)
+    assert (tmp_path / "cycle.csv").exists()
 
 
 @pytest.mark.parametrize("verb", ["check", "analyse", "locking"])

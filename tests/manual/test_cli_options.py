@@ -131,3 +131,22 @@ def test_a_number_that_is_set_without_the_unit_of_the_file(program: Run, value: 
     if told and name == "l2":
         swept = trunnion.sweep(trunnion.read(TOLERANCED), {name: [float(number), 41.0]}, steps=4).trunnion.findings
         assert [one.severity for one in swept if one.where == "dimensions.l2"] == ["warning"]
+
+
+@pytest.mark.parametrize("stated", ["10 deg", "0 deg"])
+def test_a_plain_angle_is_told_once(program: Run, tmp_path: Path, stated: str) -> None:
+    """Of a dimension that turns the fork of a shaft."""
+    text = (EXAMPLES / "double-cardan.yaml").read_text(encoding="utf-8")
+    turned = text.replace(
+        "C: {at: [0, 0, m], axis: [1, 0, 0]}", "C: {at: [0, 0, m], axis: [cos(phase), sin(phase), 0]}"
+    )
+    (tmp_path / "shaft.yaml").write_text(
+        turned.replace("dimensions:", f"dimensions:\n  phase: {stated}"), encoding="utf-8"
+    )
+    for verb, *options in (
+        ("check", "--set", "phase=3"), ("analyse", "--set", "phase=3", "--steps", 4),
+        ("sweep", "--over", "phase=3:0:2", "--steps", 4),
+    ):  # fmt: skip
+        told = [line for line in program(verb, "shaft.yaml", *options).err.splitlines() if "dimensions.phase" in line]
+        assert len(told) == 1
+        assert told[0].startswith("warning")

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from trunnion import MechanismError, read
+from studio.asking import ask
+from trunnion import MechanismError, read, sweep
 from trunnion.errors import Severity
 
 LINKAGE = """\
@@ -148,6 +149,75 @@ def test_plain_numbers_throughout_and_examples_are_left_alone(tmp_path: Path) ->
     for example in Path("examples").glob("*.yaml"):
         told += [one for one in read(example).checked if "plain number where" in one.what or "forgotten" in one.what]
     assert told == []
+
+
+SHAFT = Path("examples/double-cardan.yaml").read_text(encoding="utf-8")
+FORK = "C: {at: [0, 0, m], axis: [1, 0, 0]}"  # of the middle shaft
+
+
+def shaft(axis: str, dimensions: str = "", more: str = "") -> str:
+    """The double Cardan shaft with the axis of its second fork, and more dimensions."""
+    assert SHAFT.count(FORK) == 1
+    turned = SHAFT.replace(FORK, f"C: {{at: [0, 0, m], axis: {axis}}}")
+    return turned.replace("dimensions:\n", f"dimensions:\n{dimensions}") + more
+
+
+TURNED = "[cos(phase), sin(phase), 0]"
+LIFT = "loads: {{F: {{link: coupler, at: B, force: [0, 'between(drive, {}) * 10 N']}}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "severity", "places", "figure"),
+    [
+        (shaft(TURNED, "  phase: 3\n"), Severity.WARNING, ["dimensions.phase"], "is 3 rad, which is 172°"),
+        (shaft(TURNED, "  phase: 30\n"), Severity.WARNING, ["dimensions.phase"], "4.77 turns"),
+        (shaft(TURNED, "  phase: 0.5\n"), Severity.NOTE, ["dimensions.phase"], "28.6°"),
+        (shaft(TURNED, "  phase: half + half\n  half: 7\n"), Severity.WARNING, ["dimensions.half"], "is 7 rad"),
+        (shaft("[cos(2 * phase), sin(2 * phase), 0]", "  phase: 3\n"), Severity.WARNING, ["dimensions.phase"], "3 rad"),
+        (
+            shaft("[cos(3), sin(2 deg + 1), 0]"),
+            Severity.WARNING,
+            ["links.middle.points.C.axis.x", "links.middle.points.C.axis.y"],
+            "takes",
+        ),
+        (shaft(TURNED, "  phase: 3 deg\n", "tolerances: {phase: 1}"), Severity.WARNING, ["tolerances.phase"], "1 rad"),
+        (shaft(TURNED, "  phase: 3 deg\n", "errors: {phase: 1}"), Severity.WARNING, ["errors.phase"], "1 rad"),
+        (shaft(TURNED, "  phase: 3 deg\n"), None, [], ""),
+        (shaft(TURNED, "  phase: 0\n"), None, [], ""),
+        (shaft(TURNED, "  phase: pi / 2\n"), None, [], ""),
+        (shaft("[cos(k * pi / 4), sin(k * 45 deg), 0]", "  k: 3\n"), None, [], ""),
+        (shaft("[cos(side / l), sin(acos(0.3)), 0]"), None, [], ""),
+        (SHAFT.replace("D: 0 deg", "D: 1"), Severity.WARNING, ["assembly.D"], "is 1 rad"),
+        (LINKAGE + LIFT.format("20 deg, 90"), Severity.WARNING, ["loads.F.force.y"], "90 rad"),
+        (LINKAGE + LIFT.format("0, pi"), None, [], ""),
+        (LINKAGE.replace("60 rpm", "60 rpm, start: 3"), Severity.WARNING, ["drivers.A.start"], "3 rad"),
+        (LINKAGE.replace("CD: 70 mm", "CD: 70 mm, s: 3").replace("60 rpm", "60 rpm, start: 10 deg - s"),
+         Severity.WARNING, ["dimensions.s"], "3 rad"),
+        (re.sub(r"(\d+) (mm|rpm)", r"\1", LINKAGE).replace("speed: 60", "speed: 60, start: 3"), None, [], ""),  # all SI
+        (re.sub(r"(\d+) (mm|rpm)", r"\1", LINKAGE).replace("speed: 60", "speed: 60, start: 30"), Severity.WARNING,
+         ["drivers.A.start"], "4.77 turns"),
+    ],
+)  # fmt: skip
+def test_an_angle_without_a_unit(
+    tmp_path: Path, text: str, severity: Severity | None, places: list[str], figure: str
+) -> None:
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    found = [one for one in read(tmp_path / "model.yaml").checked if "radians" in one.what]
+    assert [(one.where, one.severity) for one in found] == [(place, severity) for place in places]
+    assert all(figure in one.what for one in found)
+    shown = [one for one in ask(ask="model", text=text)["findings"] if "radians" in one["what"]]
+    assert {one["severity"] for one in shown} == ({str(severity)} if severity else set())
+
+
+@pytest.mark.parametrize("stated", ["10 deg", "0 deg"])
+@pytest.mark.parametrize("values", [(0, 10, 3), (10, 0, 3), (-10, 0, 3), [10, 3]])
+def test_plain_angles_of_a_sweep_are_told_once(tmp_path: Path, stated: str, values: object) -> None:
+    (tmp_path / "shaft.yaml").write_text(shaft(TURNED, f"  phase: {stated}\n"), encoding="utf-8")
+    found = sweep(read(tmp_path / "shaft.yaml"), {"phase": values}, 4).trunnion.findings  # type: ignore[dict-item]
+    (told,) = (one for one in found if one.where == "dimensions.phase")
+    assert told.severity is Severity.WARNING
+    assert "10 " in told.what
+    assert "the largest of" in told.what
 
 
 def test_a_dimension_may_be_called_as_a_limit(tmp_path: Path) -> None:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import copy
+import json
 import math
+import operator
+import pickle
 import subprocess
 import sys
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -244,9 +250,36 @@ def test_equal_mechanisms_have_equal_digests() -> None:
     assert len(DURANGO.digest) == 16
 
 
-def test_a_mechanism_cannot_be_changed() -> None:
-    with pytest.raises(ValueError, match="frozen"):
-        DURANGO.name = "other"  # type: ignore[misc]
+@pytest.mark.parametrize("name", ["durango-fourbar", "double-cardan", "piston-by-cost"])
+@pytest.mark.parametrize("analysed", [False, True])
+def test_a_mechanism_cannot_be_changed_in_place(name: str, analysed: bool) -> None:
+    mechanism = Mechanism.read(f"examples/{name}.yaml")
+    if analysed:
+        mechanism.parameters()
+    link = next(iter(mechanism.links.values()))
+    groups = [mechanism.dimensions, mechanism.springs, mechanism.effective_joints, mechanism.processes, link.points]
+    groups += mechanism.processes.values()
+    groups += [joint.friction.parameters for joint in mechanism.effective_joints.values() if joint.friction]
+    calls: list[Any] = [partial(setattr, mechanism, "name", "other"), partial(delattr, link, "mass")]
+    for group in groups:
+        calls += [partial(operator.setitem, group, "L", 1.7), partial(group.update, {"L": 1.7}), group.clear]
+    for call in calls:
+        with pytest.raises(TypeError, match="with_values"):
+            call()
+    for same in (copy.deepcopy(mechanism), pickle.loads(pickle.dumps(mechanism)), mechanism.model_copy()):
+        assert same == mechanism == Mechanism(**json.loads(json.dumps(mechanism.data())))
+        assert (same.digest, same.parameters()) == (mechanism.digest, mechanism.parameters())
+        with pytest.raises(TypeError, match="with_values"):
+            same.dimensions["L"] = 1.7
+
+
+def test_a_copy_with_an_update_is_checked_and_worked_out_anew() -> None:
+    mechanism = Mechanism.read("examples/durango-fourbar.yaml")
+    before = mechanism.parameters()["dimensions.AB"]
+    other = mechanism.model_copy(update={"dimensions": {**mechanism.dimensions, "AB": 2 * before}})
+    assert other.parameters()["links.crank.points.B.x"] == 2 * before
+    with pytest.raises(MechanismError, match="parsec"):
+        mechanism.model_copy(update={"dimensions": {**mechanism.dimensions, "AB": "2 parsec per"}})
 
 
 @pytest.mark.slow

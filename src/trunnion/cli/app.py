@@ -377,9 +377,9 @@ def main() -> None:
 
 
 def _method(name: str, criterion: float | None, iterations: int) -> FrictionMethod:
-    from trunnion.solve.friction import method_named
+    from trunnion.solve.friction_method import FrictionMethod
 
-    return method_named(name, criterion, iterations)
+    return FrictionMethod(name, criterion, iterations)  # type: ignore[arg-type]  # it checks the name
 
 
 def _analysed(

@@ -10,8 +10,9 @@ import numpy as np
 
 from trunnion.cycle import summary
 from trunnion.cycle.kept import ALL, Kept
-from trunnion.deprecation import renamed
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.solve.friction_method import FrictionMethod
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ from trunnion.solve.run import Run, prepare
 __all__ = ["analyse", "analyse_run", "analysed"]
 
 
-@renamed(method="friction_method")
+@strict_keywords
 @np.errstate(all="ignore")
 def analyse(
     mechanism: Mechanism,
@@ -34,7 +35,9 @@ def analyse(
     variables: Sequence[str] | None = None,
     dtype: str = "float64",
     out: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
-    **saved: Any,
+    units_row: bool = False,
+    columns: Sequence[str] | None = None,
+    units: str = "si",
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -47,13 +50,14 @@ def analyse(
     variables: names of those that the Dataset has beside the status, all if not given; the summary and the findings
     are the same, but for the locking margin and what decides it, which are found only where it is named. dtype:
     float64, or float32 for a Dataset of half the size; what is computed is float64 in any case.
-    out: files to write, as by `save`, whose other arguments are `saved`.
+    out: files to write, as by `save`, with its arguments units_row, columns and units.
     Method: the modules' closed forms or the general group, friction settled per module (`friction.settle`).
     Raises MechanismError if the structure does not determine the motion, `steps` is out of range, a variable is
-    unknown, or the engine cannot do the mechanism.
+    unknown, the engine cannot do the mechanism, or there is no file for what is said of tables.
     """
     kept = Kept.read(variables, dtype)
     paths = [out] if isinstance(out, (str, os.PathLike)) else out
+    saved = {"units_row": units_row, "columns": columns, "units": units}
     return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved).dataset
 
 
@@ -70,6 +74,9 @@ def analysed(
 ) -> Result:
     """What `analyse` does, before it becomes a Dataset."""
     check_steps(steps)
+    unused = [key for key, value in (saved or {}).items() if value not in (False, None, "si") and not out]
+    if unused:
+        raise MechanismError(Finding("has no effect without a file to write", unused[0], "give out too"))
     run = prepare(mechanism)
     if run.determinacy is not None:
         run.determinacy.refuse()

@@ -34,6 +34,7 @@ from trunnion.cycle.near_locking import (
 from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described
 from trunnion.results.figure import Figure
@@ -72,6 +73,7 @@ VARIABLES = {
 }
 
 
+@strict_keywords
 def locking(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None] | None = None) -> xr.Dataset:
     """The result of `analyse` with what is to know of locking at every position, by dims joint, driver and position.
 

@@ -27,6 +27,7 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.numbers import Numbers
 from trunnion.model.parts import Driver
 from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run
@@ -224,7 +225,7 @@ def _chosen(base: Mechanism, hung: list[str], count: int, cut: Sequence[str], ru
     for tried in itertools.islice(itertools.combinations(joints, count), MOST_CHOICES):
         drivers = dict.fromkeys((*hung, *tried), Driver(free=True))
         try:
-            plan = decompose(base.model_copy(update={"drivers": {**base.drivers, **drivers}}))
+            plan = decompose(Numbers.model_copy(base, update={"drivers": {**base.drivers, **drivers}}))  # unchecked
         except MechanismError:
             continue
         sizes = [len(module.links) for module in plan.modules]

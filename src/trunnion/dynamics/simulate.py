@@ -30,6 +30,7 @@ from trunnion.dynamics.stick_motion import StickMotion
 from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.solve.run import Run, prepare
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ BESIDE, MASSLESS = 0.1, 1e-15  # rad, or of the size: how far from the start mor
 FINER = 2  # motions with a tenth of the tolerance of the last, at most, that are tried where it misses more
 
 
+@strict_keywords
 @np.errstate(all="ignore")
 def simulate(
     mechanism: Mechanism,

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from trunnion.model.names import FORMULA, nearest
 from trunnion.model.quantity import Dimensionless, Length
 
-__all__ = ["FORMS", "Direction", "Name", "Part", "Position", "forms", "known", "problem", "shape"]
+__all__ = ["FORMS", "Direction", "Name", "Part", "Position", "ReadOnlyDict", "forms", "known", "problem", "shape"]
+
+
+K = TypeVar("K")
+V = TypeVar("V")
 
 
 def _name(name: str) -> str:
@@ -63,7 +67,42 @@ Position = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 Direction = Annotated[tuple[Dimensionless, ...], Field(min_length=2, max_length=3)]
 
 
+def _refuse(*_: object, **__: object) -> NoReturn:
+    remedy = "take mechanism.with_values({NAME: VALUE}), or build one from changed data"
+    raise TypeError(f"this cannot be changed in place: {remedy}")
+
+
+class ReadOnlyDict(dict[K, V]):
+    """A dict that cannot be changed: what was worked out from a model would no longer belong to it."""
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __reduce__(self) -> tuple[type[Self], tuple[dict[K, V]]]:
+        """Copied and pickled at once; by default Python adds item by item."""
+        return type(self), (dict(self),)
+
+
+def _read_only(value: Any) -> Any:
+    return ReadOnlyDict({key: _read_only(item) for key, item in value.items()}) if isinstance(value, dict) else value
+
+
 class Part(BaseModel):
-    """An entry of a model file: immutable, an unknown key is an error."""
+    """An entry of a model file: immutable, its groups of entries too; an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Private attributes only."""
+        if not name.startswith("_"):
+            _refuse()
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name: str) -> None:
+        """Nothing."""
+        _refuse()
+
+    @model_validator(mode="after")
+    def _freeze(self) -> Self:
+        self.__dict__.update({key: _read_only(value) for key, value in vars(self).items() if isinstance(value, dict)})
+        return self

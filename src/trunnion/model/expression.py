@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
@@ -104,6 +104,10 @@ class Expression:
     _tree: ast.expr = field(repr=False)
     _operands: Mapping[str, Literal | str] = field(repr=False)
 
+    def __reduce__(self) -> tuple[Callable[..., Expression], tuple[ast.expr, Mapping[str, Literal | str]]]:
+        """Compiled anew in another process: closures cannot be pickled."""
+        return _expression, (self._tree, self._operands)
+
     def renamed(self, names: Mapping[str, str]) -> Expression:
         """The same that speaks of some by other names."""
         return _expression(self._tree, {key: names.get(str(one), one) for key, one in self._operands.items()})
@@ -111,6 +115,17 @@ class Expression:
     def dimension(self, names: Dimensions) -> Dimension | None:
         """Dimension of the value, from those of the names (None: unknown); UnitError if terms do not fit."""
         return _dimension(self._tree, self._operands, names)
+
+    def is_plain(self, plain: Collection[str]) -> bool:
+        """Whether it is made of numbers without a unit alone; plain: dimensions that are."""
+        return _is_plain(self._tree, self._operands, plain)
+
+    def unitless_angles(self, names: Dimensions, plain: Collection[str], angle: bool) -> Iterator[str | float]:
+        """Numbers without a unit, and dimensions that are such (plain), that are taken as radians.
+
+        They stand for an angle where the whole is one, beside a term that is one, or in sin, cos and tan.
+        """
+        return _unitless_angles(self._tree, self._operands, names, plain, angle)
 
 
 def literal(number: str, unit_text: str) -> Literal:
@@ -336,6 +351,35 @@ def _dimension(tree: ast.expr, operands: Mapping[str, Literal | str], names: Dim
         case ast.Call(func=ast.Name(id=key), args=arguments):
             return _function_dimension(str(operands[key]), [of(one) for one in arguments])
     raise AssertionError("every node was checked when compiled")
+
+
+def _is_plain(tree: ast.expr, operands: Mapping[str, Literal | str], plain: Collection[str]) -> bool:
+    leaves = [operands[part.id] for part in ast.walk(tree) if isinstance(part, ast.Name)]
+    return all(one in plain if isinstance(one, str) else not one.unit for one in leaves)  # neither pi nor a function
+
+
+def _unitless_angles(
+    tree: ast.expr, operands: Mapping[str, Literal | str], names: Dimensions, plain: Collection[str], angle: bool
+) -> Iterator[str | float]:
+    """`Expression.unitless_angles` of a tree whose dimension was found."""
+    parts = [part for part in ast.iter_child_nodes(tree) if isinstance(part, ast.expr)]
+    match tree:
+        case ast.BinOp(op=ast.Add() | ast.Sub()):
+            angle = angle or _dimension(tree, operands, names) == ANGLE
+        case ast.Call(func=ast.Name(id=key), args=parts):
+            function = FUNCTIONS[str(operands[key])]
+            beside = function.takes == "same" and any(_dimension(one, operands, names) == ANGLE for one in parts)
+            angle = function.takes == "angle" or beside or (angle and function.gives == "same")
+        case ast.Name() | ast.BinOp():
+            if angle and _is_plain(tree, operands, plain):
+                leaves = [operands[part.id] for part in ast.walk(tree) if isinstance(part, ast.Name)]
+                dimensions = [one for one in leaves if isinstance(one, str)]
+                yield from dimensions
+                if not dimensions:
+                    yield float(_compile(tree, operands)({}))
+            angle = False
+    for part in parts:
+        yield from _unitless_angles(part, operands, names, plain, angle)
 
 
 def _combine(first: Dimension, second: Dimension, sign: int) -> Dimension:

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from trunnion.model.cost_parts import Process
 from trunnion.model.dimensions import nominal_dimensions
+from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.parts import (
     Correlation,
@@ -82,7 +83,7 @@ class Fields(Part):
     @cached_property
     def effective_links(self) -> Mapping[str, Link]:
         """Every link; one that only the loop names is massless."""
-        return {**self.links, **{row.link: Link() for row in self.loop if row.link not in self.links}}
+        return ReadOnlyDict({**self.links, **{row.link: Link() for row in self.loop if row.link not in self.links}})
 
     @cached_property
     def stated_joints(self) -> Mapping[str, Joint]:
@@ -101,7 +102,7 @@ class Fields(Part):
                 seat_on=row.seat_on,
                 seat=row.seat,
             )
-        return stated
+        return ReadOnlyDict(stated)
 
     @cached_property
     def effective_joints(self) -> Mapping[str, Joint]:
@@ -110,17 +111,21 @@ class Fields(Part):
         pins = [self.joint_defaults.pin, *(joint.pin for joint in self.stated_joints.values())]
         named = any(pin and pin.fit and pin.fit.size.names for pin in pins)
         sizes = nominal_dimensions(self.dimensions) if named else {}
-        return {
-            name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
-            for name, joint in self.stated_joints.items()
-        }
+        return ReadOnlyDict(
+            {
+                name: merge_joint(joint, self.joint_defaults, spatial, self.fits, sizes)
+                for name, joint in self.stated_joints.items()
+            }
+        )
 
     @cached_property
     def points(self) -> Mapping[str, tuple[str, ...]]:
         """Names of the points of every link; a joint of the loop is a point of both its links."""
         rows = [row.joint for row in self.loop]
         ends = {name: [row for row in rows if name in self.stated_joints[row].links] for name in self.effective_links}
-        return {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
+        return ReadOnlyDict(
+            {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
+        )
 
     def carriers(self, gear: str) -> tuple[int, int] | None:
         """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""

@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema
 from trunnion.joints.contact import CONTACT_LAWS, ContactLaw
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.entry import Direction, Name, Part, forms, known, problem
+from trunnion.model.entry import Direction, Name, Part, ReadOnlyDict, forms, known, problem
 from trunnion.model.quantity import (
     Angle,
     AnyQuantity,
@@ -231,7 +231,7 @@ class Friction(BaseModel):
     @property
     def parameters(self) -> Mapping[str, Quantity]:
         """Parameters of the law by name: every key beside `law` and `model`."""
-        return self.__pydantic_extra__
+        return ReadOnlyDict(self.__pydantic_extra__)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

@@ -23,11 +23,12 @@ from trunnion.model.assign import assign
 from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
+from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.findings import repair, schema_findings
 from trunnion.model.friction_override import with_law
 from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
-from trunnion.model.names import nearest
+from trunnion.model.names import nearest, strict_keywords
 from trunnion.model.numbers import Numbers
 from trunnion.model.parameters import Location
 from trunnion.model.parts import (
@@ -70,6 +71,7 @@ _JOINT_PARTS: Mapping[str, type[Part]] = {
 }
 
 
+@strict_keywords
 class Mechanism(Numbers):
     """A linkage: dimensions, links, joints, drivers, loads. See the sections' classes in `model.parts`.
 
@@ -104,9 +106,16 @@ class Mechanism(Numbers):
         return check_model(self)
 
     @classmethod
-    def model_validate(cls, obj: Any, **options: Any) -> Self:
+    def model_validate(cls, obj: Any) -> Self:  # type: ignore[override]  # one way of reading
         """The mechanism of a mapping; MechanismError, as when built from keywords."""
         return obj if isinstance(obj, cls) else cls(**obj)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy, or the mechanism with some sections replaced, which is checked as any other; MechanismError."""
+        if not update:
+            return super().model_copy(deep=deep)
+        names = {name: field.alias or name for name, field in type(self).model_fields.items()}
+        return type(self)(**{names[name]: getattr(self, name) for name in self.model_fields_set} | dict(update))
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
@@ -150,11 +159,13 @@ class Mechanism(Numbers):
     @cached_property
     def seated(self) -> Mapping[str, Literal["loaded"] | Seat]:
         """How the pin lies in its hole, of every joint that has a play and a seat other than free."""
-        return {
-            name: joint.seat
-            for name, joint in self.effective_joints.items()
-            if joint.seat is not None and joint.seat != "free" and has_play(joint) and self._moves(name, joint)
-        }
+        return ReadOnlyDict(
+            {
+                name: joint.seat
+                for name, joint in self.effective_joints.items()
+                if joint.seat is not None and joint.seat != "free" and has_play(joint) and self._moves(name, joint)
+            }
+        )
 
     def _moves(self, name: str, joint: Joint) -> bool:
         """Whether a play is more than 0, across the axis or along it."""
@@ -395,7 +406,7 @@ class Mechanism(Numbers):
     def with_motions(self, laws: Mapping[str, MotionLaw]) -> Mechanism:
         """The mechanism whose drivers move as they were found to, by driver; its file and its digest stay the same."""
         drivers = {name: one.moving(laws[name]) if name in laws else one for name, one in self.drivers.items()}
-        found = self.model_copy(update={"drivers": drivers})
+        found = super().model_copy(update={"drivers": ReadOnlyDict(drivers)})
         found.__dict__.pop("worked_out", None)
         return found
 
@@ -469,6 +480,7 @@ def _canonical(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+@strict_keywords
 def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
     """The mechanism of a YAML, JSON or TOML file.
 

@@ -68,6 +68,7 @@ __all__ = [
     "FORMS",
     "FRICTION_MODELS",
     "JOINT_TYPES",
+    "USUAL_PRESSURE_ANGLE",
     "Contact",
     "Correlation",
     "Cost",
@@ -345,6 +346,9 @@ class Spring(Part):
     useful: bool = False
 
 
+USUAL_PRESSURE_ANGLE = Quantity.read("20 deg", KINDS["angle"])
+
+
 class Gear(Part):
     """A gear pair: the rotation of the second joint is ratio · rotation of the first + phase.
 
@@ -360,7 +364,7 @@ class Gear(Part):
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""
-        usual = Quantity.read("20 deg", KINDS["angle"]) if self.teeth else None
+        usual = USUAL_PRESSURE_ANGLE if self.teeth else None
         return self if self.pressure_angle else self.model_copy(update={"pressure_angle": usual})
 
 

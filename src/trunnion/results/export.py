@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.names import guarded
+from trunnion.model.names import guarded, strict_keywords
 from trunnion.results.attributes import KEPT
 from trunnion.results.model_units import in_model_units
 from trunnion.results.tables import KINDS, Column, kind_of, table_of
@@ -184,6 +184,7 @@ def check_units(units: str) -> None:
         )
 
 
+@strict_keywords
 def save(
     result: xr.Dataset,
     path: str | os.PathLike[str],

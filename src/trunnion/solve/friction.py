@@ -28,7 +28,7 @@ from trunnion.algebra.nested import replaced
 from trunnion.joints.friction import LawFunction
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
-from trunnion.solve.friction_method import FrictionMethod, method_named, peak
+from trunnion.solve.friction_method import FrictionMethod, peak
 from trunnion.solve.friction_problem import Contact, FrictionProblem, State, added, largest, total
 
 __all__ = [
@@ -39,7 +39,6 @@ __all__ = [
     "balance",
     "frictionless",
     "identity_minus",
-    "method_named",
     "primal_of",
     "scaled",
     "settle",

@@ -12,14 +12,16 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.names import strict_keywords
 
 if TYPE_CHECKING:
     pass
-__all__ = ["MARGIN", "FrictionMethod", "method_named", "peak"]
+__all__ = ["MARGIN", "FrictionMethod", "peak"]
 
 Method = Literal["newton", "successive-approximation"]
 
 
+@strict_keywords
 @dataclass(frozen=True)
 class FrictionMethod:
     """How friction and reactions are settled.
@@ -39,18 +41,15 @@ class FrictionMethod:
     margin_up_to: float = 0.0
     multiple: Number | None = None
 
-
-def method_named(name: str, criterion: float | None, limit: int) -> FrictionMethod:
-    """A method from its name and figures; MechanismError if they make no sense."""
-    for known in get_args(Method):
-        if name == known:
-            if criterion is not None and not criterion > 0:
-                raise MechanismError(Finding(f"a criterion of {criterion:g} N is never met", "criterion", "above 0"))
-            if limit < 1:
-                raise MechanismError(Finding(f"{limit} iterations are too few", "iterations", "give 1 or more"))
-            return FrictionMethod(known, criterion, limit)
-    known_names = " or ".join(get_args(Method))
-    raise MechanismError(Finding(f"there is no method '{name}'", "method", f"use {known_names}"))
+    def __post_init__(self) -> None:
+        """MechanismError for a name or figures that make no sense."""
+        if self.name not in get_args(Method):
+            remedy = f"use {' or '.join(get_args(Method))}; without friction: mechanism.with_friction('off')"
+            raise MechanismError(Finding(f"there is no method '{self.name}'", "method", remedy))
+        if self.criterion is not None and not self.criterion > 0:
+            raise MechanismError(Finding(f"a criterion of {self.criterion:g} N is never met", "criterion", "above 0"))
+        if self.limit < 1:
+            raise MechanismError(Finding(f"{self.limit} iterations are too few", "iterations", "give 1 or more"))
 
 
 def peak(normals: Sequence[Number]) -> Number:

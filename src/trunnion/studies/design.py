@@ -18,6 +18,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.transmission import pressure_angles
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
@@ -103,6 +104,7 @@ class Design:
         return self.energy_swing / (fluctuation * self.mean_speed**2) if self.mean_speed else float("nan")
 
 
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
     """What a designer asks of a planar linkage: transmission, dead centres, range, shaking, balance, motor.

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import check_keywords
 from trunnion.results.attributes import whole
 from trunnion.results.tables import kind_of
 
@@ -59,20 +61,27 @@ def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) 
 def report_of(result: xr.Dataset, **options: Any) -> str:
     """The report of a result as HTML. options: those of its view, such as ideal= of a cycle."""
     whole(result, "a report")
-    return str(_view(kind_of(result), REPORTS, "report").report(result, **options))
+    view = _view(kind_of(result), REPORTS, "report")
+    return str(_called(view.report, f"report() of a {kind_of(result)}", result, options))
 
 
 def figure_of(result: xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A figure of a result; kind: of those of its view, the main one if not given; options: those of its view."""
     whole(result, "a figure")
-    view = _view(kind_of(result), FIGURES, "figure")
+    view, call = _view(kind_of(result), FIGURES, "figure"), f"plot() of a {kind_of(result)}"
     if kind is None:
-        main = getattr(view, "sheet", view.figure)
-        return main(result, **options)  # type: ignore[no-any-return]
+        return _called(getattr(view, "sheet", view.figure), call, result, options)  # type: ignore[no-any-return]
     if "kind" not in signature(view.figure).parameters:
         what, remedy = f"a result of {kind_of(result)} has one figure", "leave the kind out"
         raise MechanismError(Finding(what, "kind", remedy))
-    return view.figure(result, kind=kind, **options)  # type: ignore[no-any-return]
+    return _called(view.figure, call, result, {"kind": kind, **options})  # type: ignore[no-any-return]
+
+
+def _called(view: Callable[..., Any], call: str, result: xr.Dataset, options: Mapping[str, Any]) -> Any:
+    """What the function of a view makes of a result; TypeError for an option that it does not have."""
+    _, *known = signature(view).parameters
+    check_keywords(call, options, known)
+    return view(result, **options)
 
 
 def animation_of(result: xr.Dataset, ideal: xr.Dataset | None, height: int) -> Animation:

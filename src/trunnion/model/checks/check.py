@@ -15,6 +15,7 @@ from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.checks.angles import Bare, plain_dimensions, radians, unitless_angles
 from trunnion.model.checks.contacts import contact_law
 from trunnion.model.checks.costs import cost_names, cost_values
 from trunnion.model.checks.errors import errors, joint_errors
@@ -87,6 +88,7 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
     yield from _dimensions(mechanism, known, unreadable)
     yield from tables(mechanism, known)
     moving = {**motion_dimensions(mechanism, known), **known}
+    plain, bare = plain_dimensions(mechanism.dimensions), list[Bare]()
     used: set[str] = set()
     found = mechanism.entries
     for entry in (*found, *stated_entries(mechanism, found)):
@@ -107,8 +109,10 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
             yield Finding(what, entry.where, "state a dimension with the tolerance and use it in the expression")
         try:
             entry.quantity.check(sayable, entry.kind)
+            bare += unitless_angles(mechanism, entry, sayable, plain)
         except UnitError as error:
             yield Finding(error.what, entry.where, error.remedy)
+    yield from radians(mechanism, bare)
     rubs = any(joint.friction is not None for joint in mechanism.effective_joints.values())
     remedy = "remove it" if rubs else "remove it, unless it is of friction, which is off"
     for name in mechanism.dimensions:

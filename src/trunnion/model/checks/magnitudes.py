@@ -132,10 +132,10 @@ def bare_number(numbers: ParameterSet, path: str, value: float) -> Iterator[Find
     as it is written than to its value in SI."""
     entry, before = numbers.entries.get(path), float(numbers.nominal.get(path, math.nan))
     own = _literal_unit(entry.quantity) if entry else ""
-    if not own or not value * before > 0:
+    if not own or not abs(value * before) > 0:
         return
     factor = unit(own)[0]
     written = before / float(factor)
-    if abs(math.log(value / written)) < abs(math.log(value / before)):
+    if abs(math.log(abs(value / written))) < abs(math.log(abs(value / before))):
         what = f"{value:g} is in SI units, where the model states {written:g} {own}: a unit forgotten?"
         yield Finding(what, path, f"write {value:g}{own}", Severity.WARNING)

@@ -20,7 +20,6 @@ from trunnion.model.checks.space import direction_values, pitch_values
 from trunnion.model.parameter_names import ERRORS
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
-from trunnion.model.units import KINDS
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
@@ -93,8 +92,6 @@ def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:
                 entry.where,
                 "check divisions and roots",
             )
-        if entry.kind is KINDS["angle"] and isinstance(entry.quantity.source, int | float) and not entry.alias:
-            yield from _radians(entry.where, float(values[path]))
         if path.startswith(ERRORS):
             continue  # a deviation has a sign
         if entry.path.rpartition(".")[2] in NOT_NEGATIVE and not entry.alias and values[path] < 0:
@@ -105,14 +102,6 @@ NOT_NEGATIVE = frozenset(
     {"mass", "radius", "hole_radius", "length", "bearing", "clearance", "cylindricity", "end_float"}
     | {"resisting_torque", "resisting_force"}
 )
-
-
-def _radians(path: str, angle: float) -> Iterator[Finding]:
-    """A plain number that is many turns is likely meant in degrees."""
-    whole = float(angle).is_integer() or not path.startswith("drivers.")  # a driver may well go through turns
-    if abs(angle) > 2 * np.pi and whole:
-        what = f"is {angle:g} rad, which is {angle / (2 * np.pi):.3g} turns: a plain number is in radians"
-        yield Finding(what, path, f"write {angle:g} deg if it is in degrees", Severity.WARNING)
 
 
 def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Finding]:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.rig.identification.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
 from trunnion.rig.identification.fit import FitProblem, fit, sensors_of
 from trunnion.rig.identification.holdout import HoldOut, held_out
@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 Errors = Literal["channel", "condition"]
 
 
-@renamed(method="friction_method")
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def identify(
     mechanism: Mechanism,

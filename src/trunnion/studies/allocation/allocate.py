@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.model.prices import Price
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
@@ -56,7 +56,7 @@ MOST_FACTORS = 201
 RANGE = (0.5, 2.0)  # of the stated limits: the curve of cost over accuracy
 
 
-@renamed(friction="friction_method")
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def allocate(
     mechanism: Mechanism,

@@ -39,6 +39,7 @@ from trunnion.measures.motion import MOTIONS
 from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.backward import under
@@ -142,6 +143,7 @@ def variance(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
 # ---- over the cycle -------------------------------------------------------------------------------------------
 
 
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def play(
     mechanism: Mechanism,

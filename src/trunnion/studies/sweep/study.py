@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.summary import effort_units, inputs, references
-from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
 from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.sentences import finding_for
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "MOST_POINTS", "Swept", "sweep"]
 
 
-@renamed(method="friction_method")
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def sweep(
     mechanism: Mechanism,
@@ -101,9 +101,16 @@ def sweep(
 
 
 def _with_bare(mechanism: Mechanism, swept: Iterable[Swept], found: list[Finding]) -> list[Finding]:
-    """The findings, with those of plain numbers where the model states a unit in place of others of the same number."""
-    numbers, plain = mechanism.parameter_set, [one for one in swept if not one.written]
-    bare = [finding for one in plain for finding in bare_number(numbers, one.path, float(one.values[-1]))]
+    """The findings, with what the largest value of each number says of its unit in place of what every value does."""
+    bare: list[Finding] = []
+    for one in swept:
+        value = float(max(one.values, key=abs))
+        if not one.written:
+            checked = mechanism.with_values({one.path: value}).checked
+            doubts = [doubt for doubt in checked if (doubt.where, doubt.severity) == (one.path, Severity.WARNING)]
+            doubts = [*bare_number(mechanism.parameter_set, one.path, value)] or doubts
+            more = f" (the largest of {len(one.values)} values)" if len(one.values) > 1 else ""
+            bare += [replace(doubt, what=doubt.what + more) for doubt in doubts]
     return [*(one for one in found if one.where not in {own.where for own in bare}), *bare]
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.deprecation import renamed
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.names import strict_keywords
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.tolerance import runner
@@ -36,7 +36,7 @@ DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**15
 
 
-@renamed(friction="friction_method")
+@strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def tolerance(
     mechanism: Mechanism,

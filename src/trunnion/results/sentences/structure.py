@@ -139,7 +139,7 @@ STRUCTURE: dict[str, Sentence] = {
     "mobility.friction_open": Sentence(
         ERROR,
         "statics does not determine the forces on which the friction in the joints {joints} depends",
-        "state one joint for bearings on one line, with pin.bearing (guide.length) from end to end, or joints with more "
+        "state one joint for bearings on one line, with pin.bearing (guide.length) from end to end, joints with more "
         "freedoms (cylindrical, spherical), or friction: 0 for these joints",
     ),
     "mobility.special": Sentence(

@@ -24,9 +24,10 @@ import importlib.util
 import json
 import math
 import os
-import shutil
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, contextmanager
+from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -43,6 +44,7 @@ from trunnion.results.workbook import write_workbook
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from _typeshed import ReadableBuffer
 
 __all__ = ["FORMATS", "UNITS", "check_format", "check_units", "frame", "in_parts", "save", "saving"]
 
@@ -138,14 +140,13 @@ def _netcdf(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> It
             result = result.copy(deep=False)
             result.attrs[f"kept_{KEPT}"] = result.attrs.pop(KEPT)
         if begun:
-            _append(result, path)
-        elif in_parts:
-            result.to_netcdf(path, engine=engine, unlimited_dims=["position"])
+            _uninterrupted(_append, result, path)
         else:
+            endless = ["position"] if in_parts else None
             try:
-                made = result.to_netcdf(engine=engine)
+                made = result.to_netcdf(engine=engine, unlimited_dims=endless)
             except ValueError:  # of an xarray that cannot make it in memory
-                result.to_netcdf(path, engine=engine)
+                result.to_netcdf(path, engine=engine, unlimited_dims=endless)
             else:  # by Python: where the disk is full, the HDF5 library takes the process with it
                 path.write_bytes(made)
         begun = True
@@ -153,17 +154,59 @@ def _netcdf(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> It
     yield add
 
 
+def _uninterrupted(write: Callable[..., object], *arguments: object) -> None:
+    """Write in a thread of its own, to its end: a signal raises in the main thread alone.
+
+    Inside of HDF5 an exception ends the process, and Zarr goes on writing behind one.
+    """
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(write, *arguments).result()
+
+
 def _append(result: xr.Dataset, path: Path) -> None:
     """Further positions at the end of a NetCDF file, and what the result says now."""
     import h5netcdf
 
-    with h5netcdf.File(path, "a") as file:
+    with _Disk(path, "r+") as disk, h5netcdf.File(disk, "a") as file:
         before = file.dimensions["position"].size
         file.resize_dimension("position", before + result.sizes["position"])
         for name, variable in result.variables.items():
             if "position" in variable.dims:
                 file.variables[str(name)][..., before:] = variable.values
         file.attrs.update(result.attrs)
+    if disk.refused is not None:
+        raise disk.refused
+
+
+class _Disk(FileIO):
+    """A file that notes that it cannot be written and takes what comes: at an error the HDF5 library ends the process.
+
+    refused: the first error.
+    """
+
+    refused: OSError | None = None
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        """Write all of it, or note why not."""
+        left = memoryview(data).cast("B")
+        size = left.nbytes
+        with self._noting():
+            while left:
+                left = left[super().write(left) :]
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Set the size, or note why not."""
+        with self._noting():
+            return super().truncate(size)
+        return size or 0
+
+    @contextmanager
+    def _noting(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.refused = self.refused or error
 
 
 @contextmanager
@@ -175,14 +218,12 @@ def _zarr(path: Path, units_row: bool, columns: Columns, in_parts: bool) -> Iter
         nonlocal begun
         own = [name for name, one in result.variables.items() if begun and "position" not in one.dims]
         along = "position" if begun else None
-        result.drop_vars(own).to_zarr(path, append_dim=along, zarr_format=2)  # 3 has no stable text arrays yet
+        rest = result.drop_vars(own)
+        # format 3 has no stable text arrays yet
+        _uninterrupted(lambda: rest.to_zarr(path, append_dim=along, zarr_format=2))
         begun = True
 
-    try:
-        yield add
-    except BaseException:
-        shutil.rmtree(path, ignore_errors=True)
-        raise
+    yield add
 
 
 @contextmanager

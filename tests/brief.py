@@ -13,9 +13,12 @@ from trunnion.solve.run import prepare
 
 
 @np.errstate(all="ignore")
-def brief(mechanism: Mechanism, steps: int, method: FrictionMethod | None = None) -> Any:
-    """The variables of every position as `analyse` has them; NaN for what is a mean over the cycle."""
+def brief(mechanism: Mechanism, steps: int, method: FrictionMethod | None = None, refuse: bool = True) -> Any:
+    """The variables of every position as `analyse` has them; NaN for what is a mean over the cycle.
+
+    refuse: whether what statics does not determine is an error.
+    """
     run = prepare(mechanism)
-    if run.determinacy is not None:
+    if refuse and run.determinacy is not None:
         run.determinacy.refuse()
     return result_of(run, positions(run, steps, method, averaged=False)).dataset

@@ -16,7 +16,7 @@ from scipy import optimize
 
 from reference.maximal_space import Array, Data, Drive, Frame, Linkage, element, point, rotation, unrolled
 
-__all__ = ["MODELS", "Drawn", "cardan", "chain", "closed", "draw", "frame_of", "random_rotation", "rssr"]
+__all__ = ["MODELS", "Drawn", "cardan", "chain", "closed", "draw", "floating", "frame_of", "random_rotation", "rssr"]
 
 REACH = 0.15  # of the drawn drivers on both sides of the drawn pose, rad or m/10
 SPEED = 3.0
@@ -361,3 +361,20 @@ MODELS: dict[str, Callable[[], Drawn]] = {
     "two RSSR in series": lambda: draw(14, TWO_RSSR),
     "platform on six legs": lambda: draw(3, PLATFORM),
 }
+
+
+def floating(nut: str) -> tuple[Data, Data]:
+    """Links and joints from P of the ground to U of a nut that keep it from turning about z, and from nothing else."""
+    x, y, z = ({"at": [0, 0, 0], "axis": list(axis)} for axis in np.eye(3))
+    links = {
+        "carriage": {"points": {"P": z, "X": x}},
+        "plate": {"points": {"X": x, "Y": y}},
+        "ring": {"points": {"Y": y, "U": x}},
+    }
+    joints = {
+        "P": {"type": "prismatic", "links": ["ground", "carriage"]},
+        "X": {"type": "prismatic", "links": ["carriage", "plate"]},
+        "Y": {"type": "prismatic", "links": ["plate", "ring"]},
+        "U": {"type": "universal", "links": ["ring", nut]},
+    }
+    return links, joints

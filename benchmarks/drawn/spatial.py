@@ -354,14 +354,16 @@ def cardan(space: Space) -> None:
 
 
 def spherical(space: Space) -> None:
-    """Four pins whose axes meet in one point, a crank that turns fully: over-constrained, least reactions."""
+    """Four pins whose axes meet in one point, a crank that turns fully: over-constrained, least reactions, no friction
+    since statics does not say what presses on the pins."""
     rng = space.rng
     crank = float(rng.uniform(0.2, 0.5))
     arcs = [crank, *(float(n) for n in rng.uniform(1.0, 1.5, 2)), float(rng.uniform(1.0, 1.5))]
     links = ["crank", "coupler", "rocker"]
     rows: list[Data] = []
     for name, link, arc in zip("ABCD", [*links, "ground"], arcs, strict=True):
-        rows.append({"joint": name, "type": "revolute", "link": link, "twist": arc, **space.contact("revolute")})
+        contact = {**space.contact("revolute"), "friction": 0}
+        rows.append({"joint": name, "type": "revolute", "link": link, "twist": arc, **contact})
     looped(space, rows, links)
     space.data["over_constraint"] = "minimum-norm"
     space.data["assembly"] = {"coupler": str(rng.choice(["way-1", "way-2"]))}

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -152,25 +153,24 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     _guard(asked)
     with _unwritable(asked):
         target, stream = _destination(asked)
-    remedy = "make the folder first, or write elsewhere"
-    with _unwritable(asked, remedy):
-        beside = target.parent if target else None
-        handle, name = tempfile.mkstemp(suffix=asked.suffix, prefix=f".{asked.stem[:40]}-", dir=beside)
-        os.close(handle)
-    temporary = Path(name)
+    beside = target.parent if target else Path(tempfile.gettempdir())
+    temporary = beside / f".{asked.stem[:40]}-{secrets.token_hex(4)}{asked.suffix}"  # known before it is there
     try:
+        with _unwritable(asked, "make the folder first, or write elsewhere"):
+            os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
         with _unwritable(asked):
             yield temporary
             if target is None:
                 _poured(temporary, stream, asked)
                 return
-            mode = 0o777 if temporary.is_dir() else 0o666  # mkstemp makes it private; a result is an ordinary file
+            mode = 0o777 if temporary.is_dir() else 0o666  # a draft is private; a result is an ordinary file
             temporary.chmod(mode & ~UMASK)
             temporary.replace(target)
     finally:
         if temporary.is_dir():
             shutil.rmtree(temporary, ignore_errors=True)
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # it was not made, or has taken its place
+            temporary.unlink()
 
 
 @contextmanager
@@ -224,9 +224,17 @@ def folder(path: Path) -> None:
 def cache_directory(engine: str) -> Path:
     """Where what an engine has compiled is kept between runs: in the user's cache directory."""
     if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+        base = Path(os.environ.get("LOCALAPPDATA") or _home() / "AppData" / "Local")
     elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
+        base = _home() / "Library" / "Caches"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        base = Path(os.environ.get("XDG_CACHE_HOME") or _home() / ".cache")
     return base / "trunnion" / engine
+
+
+def _home() -> Path:
+    """The user's home folder; of a user without one, a place in which no folder can be made."""
+    try:
+        return Path.home()
+    except RuntimeError:
+        return Path(os.devnull)

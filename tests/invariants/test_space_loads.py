@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trunnion
+from mechanisms_space import floating
 from trunnion import Mechanism, analyse
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -86,22 +87,23 @@ def test_a_spring_between_joints_of_a_loop() -> None:
 
 
 def jack(friction: float, **load: Any) -> Mechanism:
-    """A driven screw of 6 mm pitch and 10 mm mean radius lifts a nut that a guide on its axis keeps from turning."""
-    line = {"at": [0, 0, 0], "axis": [0, 0, 1]}
+    """A driven screw of 6 mm pitch and 10 mm mean radius lifts a floating nut that is kept from turning."""
+    line, across = {"at": [0, 0, 0], "axis": [0, 0, 1]}, {"at": [0, 0, 0], "axis": [0, 1, 0]}
+    links, joints = floating("nut")
     return Mechanism(
         space="spatial",
-        over_constraint="minimum-norm",
         gravity=[0, 0, 0],
         links={
             "ground": {"points": {"A": line, "P": line}},
             "screw": {"points": {"A": line, "H": line}},
-            "nut": {"points": {"H": line, "P": line}},
+            "nut": {"points": {"H": line, "U": across}},
+            **links,
         },
         joints={
+            **joints,
             "A": {"type": "revolute", "links": ["ground", "screw"]},
             "H": {"type": "helical", "links": ["screw", "nut"], "pitch": "6 mm", "friction": friction,
                   "pin": {"radius": "10 mm", "bearing": "50 mm"}},
-            "P": {"type": "prismatic", "links": ["ground", "nut"]},
         },
         drivers={"A": {"speed": 2.0}},
         loads={"load": load},

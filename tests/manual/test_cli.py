@@ -539,6 +539,17 @@ def test_redundant_bearings_are_refused_by_every_verb_and_can_be_asked_for(run: 
     assert run("analyse", model, "--set", "over_constraint=minimum-norm", "--steps", "8").code == 0
 
 
+def test_friction_of_forces_that_statics_leaves_open_is_refused(run: Run, tmp_path: Path) -> None:
+    text, model = (EXAMPLES / "bennett.yaml").read_text("utf-8"), tmp_path / "model.yaml"
+    model.write_text(text.replace("bearing: 40 mm}", "bearing: 40 mm}\n  friction: 0.1"), "utf-8")
+    for verb, code in (("analyse", 2), ("locking", 2), ("check", 1)):
+        done = run(verb, model)
+        assert done.code == code
+        assert "the forces on which the friction in the joints A, B, C, D depends" in done.err
+    done = run("analyse", model, "--steps", "8", *(f"--set=joints.{joint}.friction.coefficient=0" for joint in "ABCD"))
+    assert done.code == 0, done.err
+
+
 @pytest.mark.slow
 def test_too_many_drivers_in_space(run: Run, tmp_path: Path) -> None:
     text = (EXAMPLES / "rccc.yaml").read_text("utf-8").replace("drivers:", "drivers:\n  D: {speed: 5 rpm}", 1)

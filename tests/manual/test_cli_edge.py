@@ -93,21 +93,97 @@ def test_ctrl_c_while_the_program_is_loaded(after: float, tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("end", ["csv", "json", "nc", "parquet", "zarr"])
-def test_a_full_disk_is_a_finding(end: str, tmp_path: Path) -> None:
+PARTS = ["--steps", "300000", "--variables", "drive_effort"]  # so many positions are written some at a time
+
+
+def limited() -> None:
+    """No file grows beyond 5 kB."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
+
+
+@pytest.mark.spread(3, "r.xlsx", "r.pdf")
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [
+        *((f"r.{end}", ["analyse", "--steps", "1000"]) for end in ("csv", "json", "nc", "parquet", "xlsx", "zarr")),
+        *((f"parts.{end}", ["analyse", *PARTS]) for end in ("csv", "nc", "parquet", "zarr")),
+        *((f"r.{end}", ["plot", "--kind", "mechanism"]) for end in ("jpg", "pdf", "png", "svg")),
+        ("r.html", ["report"]),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_full_disk_is_a_finding(out: str, words: list[str], tmp_path: Path) -> None:
     """A limit of the size of files stands for it: the process is not taken along, and nothing is left behind."""
-
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-
-    words = ["analyse", str(FOUR_BAR), "--steps", "1000", "--out", str(tmp_path / f"r.{end}")]
+    verb, *options = words
     done = subprocess.run(
-        [sys.executable, "-m", "trunnion", *words], capture_output=True, text=True, check=False, preexec_fn=limited
-    )
-    assert done.returncode == 2
+        [sys.executable, "-m", "trunnion", verb, str(FOUR_BAR), *options, "--out", str(tmp_path / out)],
+        capture_output=True, text=True, check=False, preexec_fn=limited,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
     assert "cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.spread(1, "zarr")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("end", ["csv", "nc", "parquet", "zarr", "xlsx"])
+def test_a_program_that_is_ended_leaves_no_draft(number: signal.Signals, end: str, tmp_path: Path) -> None:
+    """The old file stays, and no other; the exit status is that of the signal."""
+    out = tmp_path / f"r.{end}"
+    if end != "zarr":
+        out.write_text("old")
+    steps = PARTS if end != "xlsx" else ["--steps", "20000"]
+    before, words = list(tmp_path.iterdir()), ["analyse", str(FOUR_BAR), *steps, "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "trunnion", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        while len(list(tmp_path.iterdir())) == len(before) and process.poll() is None:
+            time.sleep(0.001)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert err.splitlines()[-1] == "stopped"
+    assert list(tmp_path.iterdir()) == before
+    assert end == "zarr" or out.read_text() == "old"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_that_is_dropped_comes_again(
+    program: Run, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    """Python drops what is raised while it clears up an object."""
+
+    class Ended:
+        def __del__(self) -> None:
+            os.kill(os.getpid(), number)
+            time.sleep(0.01)
+
+    def broken(*_: object) -> None:
+        Ended()
+        time.sleep(10)
+
+    monkeypatch.setattr(sys, "unraisablehook", lambda _: None)  # that of the tests tells of it
+    monkeypatch.setattr(analysing, "analysed", broken)
+    assert program("analyse", FOUR_BAR).code == 128 + number
+
+
+@pytest.mark.slow
+def test_workers_end_with_the_program(tmp_path: Path) -> None:
+    words = ["tolerance", str(EXAMPLES / "toleranced-fourbar.yaml"), "--samples", "2000000", "--engine", "numpy"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "trunnion", *words, "--jobs", "2", "--out", str(tmp_path / "t.csv")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        workers: list[str] = []
+        while len(workers) < 2 and process.poll() is None:
+            time.sleep(0.05)
+            workers = children.read_text().split() if children.exists() else ["", ""]
+        time.sleep(1.0)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)  # ends when no worker holds the pipes any more
+    assert process.returncode == 143
     assert list(tmp_path.iterdir()) == []
 
 

@@ -171,6 +171,22 @@ def test_kept_code_is_found_without_recording(monkeypatch: pytest.MonkeyPatch, t
     assert len(recorded) == 3
 
 
+def nowhere(_user: int) -> None:
+    raise KeyError("uid not found")
+
+
+def test_without_a_home_folder_it_is_compiled_anew(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As of a user whom the system does not know: `docker run --user`."""
+    expected = curve(kernel_of("one"))
+    for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "USERPROFILE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("pwd.getpwuid", nowhere)
+    monkeypatch.chdir(tmp_path)
+    assert np.array_equal(curve(kernel_of("one")), expected)
+    both(trunnion.read(DURANGO), 40)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("over", [{"AB": [1.9, 2.0]}, {"A.speed": [5.0, 6.0]}], ids=lambda over: "".join(over))
 def test_a_sweep_again_records_nothing(over: dict[str, Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Neither to see whether it can be compiled, nor with times of each mechanism."""

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import trunnion
-from mechanisms_space import cardan, rssr
+from mechanisms_space import cardan, floating, rssr
 from reference.maximal_space import Data, unrolled
 from reference.space_oracle import Oracle
 from reference.test_newton_euler_space import Compared
@@ -238,18 +238,19 @@ def test_screw_jack(friction: float, way: float) -> None:
 @pytest.mark.parametrize("friction", [0.05, 0.1, 0.2])
 def test_nut_pushed_along_its_screw(friction: float) -> None:
     """Force T/(r tan(λ − φ)); self-locking from φ = λ on, and the margin is tan λ/f."""
-    z, torque = {"at": [0, 0, 0], "axis": [0, 0, 1]}, 3.0
+    y, z = {"at": [0, 0, 0], "axis": [0, 1, 0]}, {"at": [0, 0, 0], "axis": [0, 0, 1]}
+    torque, (links, joints) = 3.0, floating("nut")
     pin = {"pin": {"radius": MEAN, "bearing": 0.1}, "friction": friction}
     data = {
         "space": "spatial",
-        "over_constraint": "minimum-norm",  # all on one axis
         "links": {
             "ground": {"points": {"P": z, "R": z}},
-            "nut": {"points": {"P": z, "H": z}},
+            "nut": {"points": {"U": y, "H": z}},
             "screw": {"points": {"H": z, "R": z}},
+            **links,
         },
         "joints": {
-            "P": {"type": "prismatic", "links": ["ground", "nut"]},
+            **joints,
             "H": {"type": "helical", "links": ["nut", "screw"], "pitch": PITCH, **pin},
             "R": {"type": "revolute", "links": ["ground", "screw"]},
         },
@@ -294,3 +295,93 @@ def test_friction_that_drags_a_rod_round(turned: tuple[str, ...]) -> None:
         force = np.linalg.norm(vector(back.reactions[joint].u), axis=0)
         dragged += friction * radius * force * np.sum(turn * line, axis=0) / np.linalg.norm(turn, axis=0)
     assert run.determinacy.dragged["rod"] == pytest.approx(np.max(np.abs(dragged)), rel=1e-6)
+
+
+# ---- forces that statics leaves open ---------------------------------------------------------------------------------
+
+DOOR, ARM_OF_WEIGHT = 20.0, 0.4
+
+
+def door(hinges: dict[str, float], bearing: float, friction: float = 0.1, **more: Any) -> trunnion.Mechanism:
+    """A door of 20 kg on hinges at these heights, whose pins of 6 mm turn in bearings of the given length."""
+    points = {name: {"at": [0, 0, height], "axis": [0, 0, 1]} for name, height in hinges.items()}
+    leaf = {"mass": DOOR, "centre": [ARM_OF_WEIGHT, 0, 0.5], "inertia": {"xx": 2.4, "yy": 3.5, "zz": 1.1}}
+    pin = {"pin": {"radius": 0.006, "bearing": bearing}, "friction": friction}
+    data = {
+        "space": "spatial",
+        "over_constraint": "minimum-norm",
+        "gravity": [0, 0, -9.81],
+        "links": {"ground": {"points": points}, "leaf": {"points": points, **leaf}},
+        "joints": {name: {"type": "revolute", "links": ["ground", "leaf"], **pin} for name in hinges},
+        "drivers": {"lower": {"speed": 0.6, "range": [0.0, 1.5]}},
+        "tolerances": {"joints.lower.pin.radius": "0.1 mm"},
+        "measures": {"torque": {"effort": "lower", "as": "maximum"}},
+    }
+    return trunnion.Mechanism(trunnion=1, **{**data, **more})
+
+
+REFUSING = {
+    "analyse": lambda model: trunnion.analyse(model, 4),
+    "locking": lambda model: trunnion.locking(model, 4),
+    "sweep": lambda model: trunnion.sweep(
+        model.with_values({f"joints.{name}.friction.coefficient": 0.0 for name in ("lower", "upper")}),
+        {"joints.lower.friction.coefficient": [0.0, 0.2]},
+        steps=4,
+    ),
+    "tolerance": lambda model: trunnion.tolerance(model, ["torque"], steps=4),
+    "simulate": lambda model: trunnion.simulate(
+        trunnion.Mechanism(**{**model.data(), "drivers": {"lower": {"free": True, "speed": 0.6}}}), duration=0.1
+    ),
+}
+
+
+@pytest.mark.parametrize("verb", REFUSING)
+@pytest.mark.parametrize("bearing", [0.02, 0.08])
+def test_friction_of_a_split_that_is_open_is_refused(verb: str, bearing: float) -> None:
+    model = door({"lower": 0.0, "upper": 1.0}, bearing)
+    with pytest.raises(trunnion.MechanismError, match=r"on which the friction in the joints lower(, upper)? depends"):
+        REFUSING[verb](model)
+    assert "mobility.friction_open" in {finding.code for finding in trunnion.check(model, 4).findings}
+
+
+def test_one_bearing_with_two_ends_has_the_friction_of_a_door() -> None:
+    """The weight turns the leaf over: each end carries W a/L whatever the bearing is made of."""
+    result = trunnion.analyse(door({"lower": 0.5}, bearing=1.0), 4)
+    torque = 0.1 * 0.006 * 2 * DOOR * 9.81 * ARM_OF_WEIGHT / 1.0
+    np.testing.assert_allclose(result.drive_effort.values, torque, rtol=1e-12)
+    free = trunnion.analyse(door({"lower": 0.0, "upper": 1.0}, bearing=0.02, friction=0.0), 4)
+    np.testing.assert_allclose(free.drive_effort.values, 0.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("rubbing", ["A", "U"])
+def test_friction_that_no_open_force_presses_on_is_kept(rubbing: str) -> None:
+    """A shaft that its bearing and a plate on a cross both hold along: the thrust is open, what bends the shaft is not.
+
+    The bearing feels the load across it alone; a pin of the cross feels the thrust.
+    """
+    x, y, z = ({"at": [0, 0, 0], "axis": list(axis)} for axis in np.eye(3))
+    pin = {"pin": {"radius": 0.01, "bearing": 0.05}, "friction": 0.1}
+    data = {
+        "space": "spatial",
+        "over_constraint": "minimum-norm",
+        "links": {
+            "ground": {"points": {"A": z, "U": x}},
+            "plate": {"points": {"U": y, "E": z}},
+            "shaft": {"points": {"A": z, "E": z, "P": [0, 0, 0.3]}},
+        },
+        "joints": {
+            "A": {"type": "revolute", "links": ["ground", "shaft"]},
+            "U": {"type": "universal", "links": ["ground", "plate"]},
+            "E": {"type": "planar", "links": ["plate", "shaft"]},
+        },
+        "drivers": {"A": {"speed": 2.0}},
+        "loads": {"belt": {"link": "shaft", "at": "P", "force": [50.0, 0.0, -300.0]}},
+    }
+    data["joints"][rubbing] |= pin
+    if rubbing == "U":
+        with pytest.raises(trunnion.MechanismError, match="on which the friction in the joints U depends"):
+            analysed(data, 4)
+        return
+    result = analysed(data, 4)
+    expected = 0.1 * 0.01 * 2 * 50 * 0.3 / 0.05  # the ends carry 25 N -+ 300 N
+    np.testing.assert_allclose(result.drive_effort.values, expected, rtol=1e-9)

@@ -70,6 +70,39 @@ def test_left_out_conditions_end_with_1(run: Run, tmp_path: Path) -> None:
     assert (tmp_path / "data" / "run-02.csv").exists()
 
 
+BOTH_WAYS = """trunnion-rig: 1
+schedule: {conditions: [{w: 5 rad/s}, {w: -5 rad/s}], turns: 5, idle: 0.5 s}
+rate: 2 kHz
+encoder: {per_turn: 360, kind: count, index: z}
+sensors:
+  torque: {measures: "effort:A", range: 10 N m, noise: 4 mN m, bits: 14, accuracy: {gain: 0.1 %, zero: 5 mN m}}
+  out: {measures: "rate:D", range: 20 rad/s, noise: 0.01 rad/s, bits: 14, accuracy: {zero: 0.02 rad/s}}
+"""
+
+
+@pytest.mark.spread(1, "rssr")
+@pytest.mark.parametrize("name", ["toleranced-fourbar", "rssr"])
+def test_conditions_that_turn_both_ways_by_a_dimension(program: Run, tmp_path: Path, name: str) -> None:
+    """The speed that a condition sets by way of a dimension has the direction against which its angle is held."""
+    text = (EXAMPLES / f"{name}.yaml").read_text("utf-8").replace("dimensions:\n", "dimensions:\n  w: 5 rad/s\n")
+    (tmp_path / "model.yaml").write_text(re.sub(r"A: *\{speed: [^}]*\}", "A: {speed: w}", text), encoding="utf-8")
+    (tmp_path / "rig.yaml").write_text(BOTH_WAYS, encoding="utf-8")
+    assert program("rig", "model.yaml", "rig.yaml", "--out", "data", "--seed", 2).code == 0
+    compared = program("compare", "model.yaml", "data/mapping.yaml", "--channel", "torque", "--channel", "out")
+    assert compared.code == 0, compared.err
+    assert compared.out.count("100.0\N{NO-BREAK SPACE}%") == 4
+    assert "sign" not in program("data", "data/mapping.yaml").err
+    friction = ("--parameter", "joint_defaults.friction.coefficient", "--channel", "torque")
+    fitted = program("identify", "model.yaml", "data/mapping.yaml", *friction)
+    assert fitted.code == 0, fitted.err
+    mapping = (tmp_path / "data" / "mapping.yaml").read_text("utf-8").replace("w: -5 rad/s", "w: 5 rad/s")
+    (tmp_path / "data" / "mapping.yaml").write_text(mapping, encoding="utf-8")
+    for verb, more in (("compare", ()), ("identify", friction)):
+        refused = program(verb, "model.yaml", "data/mapping.yaml", *more)
+        assert refused.code == 2
+        assert "the angle runs backwards: -47.75 rpm measured, 47.75 rpm stated of A" in refused.err
+
+
 GOOD = """trunnion-rig: 1
 schedule: {turns: 2}
 rate: 1 kHz

@@ -1,11 +1,12 @@
 """The edge of the program: whatever ends a run is one line and an exit status, never a traceback.
 
-0 fine, 1 findings, 2 bad input, 3 a fault of the program itself, 130 stopped by Ctrl-C. Only `--debug` shows where a
-fault of the program arose.
+0 fine, 1 findings, 2 bad input, 3 a fault of the program itself, 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
+Only `--debug` shows where a fault of the program arose.
 """
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
@@ -22,12 +23,14 @@ __all__ = ["BAD_INPUT", "FAULT", "STOPPED", "status_of"]
 
 BAD_INPUT, FAULT, STOPPED = 2, 3, 130
 LONGEST = 300  # signs of what an exception says
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+AGAIN = 0.01  # s, after which a signal comes again that Python has dropped
 
 
 class _Interrupt:
-    """Whether Ctrl-C came, also where what runs made another exception of it."""
+    """The signal that came to end the run, also where what runs made another exception of it; 0 if none did."""
 
-    came = False
+    number = 0
 
 
 def status_of(run: Callable[[], Any], debug: bool = False) -> int:
@@ -41,14 +44,16 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
         code = stop.code
         if code == STOPPED:
             _say("stopped; a file named above as written is whole, no other was begun")
+        elif interrupt.number:
+            _say("stopped")
     except MechanismError as error:
         for finding in error.findings:
             _say(str(finding))
         code = BAD_INPUT
     except BaseException as error:
-        if interrupt.came or isinstance(error, KeyboardInterrupt):
+        if interrupt.number or isinstance(error, KeyboardInterrupt):
             _say("stopped")
-            code = STOPPED
+            code = 128 + (interrupt.number or signal.SIGINT)
         else:
             if debug:
                 traceback.print_exc()
@@ -59,7 +64,7 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
 def _unforeseen(error: BaseException) -> int:
     """One line about an exception that no verb foresaw; the exit status."""
     if isinstance(error, OSError):
-        _say(f"error: {error.filename or ''}: {error.strerror or error}")
+        _say(": ".join(["error", *([str(error.filename)] if error.filename else []), error.strerror or str(error)]))
         return BAD_INPUT
     if isinstance(error, MemoryError):
         _say("error: not enough memory — use fewer --steps, samples or points")
@@ -80,42 +85,43 @@ def _say(text: str) -> None:
 
 @contextmanager
 def _told_of(interrupt: _Interrupt) -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, and is remembered: a library may make an ImportError of it, or drop it.
+    """A signal that ends the run is an exception, so that drafts of files are removed and workers ended.
 
-    It is dropped where it comes while Python clears up an object: there the run ends at once.
+    Ctrl-C raises KeyboardInterrupt, of which a library may make an ImportError: so it is remembered. The others raise
+    SystemExit, and what clears up then is not broken off by a second one. Where Python drops the exception, while it
+    clears up an object, the signal comes again.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    repeated: list[threading.Timer] = []
 
-    def stop(*_: Any) -> None:
-        interrupt.came = True
-        raise KeyboardInterrupt
+    def stop(number: int, _frame: Any) -> None:
+        first, interrupt.number = not interrupt.number, number
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        if first:
+            raise SystemExit(128 + number)
 
     def lost(told: Any) -> None:
-        if issubclass(told.exc_type, KeyboardInterrupt):
-            leave()
+        if interrupt.number and issubclass(told.exc_type, (KeyboardInterrupt, SystemExit)):
+            repeated.append(threading.Timer(AGAIN, _thread.interrupt_main, [interrupt.number]))
+            interrupt.number = 0
+            repeated[-1].start()
         before_lost(told)
 
-    before, before_lost = signal.getsignal(signal.SIGINT), sys.unraisablehook
-    ours = before is not signal.SIG_IGN  # in the background of a shell it is not for us
-    if ours:
-        signal.signal(signal.SIGINT, stop)
+    # what is ignored, as Ctrl-C in the background of a shell, is not for us
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    ours = [number for number in SIGNALS if before[number] not in (signal.SIG_IGN, None)]
+    before_lost = sys.unraisablehook
+    for number in ours:
+        signal.signal(number, stop)
     sys.unraisablehook = lost
     try:
         yield
     finally:
+        for timer in repeated:
+            timer.cancel()
         sys.unraisablehook = before_lost
-        if ours:
-            signal.signal(signal.SIGINT, before)
-
-
-def leave(*_: Any) -> None:
-    """End the process at once, with what was printed so far: for Ctrl-C where nothing is begun that would be lost."""
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except (OSError, RuntimeError, ValueError):  # it is being written to, or gone
-            continue
-    os.write(2, b"stopped\n")
-    os._exit(STOPPED)
+        for number in ours:
+            signal.signal(number, before[number])

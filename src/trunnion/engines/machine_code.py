@@ -212,6 +212,10 @@ def _keep(path: Path, code: bytes) -> None:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if _own(path.parent):
             handle, name = tempfile.mkstemp(dir=path.parent)  # for this user alone, unlike what `files.whole` writes
-            with os.fdopen(handle, "wb") as file:
-                file.write(MAGIC + hashlib.sha256(code).digest() + code)
-            os.replace(name, path)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(MAGIC + hashlib.sha256(code).digest() + code)
+                os.replace(name, path)
+            except BaseException:
+                os.unlink(name)
+                raise

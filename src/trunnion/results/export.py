@@ -25,8 +25,8 @@ import importlib.util
 import json
 import math
 import os
-import shutil
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -121,11 +121,13 @@ def _netcdf(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -
 
 def _zarr(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:
     path.unlink()  # a Zarr store is a folder
-    try:
-        result.to_zarr(path, zarr_format=2)  # 3 has no stable text arrays yet
-    except BaseException:
-        shutil.rmtree(path, ignore_errors=True)
-        raise
+    _uninterrupted(lambda: result.to_zarr(path, zarr_format=2))  # 3 has no stable text arrays yet
+
+
+def _uninterrupted(write: Callable[[], object]) -> None:
+    """Write in a thread of its own, to its end: a signal raises in the main thread alone, and Zarr goes on behind one."""
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(write).result()
 
 
 def _json(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> None:

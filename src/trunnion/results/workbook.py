@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ def write_workbook(path: Path, tables: Mapping[str, Sequence[Column]], title: st
 
     for name, columns in tables.items():
         _check(path, name, columns)
-    book = Workbook(str(path), {**PLAIN, "in_memory": True})
+    made = BytesIO()  # written by Python: where the disk is full, the package raises what is no OSError
+    book = Workbook(made, {**PLAIN, "in_memory": True})
     book.set_properties({"title": title, "comments": "written by Trunnion", "created": datetime(2000, 1, 1)})
     head, unit = (
         book.add_format({"bold": True, "bottom": 1}),
@@ -44,6 +46,7 @@ def write_workbook(path: Path, tables: Mapping[str, Sequence[Column]], title: st
             sheet.set_column(place, place, max(10, min(len(label) + 2, 40)))
             _fill(sheet, place, np.asarray(values(slice(None))))
     book.close()
+    path.write_bytes(made.getbuffer())
 
 
 def _check(path: Path, name: str, columns: Sequence[Column]) -> None:

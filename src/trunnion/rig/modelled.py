@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -222,19 +222,32 @@ def refuse_backwards(driver: str, rows: Iterable[tuple[Condition, float]]) -> No
 
 
 def _refuse_opposed(mechanism: Mechanism, conditions: Sequence[Condition]) -> None:
-    """MechanismError where conditions turn against the speed of the driver that is stated of them, by all their files.
+    """MechanismError where conditions turn against the speed that the driver has under their settings, by all files.
 
-    Of those that take it from the data only where all turn against the model's.
+    Where that speed is taken from the data, it is the one without them, and an error only where all such are opposed.
     """
     driver = next(iter(mechanism.drivers), "")
     path = f"drivers.{driver}.speed"
-    if path in mechanism.parameter_set.entries:
-        stated, names = float(mechanism.parameters()[path]), (path, f"{driver}.speed")
-        rows = [(one, stated) for one in conditions if set(names) & set(one.followed)]
-        rows = rows if all(one.speed * stated < 0 for one, _ in rows) else []
-        rows += [(one, next((one.values[name] for name in names if name in one.values), stated)) for one in conditions
-                 if not set(names) & set(one.followed)]  # fmt: skip
-        refuse_backwards(driver, rows)
+    if path not in mechanism.parameter_set.entries:
+        return
+    from_data: list[tuple[Condition, float]] = []
+    stated: list[tuple[Condition, float]] = []
+    for condition in conditions:
+        settings = {name: value for name, value in condition.values.items() if name not in condition.followed}
+        unknown = dict.fromkeys(condition.followed, np.nan)
+        follows = np.isnan(_number(mechanism, path, settings | unknown))
+        (from_data if follows else stated).append((condition, _number(mechanism, path, settings)))
+    opposed = all(condition.speed * speed < 0 for condition, speed in from_data)
+    refuse_backwards(driver, [*(from_data if opposed else []), *stated])
+
+
+def _number(mechanism: Mechanism, path: str, settings: Mapping[str, float]) -> float:
+    """A number of the mechanism, SI, under settings; names that the model does not have are passed over."""
+    numbers = {}
+    for name, value in settings.items():
+        with suppress(MechanismError):
+            numbers[mechanism.parameter_set.resolve(name)] = value
+    return float(mechanism.parameters(numbers)[path])
 
 
 def _degrees(angle: float) -> str:

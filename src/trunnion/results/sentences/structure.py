@@ -136,6 +136,12 @@ STRUCTURE: dict[str, Sentence] = {
         "the reactions given are the smallest that satisfy equilibrium",
         "misfit and preload add to them: they depend on errors and stiffness",
     ),
+    "mobility.friction_open": Sentence(
+        ERROR,
+        "statics does not determine the forces on which the friction in the joints {joints} depends",
+        "state one joint for bearings on one line, with pin.bearing (guide.length) from end to end, joints with more "
+        "freedoms (cylindrical, spherical), or friction: 0 for these joints",
+    ),
     "mobility.special": Sentence(
         WARNING,
         "the mobility is {formula} by Grübler's formula and {rank} by the rank of the constraints",

@@ -254,10 +254,12 @@ def mapping_of(observation: Recorded, form: str) -> dict[str, Any]:
 
 
 def _file(observation: Recorded, case: Case, form: str, timed: bool) -> dict[str, Any]:
-    """A file with what was set, and where the time alone tells the position, when it ran."""
+    """A file with what was set, its zero of an encoder, and where the time alone tells the position, when it ran."""
     found: dict[str, Any] = {"file": f"{case.name}.{form}"}
     if case.settings:
         found["set"] = dict(case.settings)
+    if observation.rig.encoder and (zero := _counted_from(observation, case)) != _counted_from(observation):
+        found["angle"] = {"zero": f"{math.degrees(zero):.12g} deg"}
     if timed and case.rows > case.running:
         ends = (case.before - case.origin, case.before + case.running - 1 - case.origin)
         found["over"] = [f"{end / observation.rate:.9g} s" for end in ends]
@@ -305,9 +307,9 @@ def _source(observation: Recorded, driver: str) -> dict[str, Any]:
     return {"from": "time", "speed": f"{speed:.15g} rad/s", "zero": f"{math.degrees(start):.12g} deg"}
 
 
-def _counted_from(observation: Recorded) -> float:
+def _counted_from(observation: Recorded, case: Case | None = None) -> float:
     """Coordinate, rad, where an encoder reads zero: at its index, else where its count is 0, its level rises."""
-    encoder, case = observation.rig.encoder, observation.cases[0]
+    encoder, case = observation.rig.encoder, case or observation.cases[0]
     assert encoder is not None  # asked of encoders only
     zero, pitch = float(encoder.zero.evaluate()), 2 * math.pi / encoder.per_turn
     start, speed = case.drive(observation.rate)

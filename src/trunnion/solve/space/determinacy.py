@@ -3,12 +3,12 @@
 Grübler's count knows numbers of freedoms only. Where axes are parallel, or meet in a point, some constraints repeat
 others: a planar four-bar drawn in space moves though the count is −2, and what its bearings carry in excess no equation
 of statics tells. The rank of J at assembled poses does: rows − rank constraints are redundant, columns − rank freedoms
-are not determined.
+are not determined. What the joints carry in excess are the self-stresses, Jᵀ λ = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import each
+from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import flat
 from trunnion.algebra.space import ZERO, Screw, moment_at
 from trunnion.algebra.vector import dot, minus
 from trunnion.errors import Finding, MechanismError, Severity
@@ -26,20 +27,24 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Given, backward
 from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
 from trunnion.solve.branches import Chosen
-from trunnion.solve.forward import forward, posed
+from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.system import Cycle, System, Values, driven_coordinates
+from trunnion.solve.system import Cycle, System, Values, driven_coordinates, felt
 
 __all__ = ["Determinacy", "ModuleDeterminacy", "look"]
 
 LOOKED = 12  # positions: what is special at one of them only is a singular position
 TRIES = 96  # guesses at a pose
 PRESENT = 1e-6  # of the largest entry of a null vector
+CONTACTS = 2  # of a joint with friction at most: both pins of a cross, turn and slide of a sleeve
+
+Array = NDArray[Any]
 
 
 class ModuleDeterminacy(NamedTuple):
     """Of one module: redundant constraints and undetermined freedoms at every position looked at; joints that carry the
-    former, links that have the latter. surplus: drivers more than there are freedoms, for which it does not close.
+    former, links that have the latter. surplus: drivers more than there are freedoms, for which it does not close;
+    rubbing: joints whose friction follows what the redundant constraints leave open.
     """
 
     module: int
@@ -48,23 +53,17 @@ class ModuleDeterminacy(NamedTuple):
     joints: tuple[str, ...]
     links: tuple[str, ...]
     surplus: int = 0
-
-
-@dataclass(frozen=True)
-class _Module:
-    number: int
-    names: tuple[str, ...]
-    links: tuple[str, ...]
-    group: SpatialGroup
-    pose: SpatialPose
+    rubbing: tuple[str, ...] = ()
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determinacy:
     """What the rank says of every module that closes a loop and could be assembled."""
-    # places alone decide the rank, but a link that may spin is looked at as it moves
-    walked = forward if system.plan.passive else posed
-    walk = walked(system, values, chosen.assembly, cycle.times(LOOKED) if cycle.duration else np.zeros(1))
+    rubbing = felt(system, values) if system.mechanism.over_constraint == "minimum-norm" else []
+    # places alone decide the rank, but a link that may spin, and a contact with friction, is looked at as it moves
+    walked = forward if system.plan.passive or rubbing else posed
+    time = cycle.times(LOOKED) if cycle.duration else np.zeros(1)
+    walk = walked(system, values, chosen.assembly, time)
     found = []
     for number, module in enumerate(system.plan.modules):
         group = cast(SpatialGroup, system.groups[number])
@@ -78,18 +77,28 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
         if pose is None or not pose.jacobian:
             continue
         table = stacked(pose.jacobian)
-        lanes = np.flatnonzero(np.isfinite(table).all(axis=(-2, -1)))
-        if not len(lanes):
-            continue
-        ranks = np.linalg.matrix_rank(table[lanes], rtol=RANK) if table.size else np.zeros(len(lanes))
-        rank, best = int(np.max(ranks)), int(lanes[np.argmax(ranks)])
         rows, columns = table.shape[1:]
-        joints: tuple[str, ...] = ()
-        links: tuple[str, ...] = ()
-        if rank < max(rows, columns):
-            one = _Module(number, module.joints, module.links, group, _lane(pose, best, len(table)))
-            joints, links = _strained(one, table[best]), _loose(one, table[best])
-        found.append(ModuleDeterminacy(number, rows - rank, columns - rank, joints, links))
+        table = np.broadcast_to(table, (len(time), rows, columns))
+        finite = np.asarray(np.isfinite(table).all(axis=(-2, -1)))
+        if not np.any(finite):
+            continue
+        left, sizes, right = np.linalg.svd(np.where(finite[:, None, None], table, 0.0))
+        ranks = np.where(finite, np.sum(sizes > RANK * sizes[:, :1], axis=-1), -1)
+        rank = int(np.max(ranks))
+        regular = ranks == rank
+        stresses = [_stress(group, pose, null) for null in np.moveaxis(left, -1, 0)[rank:]]
+        motions = [_motion(group, pose, null) for null in np.moveaxis(right, -2, 0)[rank:]]
+        normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
+        found.append(
+            ModuleDeterminacy(
+                number,
+                rows - rank,
+                columns - rank,
+                _present(module.joints, stresses, stresses, regular),
+                _present(module.links, motions, motions, regular),
+                rubbing=_present(module.joints, normals, stresses, regular),
+            )
+        )
     return Determinacy(system, tuple(found), *_spins(walk))
 
 
@@ -153,51 +162,46 @@ def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGrou
         return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
 
 
-def _lane(pose: SpatialPose | None, lane: int, count: int) -> SpatialPose:
-    """The pose at one position, with plain numbers."""
-
-    def pick(number: Any) -> Any:
-        values = np.ravel(number)
-        return float(values[lane if len(values) == count else 0])
-
-    assert pose is not None
-    frames, elements = each((pose.frames, pose.elements), pick)
-    screws = tuple([each(screw, pick) for screw in joint] for joint in pose.screws)
-    size = pick(pose.size)
-    return pose._replace(frames=frames, elements=elements, screws=screws, size=size)
+def _stress(group: SpatialGroup, pose: SpatialPose, null: Array) -> Array:
+    """(joint, 6, lane): the wrenches of a self-stress. null: (lane, row)."""
+    return _table(group.link_by_link(pose, [ZERO] * group.links, list(null.T)), len(null))
 
 
-def _strained(module: _Module, table: NDArray[np.float64]) -> tuple[str, ...]:
-    """Joints whose reactions a redundant constraint leaves open: those of self-stress, Jᵀ λ = 0."""
-    left, values, _ = np.linalg.svd(table)
-    rank = int(np.sum(values > RANK * values[0])) if len(values) else 0
-    names: list[str] = []
-    none = [ZERO] * module.group.links
-    for column in left[:, rank:].T:
-        wrenches = module.group.link_by_link(module.pose, none, list(column))
-        sizes = np.array([_size(wrench) for wrench in wrenches])
-        names += [name for name, size in zip(module.names, sizes, strict=True) if size > PRESENT * sizes.max()]
-    return tuple(dict.fromkeys(name for name in module.names if name in names))
+def _motion(group: SpatialGroup, pose: SpatialPose, null: Array) -> Array:
+    """(link, 6, lane): the twists of a motion that nothing determines, J q̇ = 0. null: (lane, column)."""
+    rates: list[list[Number]] = [[0.0] * len(screws) for screws in pose.screws]
+    for (k, i), rate in zip(group.free, null.T, strict=True):
+        rates[k][i] = rate
+    return _table(group.twists(pose, [None] * len(group.joints), rates), len(null))
 
 
-def _loose(module: _Module, table: NDArray[np.float64]) -> tuple[str, ...]:
-    """Links that move in the freedoms that nothing determines, J q̇ = 0."""
-    _, values, right = np.linalg.svd(table)
-    rank = int(np.sum(values > RANK * values[0])) if len(values) else 0
-    names: list[str] = []
-    for row in right[rank:]:
-        rates: list[list[float]] = [[0.0] * len(screws) for screws in module.pose.screws]
-        for (k, i), value in zip(module.group.free, row, strict=True):
-            rates[k][i] = float(value)
-        twists = module.group.twists(module.pose, [None] * len(module.names), rates)
-        sizes = np.array([_size(twist) for twist in twists])
-        moving = sizes > PRESENT * max(sizes.max(), 1e-300)
-        names += [name for name, moves in zip(module.links, moving, strict=True) if moves]
-    return tuple(name for name in module.links if name in names)
+def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: Number, stress: Array) -> Array:
+    """(joint, contact, lane): normal loads by which a self-stress presses on the contacts with friction, times size.
+
+    A normal load is a seminorm: |N(R + S) − N(R)| ≤ N(S). Where it is zero, so is what S changes of the friction.
+    """
+    found = np.zeros((len(names), CONTACTS, stress.shape[-1]))
+    for k, joint in enumerate(names):
+        for i, contact in enumerate(walk.system.geometry.contacts(walk, joint) if joint in rubbing else ()):
+            found[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
+    return found
 
 
-def _size(screw: Screw) -> float:
-    return float(np.sqrt(sum(float(n) ** 2 for vector in screw for n in vector)))
+def _table(screws: Sequence[Screw], lanes: int) -> Array:
+    """(screw, 6, lane)."""
+    return np.array([[np.broadcast_to(entry, lanes) for entry in flat(screw)] for screw in screws])
+
+
+def _present(names: Sequence[str], parts: Sequence[Array], wholes: Sequence[Array], lanes: Array) -> tuple[str, ...]:
+    """Names whose part in any null vector is, at any of the lanes, more than rounding of the whole.
+
+    parts, wholes: (name, entry, lane) of each null vector.
+    """
+    present = np.zeros(len(names), bool)
+    for part, whole in zip(parts, wholes, strict=True):
+        largest = np.max(np.linalg.norm(whole, axis=1), axis=0)
+        present |= np.any((np.linalg.norm(part, axis=1) > PRESENT * largest) & lanes, axis=-1)
+    return tuple(name for name, is_present in zip(names, present, strict=True) if is_present)
 
 
 @dataclass(frozen=True)
@@ -232,6 +236,7 @@ class Determinacy:
             found += [self._overdriven()] if one.surplus else []
             found += [self._undetermined(one)] if one.undetermined else []
             found += [self._redundant(one)] if one.redundant else []
+            found += [finding_for("mobility.friction_open", "joints", joints=list(one.rubbing))] if one.rubbing else []
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
                 where, drag = f"links.{link}", self.dragged.get(link)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -459,6 +460,9 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     kind = check_figure(target)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with whole(target) as draft, rc_context({"svg.hashsalt": "trunnion"}):
-        figure.savefig(draft, format=kind, dpi=200, metadata=undated)
+    made = BytesIO()  # written by Python: where the disk is full, matplotlib's PDF raises what is no OSError
+    with whole(target) as draft:
+        with rc_context({"svg.hashsalt": "trunnion"}):
+            figure.savefig(made, format=kind, dpi=200, metadata=undated)
+        draft.write_bytes(made.getbuffer())
     return target

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -153,11 +153,15 @@ class Decision(NamedTuple):
 
 @dataclass(frozen=True)
 class Chosen:
-    """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say."""
+    """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say.
+
+    meetings: of modules, by their number, the times at which two assemblies meet in the nominal cycle, s.
+    """
 
     assembly: tuple[Any, ...]
     found: tuple[int, ...]
     findings: tuple[Finding, ...]
+    meetings: Mapping[int, Sequence[change_points.Meeting]] = field(default_factory=dict)
 
 
 def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
@@ -172,6 +176,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
     walk = start(system, values)
     chosen: list[Any] = []
     counts: list[int] = []
+    meetings: dict[int, Sequence[change_points.Meeting]] = {}
     with np.errstate(all="ignore"):
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
@@ -193,15 +198,15 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
                 findings.append(_never(system, module))
             if isinstance(assembly, Track) and len(assembly.again):
                 findings.append(_anew(module, system.dial(values, times), assembly.again))
-            closed = module.rank > 1 and group.BRANCHES
-            if not closed and number == len(system.plan.modules) - 1:  # nothing stands on it
+            assembled = module.rank > 1 and (group.BRANCHES or (isinstance(assembly, Track) and count > 0))
+            if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
             pose = pose_of(walk, number, assembly, times) if pose is None else pose
             walk.stand(number, pose)  # an assembly is a matter of places
-            if closed:
-                meeting = change_points.find(walk, number, assembly, times, pose)
-                findings += [change_points.finding(system, values, module, meeting)] if meeting else []
-    return Chosen(tuple(chosen), tuple(counts), tuple(findings))
+            if assembled and (meeting := change_points.find(walk, number, assembly, times, pose)):
+                findings.append(change_points.finding(system, values, module, meeting))
+                meetings[number] = meeting
+    return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings)
 
 
 def _misnamed(system: System) -> list[Finding]:

@@ -1,20 +1,21 @@
-"""Change points: positions where two assemblies of a closed form meet, and nothing says which way it goes on."""
+"""Change points: positions where two assemblies of a module meet, and nothing says which way it goes on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import Forward, pose_of, start
 from trunnion.solve.system import System, Values
 from trunnion.structure.decompose import Module
 
-__all__ = ["find", "finding", "suspects"]
+__all__ = ["TOUCHING", "Meeting", "find", "finding", "suspects", "touched"]
 
 Array = NDArray[np.float64]
 
@@ -44,29 +45,38 @@ def suspects(margin: Array) -> NDArray[np.bool_]:
 
 
 def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> list[Meeting]:
-    """First and last time at which the assemblies of a closed form meet, s: the same where it passes such a position.
+    """First and last time at which two assemblies of a module meet, s: the same where it passes such a position.
 
-    There 1/condition touches zero between two assembled positions: found on the grid as a minimum that its
-    neighbours' slope would reach, then by golden section. Over a range it is zero at positions of the grid in a row.
+    Over a range 1/condition is zero at positions of the grid in a row; single places are those of `touched`.
     """
     if len(times) < 3:
         return []
-    margin = np.broadcast_to(1 / walk.system.groups[number].condition(pose), times.shape)
+    group = walk.system.groups[number]
+    margin = np.broadcast_to(1 / primal(group.condition(pose)), times.shape)
 
     def margin_at(moment: float) -> float:
         trial = start(walk.system, walk.values)
         for earlier in range(number):
             trial.stand(earlier, pose_of(trial, earlier, walk.assembly[earlier], moment))
-        found = 1 / walk.system.groups[number].condition(pose_of(trial, number, assembly, moment))
-        return float(np.nan_to_num(np.ravel(found)[0], nan=1.0))
+        return float(np.ravel(1 / primal(group.condition(pose_of(trial, number, assembly, moment))))[0])
 
     ranges = _in_a_row(margin < TOUCHING)
     near = suspects(margin)
     for first, last in ranges:
         near[max(first - 2, 0) : last + 1] = False  # it lacks the first and the last of the grid
-    moments = [_lowest(margin_at, times[k - 1], times[k + 1]) for k in np.flatnonzero(near) + 1]
-    found = [(moment, moment) for moment in moments if margin_at(moment) < TOUCHING]
-    return sorted([*found, *((float(times[first]), float(times[last])) for first, last in ranges)])
+    moments = touched(margin_at, times, np.flatnonzero(near) + 1)
+    return sorted([*((one, one) for one in moments), *((float(times[a]), float(times[b])) for a, b in ranges)])
+
+
+def touched(margin: Callable[[float], float], times: Array, places: Iterable[int]) -> list[float]:
+    """Times, s, at which 1/condition touches zero, by golden section between the neighbours of some places of a grid:
+    where the slope of the neighbours would reach zero (`suspects`)."""
+
+    def margin_at(moment: float) -> float:
+        return float(np.nan_to_num(margin(moment), nan=1.0))
+
+    moments = [_lowest(margin_at, float(times[k - 1]), float(times[k + 1])) for k in places]
+    return [moment for moment in moments if margin_at(moment) < TOUCHING]
 
 
 def _in_a_row(touches: NDArray[np.bool_]) -> list[tuple[int, int]]:

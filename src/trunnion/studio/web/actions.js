@@ -2,6 +2,7 @@
 
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
+import { isPart } from "./fields.js";
 import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
@@ -80,6 +81,7 @@ async function answered() {
   const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
   state.answer.value = { ...found, numbers: read ? found.numbers : (state.answer.value?.numbers ?? {}), text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
+  if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
 }

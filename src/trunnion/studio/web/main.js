@@ -3,6 +3,7 @@
 import { render } from "preact";
 import { start } from "./actions.js";
 import { App } from "./app.js";
+import { listenToFailures } from "./boundary.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";
 import { listenToKeys } from "./keys.js";
@@ -12,6 +13,7 @@ import { keepTheme } from "./theme.js";
 import { html } from "./ui.js";
 import { keepCompared } from "./variants.js";
 
+listenToFailures();
 keepTheme();
 render(html`<${App} />`, document.getElementById("studio"));
 listenToKeys(document);

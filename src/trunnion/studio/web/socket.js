@@ -4,7 +4,7 @@
 
 const AGAIN = 800; // ms until a lost connection is tried again
 
-/** An answer's header with its columns as arrays, null for NaN; `body` are the bytes behind the header. */
+/** An answer's header with its columns as arrays, null for what is no number; `body` are the bytes behind the header. */
 export function decode(/** @type {ArrayBuffer} */ buffer) {
   const size = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));
@@ -19,7 +19,7 @@ function unpacked(part, floats) {
   const keys = Object.keys(part);
   if (keys.length === 1 && keys[0] === "column") {
     const [first, count] = part.column;
-    return Array.from(floats.subarray(first, first + count), (value) => (Number.isNaN(value) ? null : value));
+    return Array.from(floats.subarray(first, first + count), (value) => (Number.isFinite(value) ? value : null));
   }
   return Object.fromEntries(keys.map((key) => [key, unpacked(part[key], floats)]));
 }
@@ -39,10 +39,18 @@ export function connection(/** @type {string} */ url, /** @type {(open: boolean)
     socket.binaryType = "arraybuffer";
     ready = new Promise((resolve) => socket.addEventListener("open", resolve));
     socket.addEventListener("open", () => onState(true));
-    socket.addEventListener("message", ({ data }) => settle(decode(data)));
+    socket.addEventListener("message", ({ data }) => {
+      let answer;
+      try {
+        answer = decode(data);
+      } finally {
+        if (!answer) drop(); // nobody waits for what cannot be read
+      }
+      settle(answer);
+    });
     socket.addEventListener("close", () => {
       onState(false);
-      for (const kind of Object.keys(waiting)) finish(kind, null);
+      drop();
       setTimeout(open, AGAIN);
     });
   };
@@ -51,6 +59,7 @@ export function connection(/** @type {string} */ url, /** @type {(open: boolean)
     delete waiting[kind];
     one?.resolve(answer);
   };
+  const drop = () => Object.keys(waiting).forEach((kind) => finish(kind, null));
   const settle = (/** @type {Answer} */ answer) => {
     if (waiting[answer.ask]?.revision === answer.revision) finish(answer.ask, answer);
   };

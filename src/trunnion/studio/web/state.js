@@ -10,6 +10,8 @@ const VARIANT = "trunnion studio variant A";
 export const connected = signal(false);
 /** Whether the program behind the page is gone, or runs anew with another address. */
 export const stopped = signal(false);
+/** What went wrong in the page itself, an error; or null. */
+export const failure = signal(null);
 /** Of the program: {version, examples, laws}. @type {Signal<Record<string, any>>} */
 export const about = signal({ version: "", examples: [], laws: [] });
 /** Of the opened folder: {folder, names}. */

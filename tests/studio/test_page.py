@@ -338,6 +338,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert other.read_text("utf-8") == mine + "# elsewhere\n"
         assert "changed elsewhere" in user.state("s.notice.value.words")
+        user.wrong.clear()  # the console tells of the answer 409
 
     @pytest.mark.slow
     def test_names_are_never_markup(user):

@@ -1,6 +1,6 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
-import { discard, takeWaiting } from "./actions.js";
+import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
 import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
@@ -69,8 +69,9 @@ function Messages() {
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
     <${Failures} />
-    ${state.stopped.value && html`<div class="message-card bad" role="alert">The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.</div>`}
-    ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.
+    ${state.stopped.value && html`<div class="message-card bad" role="alert">${state.stopped.value}</div>`}
+    ${state.unkept.value && state.unsaved.value && html`<div class="message-card bad" role="alert">The browser has no room for this work: it is lost when the page closes. <${Button} label="Save it" onClick=${() => save()} /></div>`}
+    ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.${state.basis.value === state.savedText.value ? "" : ` ${state.fileName.value} was changed elsewhere since.`}
       <${Button} label="Discard it" onClick=${discard} /> <${Button} label="Keep it" onClick=${() => (state.recovered.value = null)} /></div>`}
     ${waiting && html`<div class="message-card">${waiting.name ? `Unsaved work on ${waiting.name}` : "A sheet that was not saved"} is left from ${clock(waiting.time)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}

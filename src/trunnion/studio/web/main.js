@@ -9,11 +9,13 @@ import { keepOthers } from "./ghosts.js";
 import { listenToKeys } from "./keys.js";
 import { keepLayers } from "./layers.js";
 import { keepPhotos } from "./photo.js";
+import { enter } from "./socket.js";
 import { keepTheme } from "./theme.js";
 import { html } from "./ui.js";
 import { keepCompared } from "./variants.js";
 
 listenToFailures();
+enter();
 keepTheme();
 render(html`<${App} />`, document.getElementById("studio"));
 listenToKeys(document);

@@ -3,6 +3,33 @@
 /** @typedef {Record<string, any>} Answer */
 
 const AGAIN = 800; // ms until a lost connection is tried again
+const TOKEN = "trunnion studio token";
+const STORES = () => [localStorage, sessionStorage]; // the one for other tabs of this address; the other where that is full
+
+/** What the server knows this page by; it stays that of the server that the page came from. */
+let token = "";
+
+/** Take the token that the document came with and keep it, else that which was kept; its address goes out of sight. */
+export function enter() {
+  token = /** @type {HTMLMetaElement} */ (document.querySelector("meta[name=token]")).content;
+  if (!token) token = tried((store) => store.getItem(TOKEN)).find(Boolean) ?? "";
+  else if (tried((store) => (store.setItem(TOKEN, token), true)).some(Boolean)) history.replaceState(null, "", location.pathname + location.hash);
+}
+
+function tried(act) {
+  return [0, 1].map((order) => {
+    try {
+      return act(STORES()[order]);
+    } catch {
+      return null; // storage is off or full
+    }
+  });
+}
+
+/** Fetch what only the page may have. */
+export function request(/** @type {string} */ path, /** @type {RequestInit} */ how = {}) {
+  return fetch(path, { ...how, headers: { Authorization: `Bearer ${token}` } });
+}
 
 /** An answer's header with its columns as arrays, null for what is no number; `body` are the bytes behind the header. */
 export function decode(/** @type {ArrayBuffer} */ buffer) {
@@ -28,14 +55,14 @@ function unpacked(part, floats) {
  * A connection that comes back by itself; `onState(open)` tells of it.
  * `ask(kind, fields)` gives the answer, or null where a newer question of its kind or a lost connection overtook it.
  */
-export function connection(/** @type {string} */ url, /** @type {(open: boolean) => void} */ onState) {
+export function connection(/** @type {(open: boolean) => void} */ onState) {
   const revisions = {};
   const waiting = {};
   let socket;
   let ready;
 
   const open = () => {
-    socket = new WebSocket(url);
+    socket = new WebSocket(`ws://${location.host}/socket`, ["trunnion", token]);
     socket.binaryType = "arraybuffer";
     ready = new Promise((resolve) => socket.addEventListener("open", resolve));
     socket.addEventListener("open", () => onState(true));

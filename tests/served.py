@@ -8,18 +8,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import uvicorn
-
 from trunnion.studio.server import Studio
 
 
 @contextmanager
-def served(folder: Path, opened: str) -> Iterator[Studio]:
-    """On a port that is free, until it is left."""
+def served(folder: Path, opened: str | None, port: int = 0) -> Iterator[Studio]:
+    """On a port, or one that is free, until it is left."""
     with socket.socket() as bound:
-        bound.bind(("127.0.0.1", 0))
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind(("127.0.0.1", port))
         studio = Studio(folder, opened, bound.getsockname()[1])
-        server = uvicorn.Server(uvicorn.Config(studio.app(), log_level="error", ws="websockets-sansio"))
+        server = studio.server()
         thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]}, daemon=True)
         thread.start()
         while not server.started:

@@ -146,8 +146,9 @@ def spare(read: Iterable[Path], written: Iterable[tuple[str, Path]]) -> None:
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path with the extension of `path`, whose place it takes when the block ends well.
 
-    A link stays a link: what it leads to is written. A device or a pipe is written to and stays what it is. Raises
-    MechanismError if the folder is missing or not writable, `path` is a folder, or it is read in this run.
+    A link stays a link: what it leads to is written. A file that is replaced hands on its permissions. A device or a
+    pipe is written to and stays what it is. Raises MechanismError if the folder is missing or not writable, `path` is
+    a folder, or it is read in this run.
     """
     asked = Path(path)
     _guard(asked)
@@ -163,14 +164,21 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             if target is None:
                 _poured(temporary, stream, asked)
                 return
-            mode = 0o777 if temporary.is_dir() else 0o666  # a draft is private; a result is an ordinary file
-            temporary.chmod(mode & ~UMASK)
+            temporary.chmod(_mode(temporary, target))
             temporary.replace(target)
     finally:
         if temporary.is_dir():
             shutil.rmtree(temporary, ignore_errors=True)
         with suppress(OSError):  # it was not made, or has taken its place
             temporary.unlink()
+
+
+def _mode(made: Path, target: Path) -> int:
+    """The permissions of what is replaced; else those of any new file or folder, for a draft is private."""
+    try:
+        return target.stat().st_mode & 0o777
+    except FileNotFoundError:
+        return (0o777 if made.is_dir() else 0o666) & ~UMASK
 
 
 @contextmanager

@@ -255,6 +255,18 @@ def test_infinite_numbers_do_not_reach_json(result: Any, tmp_path: Path) -> None
     assert "Infinity" not in (tmp_path / "r.json").read_text("utf-8")
 
 
+@pytest.mark.parametrize("mode", [0o600, 0o664, 0o444])
+@pytest.mark.parametrize("name", ["r.csv", "r.nc", "r.json"])
+def test_a_file_that_is_replaced_hands_on_its_permissions(result: Any, tmp_path: Path, name: str, mode: int) -> None:
+    (tmp_path / name).write_text("before", "utf-8")
+    (tmp_path / name).chmod(mode)
+    (tmp_path / f"link-{name}").symlink_to(name)
+    for path in (tmp_path / name, tmp_path / f"link-{name}"):
+        trunnion.save(result, path)
+        assert stat.S_IMODE((tmp_path / name).stat().st_mode) == mode
+        assert (tmp_path / name).stat().st_size > 1000
+
+
 def test_a_zarr_store_can_be_opened_by_others(tmp_path: Path) -> None:
     pytest.importorskip("zarr")
     trunnion.save(trunnion.analyse(build(four_bar()), 4), tmp_path / "r.zarr")

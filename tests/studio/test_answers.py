@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import trunnion
 from studio.asking import ask, edited
-from trunnion.model.file import entries_of
+from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
 from trunnion.studio.message import packed, unpacked
@@ -373,6 +373,59 @@ def test_the_other_assembly_is_one_click_away():
     assert ghost["rocker.C"][1] < 0 < was["places"]["rocker.C"][1]
     text, _ = edited(text, was["places"], *other["gestures"])
     assert ask(ask="model", text=text)["places"]["rocker.C"] == pytest.approx(ghost["rocker.C"])
+
+
+SHORT_ROCKER = {"AD: 5.50 m": "AD: 4.2 m", "AB: 2.00 m": "AB: 2.6 m", "CD: 3.00 m": "CD: 1.2 m"}
+NEAR_AXES = {"d: 100 mm": "d: 30 mm", "friction: 0.1": "friction: 0.002"}
+
+
+@pytest.mark.parametrize(("name", "other"), [(FOURBAR, SHORT_ROCKER), ("rssr", NEAR_AXES)])
+def test_the_least_margin_is_that_of_a_position_that_has_one(name, other):
+    """The first positions cannot be assembled, the others do not lock."""
+    text = EXAMPLES[name]
+    for old, new in other.items():
+        text = text.replace(old, new)
+    found = ask(ask="model", text=text)
+    assert found["margin"][0] is None
+    assert found["margin_least"]["beyond"]
+    assert found["margin_least"]["value"] == max(one for one in found["margin"] if one is not None)
+    assert found["margin_least"]["at"] != "0°"
+
+
+@pytest.mark.parametrize("name", [FOURBAR, "rssr"])
+def test_where_nothing_loads_the_joints_there_is_no_margin(name):
+    entries = entries_of(EXAMPLES[name])[0]
+    links = {link: {"points": one["points"]} for link, one in entries["links"].items()}
+    found = ask(ask="model", text=text_of({**entries, "links": links, "loads": {}}))
+    assert found["solved"]
+    assert (found["margin_least"], found["margin_why"]) == (None, "nothing loads its joints")
+
+
+def test_the_chip_counts_what_the_section_of_tolerances_states():
+    for text in (EXAMPLES[FOURBAR] + "tolerances: {BC: ±1 mm}\n", EXAMPLES["rssr"] + "tolerances: {b: ±0.1 mm}\n"):
+        found = ask(ask="model", text=text)
+        assert next(one for one in found["ready"] if one["what"] == "tolerance")["ok"]
+        assert any(row["worst"][1] > 0 for row in ask(ask="tolerances", text=text)["rows"])
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        (FOURBAR, ["joints", "K", "pin", "radius"]),
+        (FOURBAR, ["loads", "wind", "force", 0]),
+        (FOURBAR, ["links", "coupler", "points", "K"]),
+        ("spherical-four-bar", ["joints", "K", "friction", "coefficient"]),
+    ],
+)
+def test_a_value_makes_no_part(name, path):
+    found = ask(ask="edit", text=EXAMPLES[name], gestures=[{"do": "set", "path": path, "value": "5 mm"}])
+    assert "is not there" in found["error"]
+
+
+def test_a_link_that_the_loop_alone_names_takes_a_mass():
+    text = "trunnion: 1\nspace: spatial\nloop:\n- {link: base, joint: A}\n- {link: crank, joint: B}\n"
+    text = edited(text, {}, {"do": "set", "path": ["links", "crank", "mass"], "value": "2 kg"})[0]
+    assert entries_of(text)[0]["links"] == {"crank": {"mass": "2 kg"}}
 
 
 @pytest.mark.parametrize("what", ["csv", "report", "png", "svg", "script", "gif"])

@@ -43,15 +43,15 @@ const tried = {{}};
 const fetched = (name, path, asked) => fetch("{home}" + path, asked).then((reply) => reply.text()).then(
   (text) => (tried[name] = text), () => (tried[name] = null));
 const opened = new Promise((done) => {{
-  const socket = new WebSocket("{home}/socket".replace("http", "ws"));
+  const socket = new WebSocket("{home}/socket".replace("http", "ws"), ["trunnion", "x"]);
   socket.onopen = () => done("open");
   socket.onclose = () => done(null);
 }});
 window.done = Promise.all([
   fetched("page", "/", {{ credentials: "include" }}),
   fetched("token", "{query}", {{ credentials: "include" }}),
-  fetched("file", "/file/four-bar.yaml", {{ credentials: "include" }}),
-  fetched("written", "/file/four-bar.yaml", {{ method: "PUT", body: "evil", credentials: "include" }}),
+  fetched("file", "/first/four-bar.yaml", {{ credentials: "include" }}),
+  fetched("written", "/file/four-bar.yaml", {{ method: "PUT", body: '{{"text": "evil"}}', credentials: "include" }}),
   fetched("simple", "/file/four-bar.yaml", {{ method: "POST", body: "evil", mode: "no-cors", credentials: "include" }}),
   opened.then((state) => (tried.socket = state)),
 ]).then(() => tried);
@@ -167,6 +167,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.click("dialog button:has-text('Save')")
         user.page.wait_for_selector("dialog [role=alert]:not(:empty)")
         assert "changed elsewhere" in user.page.locator("dialog [role=alert]").inner_text()
+        user.wrong.clear()  # the console tells of the answer 409
         user.page.keyboard.press("Escape")
         user.page.wait_for_selector("dialog", state="detached")
 
@@ -286,13 +287,19 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
 
     @pytest.mark.slow
     def test_tables_and_the_script_say_what_the_analysis_says(user, tmp_path):
+        """The script writes the table that is named to it, and nothing else."""
+        (tmp_path / "model.yaml").write_text("mine", "utf-8")
         result = trunnion.analyse(Mechanism(**entries_of(FOURBAR)[0]), 360)
         table, _ = exported(user, "CSV")
         columns = np.genfromtxt(io.BytesIO(table), delimiter=",", names=True, deletechars="", replace_space=" ")
         np.testing.assert_allclose(columns["A.effort [N m]"], result["drive_effort"].values[0], rtol=1e-9)
         script, _ = exported(user, "Python")
         (tmp_path / "session.py").write_bytes(script)
-        subprocess.run([sys.executable, "session.py"], cwd=tmp_path, check=True, capture_output=True, timeout=120)
+        for names in ([], ["result.csv"]):
+            command = [sys.executable, "session.py", *names]
+            subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=120)
+            assert sorted(one.name for one in tmp_path.iterdir()) == ["model.yaml", *names, "session.py"]
+        assert (tmp_path / "model.yaml").read_text("utf-8") == "mine"
         again = np.genfromtxt(tmp_path / "result.csv", delimiter=",", names=True, deletechars="", replace_space=" ")
         np.testing.assert_allclose(again["A.effort [N m]"], columns["A.effort [N m]"], rtol=1e-12)
 
@@ -345,7 +352,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         threading.Thread(target=server.serve_forever, daemon=True).start()
         before = (user.studio.folder / "four-bar.yaml").read_text("utf-8")
         try:
-            other = user.page.context.new_page()  # of the same browser, with the cookie of the studio
+            other = user.page.context.new_page()  # of the same browser, which was let in
             other.goto(f"http://127.0.0.1:{server.server_port}/")
             tried = other.evaluate("window.done")
             assert set(tried.values()) <= {None, ""}, json.dumps(tried)[:500]

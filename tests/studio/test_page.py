@@ -64,6 +64,56 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert user.state("s.text.value") == rubbing
 
+    def test_a_mistake_in_drawing_a_part_leaves_the_rest_and_ends_with_the_next_answer(user):
+        user.of("actions", "m.setValue(['dimensions', 'BC'], '5.9 m')")
+        user.idle()
+        user.state("(s.answer.value = { ...s.answer.value, margin_least: { value: null, at: '' } }, 0)")
+        user.page.wait_for_selector("[role=alert]:has-text('The page made a mistake here')")
+        user.page.click("button:has-text('Undo the last step')")
+        user.until("s.answer.value.text === s.text.value")
+        assert "BC: 6.00 m" in user.state("s.text.value")
+        assert "> 10 everywhere" in user.page.locator(".bottom .margin").inner_text()
+        assert user.page.locator("[role=alert]").count() == 0
+
+    @pytest.mark.parametrize(
+        "mistake",
+        [
+            "s.answer.value = { ...s.answer.value, scene: { count: 1 } }",  # in what follows the answer
+            "throw new Error('of a handler')",
+            "Promise.reject(new Error('of a promise'))",
+        ],
+    )
+    def test_a_mistake_elsewhere_is_told_and_the_page_goes_on(user, mistake):
+        user.state(f"(setTimeout(() => {{ {mistake}; }}), 0)")
+        user.page.wait_for_selector("[role=alert]:has-text('The page made a mistake here')")
+        user.wrong.clear()  # the mistake itself, in the console
+        for continued in user.page.locator("button:has-text('Continue')").all():
+            continued.click()
+        user.of("actions", "m.setValue(['dimensions', 'BC'], '5.9 m')")
+        user.until("s.solved.value && s.answer.value.text === s.text.value")
+        assert user.page.locator("[role=alert]").count() == 0
+        assert user.page.locator('.handle[data-name="C"]').count() == 1
+
+    def test_an_answer_that_cannot_be_read_is_waited_for_no_longer(user):
+        broken = b"\x04\x00\x00\x00{,,}"
+        user.page.route_web_socket("**/socket", lambda route: route.on_message(lambda _: route.send(broken)))
+        user.page.reload()
+        user.page.wait_for_selector("[role=alert]:has-text('The page made a mistake here')")
+        user.wrong.clear()
+        assert user.state("s.busy.value") == 0
+
+    def test_a_rename_that_is_undone_leaves_no_panel_of_the_name(user):
+        for kind, name, to in (("joints", "C", "K"), ("links", "rocker", "lever"), ("points", "coupler.E", "W")):
+            user.state(f"(s.selection.value = {{ kind: '{kind}', name: '{name}' }}, s.tab.value = 'properties')")
+            field = user.page.locator(".name-of-part")
+            field.fill(to)
+            field.press("Tab")
+            user.until(f"s.selection.value?.name.endsWith('{to}')")
+            user.keys("Control+z")
+            assert user.state("s.selection.value") is None
+            assert user.page.locator("h2:has-text('Parts')").count() == 1
+        assert user.state("s.text.value === s.savedText.value")
+
     @pytest.mark.slow
     def test_undo_to_the_empty_sheet_and_redo(user):
         user.new_sheet()
@@ -288,6 +338,7 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.idle()
         assert other.read_text("utf-8") == mine + "# elsewhere\n"
         assert "changed elsewhere" in user.state("s.notice.value.words")
+        user.wrong.clear()  # the console tells of the answer 409
 
     @pytest.mark.slow
     def test_names_are_never_markup(user):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from pathlib import Path
 from typing import Annotated
@@ -30,13 +31,11 @@ def studio(
 ) -> None:
     """Draw a mechanism in the browser, drag it, watch its forces."""
     try:
-        import uvicorn
-
         from trunnion.studio.server import Studio
     except ImportError:
         what = "the studio is not installed"
         raise MechanismError(Finding(what, remedy="install it: pip install 'trunnion[studio]'")) from None
-    path = (file or Path()).resolve()
+    path = Path(os.path.realpath(file or Path()))  # a link in a circle stays one, and does not exist
     if file is not None and not path.exists():
         raise MechanismError(Finding("does not exist", str(file), "name a model file or a folder"))
     folder, opened = (path, None) if path.is_dir() else (path.parent, path.name)
@@ -47,9 +46,8 @@ def studio(
     if open_:
         import webbrowser
 
-        webbrowser.open(own.address)
-    server = uvicorn.Server(uvicorn.Config(own.app(), log_level="warning", ws="websockets-sansio", ws_max_size=4 << 20))
-    server.run(sockets=[bound])
+        webbrowser.open(own.entrance())
+    own.server().run(sockets=[bound])
 
 
 def _usual() -> socket.socket:

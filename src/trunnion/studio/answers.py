@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.file import entries_of, text_of
+from trunnion.model.file import text_of
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
-from trunnion.studio.ends import held
+from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
 from trunnion.studio.loaded import Loaded, loaded
@@ -63,15 +63,17 @@ def answer(request: bytes) -> bytes:
         asked = json.loads(request)
         if not isinstance(asked, dict):
             raise ValueError("not a group of entries")
-        head = {key: asked.get(key) for key in ("ask", "revision")}
-        about = ANSWERS.get(str(asked.get("ask")))
+        kind, revision = asked.get("ask"), asked.get("revision")
+        head = {"ask": str(kind)[:40], "revision": revision if isinstance(revision, int) else None}
+        about = ANSWERS.get(str(kind))
         if about is None:
-            raise ValueError(f"nothing is known of '{asked.get('ask')}'")
+            raise ValueError(f"nothing is known of '{head['ask']}'")
         return packed(head | about(asked))
     except MechanismError as error:
         return packed(head | {"error": "; ".join(_sentence(one) for one in error.findings[:3])})
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        return packed(head | {"error": f"The question cannot be answered ({type(error).__name__}: {error})"})
+    except Exception as error:  # whatever it is: whoever asked gets a sentence, and can go on asking
+        why = f"{type(error).__name__}: {str(error)[:300]}"
+        return packed(head | {"error": f"The question cannot be answered ({why})"})
 
 
 def _sentence(finding: Finding) -> str:
@@ -185,7 +187,7 @@ def _numbers(state: Loaded, drawn: Sketch) -> dict[str, float]:
 def _drag(asked: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
     state, steps = loaded(str(asked["text"])), _steps(asked)
-    index, to = int(asked.get("index") or 0) % steps, (float(asked["to"][0]), float(asked["to"][1]))
+    index, to = int(asked.get("index") or 0) % steps, vector(asked["to"])
     sketch = _shown(state, steps, index)
     sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
@@ -261,11 +263,11 @@ def _named(path: str) -> str:
 def _edit(asked: Asked) -> dict[str, Any]:
     """The text of the model after some gestures, and where its points are shown."""
     text = str(asked["text"])
-    entries = (
-        copy.deepcopy(entries_of(text)[0])
-        if text.strip()
-        else {"trunnion": 1, "name": "New mechanism", "space": "planar"}
-    )
+    state = loaded(text)
+    if state.entries is None:
+        raise MechanismError(state.findings)
+    new = {"trunnion": 1, "name": "New mechanism", "space": "planar"}
+    entries = copy.deepcopy(dict(state.entries)) if text.strip() else new
     places = {str(key): (float(x), float(y)) for key, (x, y) in dict(asked.get("places") or {}).items()}
     sketch = Sketch(entries, places, set(map(str, asked.get("locked") or ())), fine=float(asked.get("fine") or 0.0))
     says = [done(sketch, given) for given in asked["gestures"]]

@@ -53,6 +53,7 @@ def lock(sketch: Sketch, given: Given) -> str:
 def put_value(sketch: Sketch, given: Given) -> str:
     """An entry gets a value; without one it goes."""
     *way, last = given["path"]
+    _refuse_missing(sketch, given["path"])
     group: Any = sketch.entries
     for key in way:
         group = group[key] if isinstance(group, list) else group.setdefault(key, {})
@@ -75,6 +76,18 @@ def put_value(sketch: Sketch, given: Given) -> str:
     if isinstance(group, dict):
         group.pop(last, None)
     return f"Remove {stated}"
+
+
+def _refuse_missing(sketch: Sketch, path: list[Any]) -> None:
+    """A value is no way to make a part: one that is gone does not come back as a group without its links."""
+    section, name, *inner = path if len(path) > 2 else ("", "")
+    if section not in SECTIONS:
+        return
+    rows = sketch.entries.get("loop") if section == "links" else None  # its links need not be stated
+    links = {row.get("link") for row in rows or () if isinstance(row, dict)}
+    point = inner[1] if section == "links" and inner[0] == "points" and len(inner) > 1 else None
+    if name not in {*sketch.section(section), *links} or (point is not None and point not in sketch.points(name)):
+        raise refused("is not there", ".".join(map(str, path)), "choose what is drawn")
 
 
 def _users(group: Any, name: str, way: tuple[str, ...] = ()) -> Iterator[str]:

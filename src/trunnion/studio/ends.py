@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from math import cos, hypot, sin
+from math import cos, hypot, isfinite, sin
 from typing import Any, NamedTuple
 
 from trunnion.errors import Finding, MechanismError
@@ -26,8 +26,10 @@ def refused(what: str, where: str, remedy: str) -> MechanismError:
 
 def vector(given: Any) -> Vector:
     """A place of the page, m."""
-    x, y = given
-    return float(x), float(y)
+    x, y = map(float, given)
+    if not (isfinite(x) and isfinite(y)):
+        raise ValueError(f"({x}, {y}) is no place")
+    return x, y
 
 
 # ---- names ----------------------------------------------------------------------------------------------------

@@ -60,22 +60,26 @@ def _animation(state: Loaded, steps: int) -> bytes:
 
 
 def _script(state: Loaded, steps: int) -> bytes:
-    """The model and what was asked of it, as Python."""
+    """The model and what was asked of it, as Python; it writes no file that is not named to it."""
     lines = [
-        '"""The session of the studio as a script: the model, its cycle, a table and a report."""',
+        '"""The session of the studio as a script: the model and its cycle; with the name of a file also its table."""',
         "",
+        "import sys",
         "from pathlib import Path",
+        "from tempfile import TemporaryDirectory",
         "",
         "import trunnion",
         "",
         f"MODEL = {state.text!r}",
         "",
-        'path = Path("model.yaml")',
-        'path.write_text(MODEL, encoding="utf-8")',
-        "mechanism = trunnion.read(path)",
+        "with TemporaryDirectory() as folder:",
+        '    path = Path(folder, "model.yaml")',
+        '    path.write_text(MODEL, encoding="utf-8")',
+        "    mechanism = trunnion.read(path)",
         f"result = trunnion.analyse(mechanism, steps={steps})",
         "print(result.trunnion)",
-        'trunnion.save(result, "result.csv", units="model")',
+        "if len(sys.argv) > 1:  # as in: python session.py table.csv",
+        '    trunnion.save(result, sys.argv[1], units="model")',
         "",
     ]
     return "\n".join(lines).encode()

@@ -29,7 +29,9 @@ def packed(header: Mapping[str, Any]) -> bytes:
     for place in plain.pop("", []):
         place["bytes"][0] = first
         first += place["bytes"][1]
-    text = json.dumps(plain, ensure_ascii=False, allow_nan=False).encode()
+    text = json.dumps(
+        plain, allow_nan=False
+    ).encode()  # ASCII: half a character of the page's text comes back as it was
     text += b" " * (-len(text) % 4)
     return struct.pack("<I", len(text)) + text + body + b"".join(files)
 

@@ -13,7 +13,6 @@ from trunnion.views.common.bundle import module
 __all__ = ["document", "found", "script"]
 
 PLACES = {"studio": ("trunnion.studio", "web"), "web": ("trunnion.views", "web")}
-FETCHED = '<link rel="preload" as="fetch" href="{}" crossorigin>'
 IMPORT_MAP = re.compile(r'<script type="importmap"[^>]*>(.*?)</script>', re.S)
 
 
@@ -30,10 +29,10 @@ def found(place: str, name: str) -> Traversable:
     return one
 
 
-def document(nonce: str, opened: str) -> str:
-    """The HTML; nonce: of its import map; opened: address of what is fetched beside the script, or ""."""
-    given = {"nonce": nonce, "fetched": FETCHED.format(opened) if opened else ""}
-    return re.sub(r"{{(\w+)}}", lambda found: given[found[1]], _text("studio/index.html"))
+def document(nonce: str, token: str) -> str:
+    """The HTML; nonce: of its import map; token: which the page names to the server, or "" if it has one already."""
+    values = {"nonce": nonce, "token": token}
+    return re.sub(r"{{(\w+)}}", lambda name: values[name[1]], _text("studio/index.html"))
 
 
 @lru_cache(maxsize=1)

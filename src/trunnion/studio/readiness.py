@@ -58,7 +58,7 @@ def _said(
     rubs = bool(rubbing(prepare(mechanism).system))
     yield rubs, "Joints rub." if rubs else "State friction of a joint, and the radius of its pin."
     yield bool(mechanism.seated), "Pins have play." if mechanism.seated else "State a clearance or fit of a pin."
-    tolerated = bool(mechanism.tolerances())
+    tolerated = bool(mechanism.tolerated())
     done = "Numbers have tolerances: what they do stands under the plots; trunnion tolerance FILE tells more."
     yield tolerated, done if tolerated else "Write a tolerance, such as 60 mm ± 0.05 mm."
     free = any(driver.found for driver in mechanism.drivers.values())

@@ -1,27 +1,32 @@
 """The studio's server: on this machine alone, for the one page that was opened with its token.
 
-Loopback only; Host and Origin are checked; the token of the address becomes a cookie, and without it there is nothing.
-Files are models of one folder: names with no way out of it, links resolved. Answers are made in a process of their own
-thread, one after another; nothing but the text of a model comes from the page.
+Loopback only; Host, Origin and Sec-Fetch-Site are checked. Who asks for more than the code of the page names the token
+in a header. It is no cookie: browsers send those to every port of a machine. The page has it from the address that
+opened it and keeps it in the browser's storage, which belongs to one port. Files are the regular files of one folder
+that are models: names with no way out of it, links resolved. Answers are made in a thread of their own, one after
+another; nothing but the text of a model comes from the page.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import json
+import logging
 import mimetypes
+import os
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, Lock
-from urllib.parse import quote
 
+import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -30,18 +35,23 @@ from trunnion.studio.page import document, found, script
 
 __all__ = ["Studio"]
 
-COOKIE = "trunnion_studio"
-# what a link to a model is opened with by a browser that does not know the token
+SUBPROTOCOL = "trunnion"  # of the socket; the token comes as a second one, for a browser sends no other header there
 STRANGER = """<!doctype html><meta charset="utf-8"><title>Trunnion</title>
 <body style="font: 16px/1.5 system-ui, sans-serif; max-width: 40em; margin: 4em auto; padding: 0 1em">
-<h1 style="font-size: 1.2em">This browser is not let in yet</h1><p>{}</p>
-<p>A link that holds a model goes on with <code>#m=</code>. Open that address first; then open the link again, or
-paste it under File, Open.</p>"""
+<h1 style="font-size: 1.2em">This browser is not let in</h1><p>{}</p>"""
+PRINTED = "Open the studio with the address that `trunnion studio` printed."
+SPENT = (
+    "This address has been used, and lets in one browser once. If that was not yours, end the studio: another "
+    f"program has opened it. {PRINTED}"
+)
 FILE_HEADERS = {"X-Content-Type-Options": "nosniff", "Cache-Control": "no-cache"}
 MODELS = (".yaml", ".yml")
 MOST_BYTES = 2_000_000
 MOST_FILES = 500
+MOST_OF_A_QUESTION = 64 << 20  # bytes; a text that is longer than the studio reads is to be told so
 PATIENCE = 1.0  # s that the rest waits for the page
+Handler = Callable[[Request], Awaitable[Response]]
+
 ANSWERING = Lock()  # one after another: the second about a text finds what was read for the first
 
 
@@ -53,6 +63,7 @@ class Studio:
     opened: str | None
     port: int
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    entrances: set[str] = field(default_factory=set)  # codes of addresses that were not opened yet
     seen: Event = field(default_factory=Event)  # that the page has what its first picture is drawn of
 
     @property
@@ -60,17 +71,33 @@ class Studio:
         """Where a browser finds it."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
+    def entrance(self) -> str:
+        """An address that lets in the browser that opens it first: others may read it in the arguments of a process."""
+        code = secrets.token_urlsafe(24)
+        self.entrances.add(code)
+        return f"http://127.0.0.1:{self.port}/?once={code}"
+
+    def server(self) -> uvicorn.Server:
+        """What serves it. No pings: an answer may take longer than they wait, and a loopback does not break."""
+        config = uvicorn.Config(
+            self.app(),
+            log_level="warning",
+            ws="websockets-sansio",
+            ws_max_size=MOST_OF_A_QUESTION,
+            ws_ping_interval=None,
+        )
+        return uvicorn.Server(config)
+
     def app(self) -> Starlette:
         """The web application."""
         routes = [
-            Route("/", self._guarded(self._page)),
-            Route("/modules.js", self._guarded(self._modules)),
-            Route("/files", self._guarded(self._files)),
-            Route("/file/{name:path}", self._guarded(self._read)),
-            Route("/first/{name:path}", self._guarded(self._first)),
-            Route("/thumbnail/{name}", self._guarded(_thumbnail)),
-            Route("/file/{name:path}", self._guarded(self._write), methods=["PUT"]),
-            Route("/{place:str}/{name:path}", self._guarded(self._asset)),
+            Route("/", self._own(self._page)),
+            Route("/modules.js", self._own(self._modules)),
+            Route("/files", self._admitted(self._files)),
+            Route("/first/{name:path}", self._admitted(self._first)),
+            Route("/thumbnail/{name}", self._admitted(_thumbnail)),
+            Route("/file/{name:path}", self._admitted(self._write), methods=["PUT"]),
+            Route("/{place:str}/{name:path}", self._own(self._asset)),
             WebSocketRoute("/socket", self._socket),
         ]
         return Starlette(routes=routes, lifespan=self._warmed)
@@ -89,46 +116,69 @@ class Studio:
     # ---- who may ask ----------------------------------------------------------------------------------------------
 
     def _refusal(self, connection: HTTPConnection) -> str | None:
-        """Why a question is not answered; None if it is."""
+        """Why a request is not one of the studio's own page; None if it is."""
         hosts = {f"{name}:{self.port}" for name in ("127.0.0.1", "localhost")}
-        if connection.headers.get("host") not in hosts:
+        headers = connection.headers
+        if headers.get("host") not in hosts:
             return "The studio answers this machine alone."
-        origin = connection.headers.get("origin")
-        if origin is not None and origin not in {f"http://{host}" for host in hosts}:
+        elsewhere = headers.get("sec-fetch-site") in ("cross-site", "same-site")  # another port is the same site
+        if (elsewhere and headers.get("sec-fetch-mode") != "navigate") or (
+            headers.get("origin") not in {None, *(f"http://{host}" for host in hosts)}
+        ):
             return "The studio answers its own page alone."
-        if not secrets.compare_digest(connection.cookies.get(f"{COOKIE}_{self.port}", ""), self.token):
-            return "Open the studio with the address that `trunnion studio` printed."
         return None
 
-    def _guarded(self, handle: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+    def _knows(self, token: str) -> bool:
+        return secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
+
+    def _own(self, handle: Handler, known: Callable[[Request], bool] = lambda _: True) -> Handler:
+        """A handler for requests of the own page. What it cannot do is an answer in words."""
+
         async def guarded(request: Request) -> Response:
-            given = request.query_params.get("token", "")
-            refusal = self._refusal(request)
-            hosts = request.headers.get("host") in {f"{name}:{self.port}" for name in ("127.0.0.1", "localhost")}
-            if hosts and request.url.path == "/" and given and secrets.compare_digest(given, self.token):
-                page = RedirectResponse("/", status_code=303)
-                page.set_cookie(f"{COOKIE}_{self.port}", self.token, httponly=True, samesite="strict")
-                return page
+            refusal = self._refusal(request) or (None if known(request) else PRINTED)
             if refusal is not None:
-                if hosts and request.url.path == "/":
-                    return HTMLResponse(STRANGER.format(refusal), status_code=403)
                 return PlainTextResponse(refusal, status_code=403)
-            return await handle(request)
+            try:
+                return await handle(request)
+            except (ValueError, OSError) as error:
+                return JSONResponse({"error": _reason(error)}, status_code=400 if request.method == "PUT" else 404)
+            except Exception as error:
+                logging.getLogger("uvicorn.error").exception("of %s", request.url.path)
+                return JSONResponse({"error": f"The studio made a mistake: {_reason(error)}"}, status_code=500)
 
         return guarded
+
+    def _admitted(self, handle: Handler) -> Handler:
+        """A handler for requests that name the token."""
+        return self._own(
+            handle, lambda request: self._knows(request.headers.get("authorization", "")[len("Bearer ") :])
+        )
 
     # ---- the page -------------------------------------------------------------------------------------------------
 
     async def _page(self, request: Request) -> Response:
+        """The document: with the token for who names it, or a code that was not used; the page keeps it."""
+        token, code = (request.query_params.get(name) for name in ("token", "once"))
+        entered = code in self.entrances
+        self.entrances.discard(code or "")
+        if token is not None and not self._knows(token):
+            return HTMLResponse(STRANGER.format(PRINTED), status_code=403)
+        if code is not None and not entered:
+            return HTMLResponse(STRANGER.format(SPENT), status_code=403)
         nonce = secrets.token_urlsafe(16)
         policy = (
             f"default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'unsafe-inline'; "
             "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; "
             "form-action 'none'; frame-ancestors 'none'"
         )
-        headers = {"Content-Security-Policy": policy, "Cache-Control": "no-store", "Referrer-Policy": "no-referrer"}
-        first = "/first/" + quote(self.opened, "!'()*") if self.opened else ""
-        return Response(document(nonce, first), media_type="text/html; charset=utf-8", headers=headers)
+        headers = {
+            "Content-Security-Policy": policy,
+            "Cross-Origin-Opener-Policy": "same-origin",
+            "Cache-Control": "no-store",
+            "Referrer-Policy": "no-referrer",
+        }
+        text = document(nonce, self.token if token is not None or entered else "")
+        return Response(text, media_type="text/html; charset=utf-8", headers=headers)
 
     async def _modules(self, request: Request) -> Response:
         return Response(script(), media_type="text/javascript", headers=FILE_HEADERS)
@@ -144,23 +194,31 @@ class Studio:
     # ---- models ---------------------------------------------------------------------------------------------------
 
     def _model(self, name: str) -> Path:
-        """A model of the folder; ValueError for any other file."""
+        """A model of the folder, be it there or not; ValueError for any other file."""
         path = self.folder / name
-        plain = Path(name).name == name and "\\" not in name and not name.startswith(".")
+        plain = Path(name).name == name and name.isprintable() and "\\" not in name and not name.startswith(".")
         if not plain or path.suffix.lower() not in MODELS:
             raise ValueError(f"'{name[:60]}' is not the name of a model file, such as press.yaml")
-        if path.resolve().parent != self.folder.resolve():
+        if os.path.dirname(os.path.realpath(path)) != os.path.realpath(self.folder):
             raise ValueError(f"'{name[:60]}' leads out of the folder")
+        if path.exists() and not path.is_file():
+            raise ValueError(f"'{name[:60]}' is no regular file")  # a pipe would be waited for
         return path
 
     async def _files(self, request: Request) -> Response:
-        names = sorted(
-            one.name for one in self.folder.iterdir() if one.suffix.lower() in MODELS and self._is_model(one.name)
+        """The models of the folder; `id` tells it from others of its name."""
+        names = sorted(path.name for path in self.folder.iterdir() if self._is_model(path.name))
+        return JSONResponse(
+            {
+                "folder": self.folder.name.encode("utf-8", "replace").decode(),
+                "id": hashlib.sha256(os.fsencode(os.path.realpath(self.folder))).hexdigest()[:16],
+                "open": self.opened,
+                "files": names[:MOST_FILES],
+            }
         )
-        return JSONResponse({"folder": self.folder.name, "open": self.opened, "files": names[:MOST_FILES]})
 
     def _is_model(self, name: str) -> bool:
-        with contextlib.suppress(ValueError):
+        with contextlib.suppress(ValueError, OSError):
             return self._model(name).is_file()
         return False
 
@@ -171,46 +229,63 @@ class Studio:
             raise ValueError(f"'{path.name}' is larger than {MOST_BYTES:,} bytes")
         return path.read_text(encoding="utf-8")
 
-    async def _read(self, request: Request) -> Response:
-        try:
-            return PlainTextResponse(self._text(request.path_params["name"]))
-        except (ValueError, OSError) as error:
-            return JSONResponse({"error": _reason(error)}, status_code=404)
-
     async def _first(self, request: Request) -> Response:
         """A model's text with what its first picture is drawn of, as an answer to a question."""
-        try:
-            text = self._text(request.path_params["name"])
-        except (ValueError, OSError) as error:
-            return JSONResponse({"error": _reason(error)}, status_code=404)
-        content = await run_in_threadpool(_placed, text)
+        content = await run_in_threadpool(_placed, self._text(request.path_params["name"]))
         self.seen.set()
         return Response(content, media_type="application/octet-stream")
 
     async def _write(self, request: Request) -> Response:
+        """Save `{text, opened, saved, over}` under a name, .yaml where it has no ending.
+
+        opened, saved: the file that the page shows and the text that it has read there or written; over: whether
+        another text that is there may be lost. Without that it stays, and the answer says so, 409 with `there`.
+        """
+        asked, name = json.loads(await request.body()), request.path_params["name"]
+        if not isinstance(asked, dict) or not isinstance(asked.get("text"), str):
+            raise ValueError("there is no text to be saved")
+        content = asked["text"].encode()
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"a model of {len(content):,} bytes is not saved; {MOST_BYTES:,} at most")
+        path = self._model(name if Path(name).suffix else f"{name}.yaml")
+        opened = path.name == asked.get("opened")
+        made = not path.exists()
+        if (
+            not made
+            and asked.get("over") is not True
+            and self._other(path, asked["text"], opened and asked.get("saved"))
+        ):
+            what = "was changed elsewhere since it was opened" if opened else "is there already, with another text"
+            return JSONResponse({"error": f"{path.name} {what}.", "there": path.name}, status_code=409)
+        if made:
+            path.touch(exist_ok=False)  # a file that comes meanwhile is not replaced
         try:
-            path, content = self._model(request.path_params["name"]), await request.body()
-            if len(content) > MOST_BYTES:
-                raise ValueError(f"a model of {len(content):,} bytes is not saved; {MOST_BYTES:,} at most")
             with whole(path) as temporary:
                 temporary.write_bytes(content)
-            return JSONResponse({"saved": path.name})
-        except (ValueError, OSError) as error:
-            return JSONResponse({"error": _reason(error)}, status_code=400)
+        except BaseException:
+            if made:
+                path.unlink(missing_ok=True)
+            raise
+        return JSONResponse({"saved": path.name})
+
+    def _other(self, path: Path, *texts: object) -> bool:
+        """Whether a file has another text than these, or none that can be read."""
+        with contextlib.suppress(ValueError):
+            return self._text(path.name) not in texts
+        return True
 
     # ---- questions ------------------------------------------------------------------------------------------------
 
     async def _socket(self, socket: WebSocket) -> None:
-        if self._refusal(socket) is not None or socket.headers.get("origin") is None:
+        protocols = [*socket.scope["subprotocols"], "", ""]
+        if self._refusal(socket) is not None or socket.headers.get("origin") is None or not self._knows(protocols[1]):
             await socket.close(code=4403)
             return
-        await socket.accept()
-        turn = asyncio.Lock()
+        await socket.accept(subprotocol=SUBPROTOCOL)
         with contextlib.suppress(WebSocketDisconnect):
-            while True:
-                question = await socket.receive_text()
-                async with turn:
-                    await socket.send_bytes(await run_in_threadpool(_answered, question))
+            while (question := await socket.receive())["type"] == "websocket.receive":
+                asked = question.get("bytes") or (question.get("text") or "").encode()
+                await socket.send_bytes(await run_in_threadpool(_answered, asked))
 
 
 async def _thumbnail(request: Request) -> Response:
@@ -239,7 +314,7 @@ def _look(text: str, seen: Event) -> None:
     seen.wait(PATIENCE)  # to load the rest beside would hold up the page
     import trunnion.studio.answers  # noqa: F401  # not while answers are being made: the page may ask for the picture
 
-    _answered(json.dumps({"ask": "model", "text": text}))
+    _answered(json.dumps({"ask": "model", "text": text}).encode())
 
 
 def _placed(text: str) -> bytes:
@@ -250,12 +325,12 @@ def _placed(text: str) -> bytes:
         return packed(placed(text))
 
 
-def _answered(question: str) -> bytes:
+def _answered(question: bytes) -> bytes:
     """The answer to a question; what it takes is loaded with the first."""
     from trunnion.studio.answers import answer
 
     with ANSWERING:
-        return answer(question.encode())
+        return answer(question)
 
 
 def _reason(error: Exception) -> str:

@@ -23,6 +23,7 @@ declare module "preact" {
 }
 declare module "preact/hooks" {
   export function useEffect(run: () => void | (() => void), inputs?: unknown[]): void;
+  export function useErrorBoundary(): [any, () => void];
   export function useLayoutEffect(run: () => void | (() => void), inputs?: unknown[]): void;
   export function useRef<T>(value: T): { current: T };
   export function useState<T>(value: T | (() => T)): [T, (value: T | ((before: T) => T)) => void];

@@ -2,15 +2,20 @@
 
 import { effect, untracked } from "@preact/signals";
 import * as state from "./state.js";
+import { isPart } from "./fields.js";
 import { placesAt, posedAt, stemOf } from "./geometry.js";
+import { enterTab, forget, forgetOwn, keepSteps, lastSheet, left, leftBehind, lookForTabs, takeUp } from "./keeping.js";
 import { carries, linkOf, textOf } from "./links.js";
 import { forgetPhoto } from "./photo.js";
 import { pictureOf } from "./picture.js";
 import { sheet } from "./sheet.js";
-import { connection, decode } from "./socket.js";
+import { connection, decode, request } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
+const PRINTED = "the address that `trunnion studio` prints";
+const STOPPED = `The studio on this machine has stopped. Start it again and open its new address, ${PRINTED}: your work is kept in this browser and offered there, on the same port.`;
+const STRANGER = `This browser is not let in yet. Open ${PRINTED}. A link that holds a model goes on with #m=: open it again then, or paste it under File, Open.`;
 
 let link;
 
@@ -21,17 +26,21 @@ export function start() {
 }
 
 async function begun() {
-  link = connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`, (open) => {
+  const reply = await request("/files");
+  if (reply.status === 403) return void (state.stopped.value = STRANGER);
+  link = connection((open) => {
     state.connected.value = open;
-    if (open) state.stopped.value = false;
-    else fetch("/files").then(({ ok }) => (state.stopped.value = !ok), () => (state.stopped.value = true)); // another token, or nobody there
+    if (open) state.stopped.value = "";
+    else request("/files").then(({ ok }) => (state.stopped.value = ok ? "" : STOPPED), () => (state.stopped.value = STOPPED)); // another token, or nobody there
     if (open && untracked(() => state.text.value)) solve();
   });
-  const files = await fetch("/files").then((reply) => reply.json());
-  state.folder.value = { folder: files.folder, names: files.files };
+  const files = reply.ok ? await reply.json() : { folder: "", id: "", files: [], open: null };
+  state.folder.value = { folder: files.folder, id: files.id, names: files.files };
+  await enterTab();
   if (!sheets) await opened(files);
+  if (!reply.ok) state.say("The folder could not be read.", true);
   state.waiting.value = leftBehind(files.files);
-  state.keepSteps();
+  keepSteps();
   effect(() => {
     state.friction.value; // another friction is another answer
     untracked(solve);
@@ -40,17 +49,12 @@ async function begun() {
   if (about && !about.error) state.about.value = about;
 }
 
-/** The latest of the sheets that were left with unsaved work, {name, time}, beside the open one; or null. */
-function leftBehind(names) {
-  const others = [null, ...names].filter((name) => name !== state.fileName.value).map((name) => ({ name, ...state.kept(name) }));
-  return others.filter(({ text, saved }) => text !== saved).sort((a, b) => b.time.localeCompare(a.time))[0] ?? null;
-}
-
 /** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
 async function opened(files) {
   if (carries(location.hash) && (await openLink(location.hash))) return;
-  const last = state.lastSheet();
-  const again = last?.folder === files.folder ? last.name : files.open;
+  const last = lastSheet();
+  if (last && last.folder !== files.id) state.variant.value = null; // of another folder
+  const again = last?.folder === files.id ? last.name : files.open;
   if (again && (files.open === again || files.files.includes(again))) await openFile(again);
   else openSheet({ name: null, saved: "", content: "" });
 }
@@ -80,6 +84,7 @@ async function answered() {
   const read = Object.keys(found.numbers).length > 0; // else it is drawn by those that were there before the mistake
   state.answer.value = { ...found, numbers: read ? found.numbers : (state.answer.value?.numbers ?? {}), text: sent, friction: asked.friction };
   if (state.live.value?.text === null) state.live.value = null; // the dragged mechanism has its answer
+  if (state.selection.value && !isPart(found, state.selection.value)) state.selection.value = null; // its name was undone, or it is gone
   if (found.scene && state.index.value >= found.scene.count) state.index.value = 0;
   if (!state.solved.value) state.places.value = { ...found.places, ...state.places.value };
 }
@@ -199,8 +204,8 @@ let sheets = 0; // that were opened or asked for: the latest is the one that is 
  */
 export function openSheet({ name, saved, content, first = null }) {
   sheets += 1;
-  const left = state.kept(name);
-  const found = left && (name === null || left.text === saved || left.text !== left.saved) ? left : null;
+  const work = takeUp(name);
+  const found = work && (name === null || work.text === saved || work.text !== work.saved) ? work : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
   if (first?.tracks && first.text === state.text.value) showFirst(first);
   state.dialog.value = null;
@@ -209,20 +214,21 @@ export function openSheet({ name, saved, content, first = null }) {
 
 /** Open the sheet that was left unsaved, or throw its work away. */
 export async function takeWaiting(open) {
-  const { name } = state.waiting.value;
+  const { name, key } = state.waiting.value;
   state.waiting.value = null;
   if (open) {
     await (name === null ? openSheet({ name: null, saved: "", content: "" }) : openFile(name));
     state.recovered.value = null; // it was asked for
     return;
   }
-  state.forget(name);
+  forget(key);
   if (name === null) forgetPhoto(null);
 }
 
 /** Go back from the recovered work to the file as it was saved, as a step to undo. */
 export function discard() {
   state.recovered.value = null;
+  state.basis.value = state.savedText.value;
   return takeText(state.savedText.value, "Discard the recovered work");
 }
 
@@ -232,14 +238,15 @@ export function openFile(name) {
 
 async function fetched(name) {
   const mine = (sheets += 1);
-  const left = mine > 1 && state.unsaved.value && state.fileName.value !== name ? { name: state.fileName.value, time: new Date().toISOString() } : null;
-  const reply = await fetch(`/first/${encodeURIComponent(name)}`);
+  const leaves = mine > 1 && state.unsaved.value && state.fileName.value !== name ? state.fileName.value : undefined;
+  const reply = await request(`/first/${encodeURIComponent(name)}`);
+  await lookForTabs();
   if (!reply.ok) return state.say(`${name} could not be read.`, true);
   const first = decode(await reply.arrayBuffer());
   if (mine !== sheets) return;
   const opened = openSheet({ name, saved: first.text, content: first.text, first });
   if (mine > 1) state.say(`${name} opened.`);
-  if (left) state.waiting.value = left;
+  if (leaves !== undefined) state.waiting.value = left(leaves);
   await opened;
 }
 
@@ -252,14 +259,14 @@ function showFirst({ text, entries, numbers, tracks }) {
 /** A new sheet with a text that is in no file of the folder yet; work on a sheet without a name comes back by undo, that on a file as the file is opened. */
 export function openText(content, words) {
   const file = state.unsaved.value ? state.fileName.value : null;
-  const kept = state.kept(null);
-  const before = state.fileName.value === null && state.unsaved.value ? present() : kept?.text !== kept?.saved ? kept : null;
-  const left = before && { name: words, text: before.text, places: before.places ?? {} };
-  state.forget(null);
+  const work = takeUp(null);
+  const before = state.fileName.value === null && state.unsaved.value ? present() : work?.text !== work?.saved ? work : null;
+  const step = before && { name: words, text: before.text, places: before.places ?? {} };
+  forgetOwn(null);
   forgetPhoto(null);
   const opened = openSheet({ name: null, saved: content, content });
-  if (left) state.past.value = [left];
-  state.say(`${words}.${left ? " Undo brings the unsaved sheet back." : ""}${file ? ` Unsaved work on ${file} is kept: open it again.` : ""}`);
+  if (step) state.past.value = [step];
+  state.say(`${words}.${step ? " Undo brings the unsaved sheet back." : ""}${file ? ` Unsaved work on ${file} is kept: open it again.` : ""}`);
   return opened;
 }
 
@@ -299,34 +306,34 @@ async function shipped({ name, title }) {
   await openText(found.text, `Example ${title || name} opened`);
 }
 
-/** Save under the name, or ask for one; why it was refused, or "". */
-export function save(name = state.fileName.value) {
-  const gone = () => unsaved(`${name} was not saved: the studio on this machine does not answer.`);
-  return name ? counted(stored(name).catch(gone)) : void (state.dialog.value = "save");
+/** Save under a name, or ask for one; `over`: another text that is there may be lost. {error, there} where it was refused, else {}. */
+export function save(name = state.fileName.value, over = false) {
+  const gone = () => refused({ error: `${name} was not saved: the studio on this machine does not answer.` });
+  if (name) return counted(stored(name, over).catch(gone));
+  state.dialog.value = "save";
+  return Promise.resolve({});
 }
 
-async function stored(name) {
+async function stored(name, over) {
   const content = state.text.value;
-  const there = name === state.fileName.value ? await fetch(`/file/${encodeURIComponent(name)}`) : null;
-  if (there?.ok && ![state.savedText.value, content].includes(await there.text()))
-    return unsaved(`${name} was changed elsewhere since it was opened; save under another name, or open it again.`);
-  const reply = await fetch(`/file/${encodeURIComponent(name)}`, { method: "PUT", body: content });
+  const body = JSON.stringify({ text: content, opened: state.fileName.value, saved: state.basis.value, over });
+  const reply = await request(`/file/${encodeURIComponent(name)}`, { method: "PUT", body });
   const told = await reply.json().catch(() => ({ error: `${name} could not be saved.` }));
-  if (told.error) return unsaved(told.error);
-  if (told.saved !== state.fileName.value) state.forget(state.fileName.value);
+  if (told.error) return refused(told);
+  if (told.saved !== state.fileName.value) forgetOwn(state.fileName.value);
   state.fileName.value = told.saved;
-  state.savedText.value = content;
+  state.savedText.value = state.basis.value = content;
   state.recovered.value = null;
   state.dialog.value = null;
-  const { folder, names } = state.folder.value;
-  state.folder.value = { folder, names: [...new Set([...names, told.saved])].sort() };
+  const { names } = state.folder.value;
+  state.folder.value = { ...state.folder.value, names: [...new Set([...names, told.saved])].sort() };
   state.say(`Saved as ${told.saved}.`);
-  return "";
+  return {};
 }
 
-function unsaved(words) {
-  state.say(words, true);
-  return words;
+function refused(told) {
+  state.say(told.there && !state.dialog.value ? `${told.error} Replace it by File, Save as; save under another name; or open it again.` : told.error, true);
+  return told;
 }
 
 /** Export and hand the file to the browser. */

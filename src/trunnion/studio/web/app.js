@@ -1,7 +1,8 @@
 // The page: bars, sheet or space, player, and the panel at the right.
 
-import { discard, takeWaiting } from "./actions.js";
+import { discard, save, takeWaiting } from "./actions.js";
 import { BottomBar, Hint, ToolBar, TopBar, ZoomBar } from "./bars.js";
+import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
 import { Motion } from "./motion.js";
@@ -20,20 +21,20 @@ const TOP = 140; // px, where messages stand
 const TABS = { properties: ["Properties", Properties], plots: ["Plots", Plots], text: ["Text", Text], findings: ["Findings", Findings] };
 
 export function App() {
-  return html`<${TopBar} />
+  const bounded = (...parts) => parts.map((Part) => html`<${Bounded} key=${Part.name}><${Part} /><//>`);
+  return html`${bounded(TopBar)}
     <main class="studio">
-      <${ToolBar} />
+      ${bounded(ToolBar)}
       <div class="middle-part">
         <div class="window">
-          ${state.spatial.value ? html`<${Space} />` : html`<${Stage} /><${ZoomBar} /><${Welcome} /><${PhotoCard} />`}
-          <${Messages} />
+          ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome, PhotoCard)}
+          ${bounded(Messages)}
         </div>
-        <${Motion} />
+        ${bounded(Motion)}
       </div>
-      <${Panel} />
+      ${bounded(Panel)}
     </main>
-    <${BottomBar} />
-    <${Dialogs} />`;
+    ${bounded(BottomBar, Dialogs)}`;
 }
 
 function Panel() {
@@ -67,8 +68,10 @@ function Messages() {
   const below = held && sheet.view?.frame.to(held)[1] < TOP;
   return html`<div class=${below ? "messages below" : "messages"}>
     <${Hint} />
-    ${state.stopped.value && html`<div class="message-card bad" role="alert">The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.</div>`}
-    ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.
+    <${Failures} />
+    ${state.stopped.value && html`<div class="message-card bad" role="alert">${state.stopped.value}</div>`}
+    ${state.unkept.value && state.unsaved.value && html`<div class="message-card bad" role="alert">The browser has no room for this work: it is lost when the page closes. <${Button} label="Save it" onClick=${() => save()} /></div>`}
+    ${time && html`<div class="message-card">Unsaved work of ${clock(time)} recovered.${state.basis.value === state.savedText.value ? "" : ` ${state.fileName.value} was changed elsewhere since.`}
       <${Button} label="Discard it" onClick=${discard} /> <${Button} label="Keep it" onClick=${() => (state.recovered.value = null)} /></div>`}
     ${waiting && html`<div class="message-card">${waiting.name ? `Unsaved work on ${waiting.name}` : "A sheet that was not saved"} is left from ${clock(waiting.time)}.
       <${Button} label="Open it" onClick=${() => takeWaiting(true)} /> <${Button} label="Throw it away" onClick=${() => takeWaiting(false)} /></div>`}

@@ -9,6 +9,8 @@ import { carries } from "./links.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
+const NO_REFUSAL = { error: "", there: "" };
+
 export function Dialogs() {
   const name = state.dialog.value;
   if (!name) return null;
@@ -46,19 +48,23 @@ function Open() {
 
 function Save() {
   const [name, setName] = useState(state.fileName.value ?? `${stemOf(state.answer.value?.entries)}.yaml`);
-  const known = state.folder.value.names.includes(name) && name !== state.fileName.value;
-  const [wrong, setWrong] = useState("");
-  const submit = async (event) => {
+  const [told, setTold] = useState(NO_REFUSAL);
+  const put = async (over) => setTold(await save(name, over));
+  const submit = (event) => {
     event.preventDefault();
-    setWrong(await save(/\.\w+$/.test(name) ? name : `${name}.yaml`));
+    return put(false);
+  };
+  const type = ({ target }) => {
+    setName(target.value);
+    setTold(NO_REFUSAL);
   };
   return html`<form onSubmit=${submit}>
     <h2>Save as</h2>
-    <label class="choice wide-choice">Name <input value=${name} onInput=${(event) => setName(event.target.value)} onFocus=${({ target }) => target.select()} required autofocus /></label>
-    <p class="calm">In ${state.folder.value.folder}${known ? html` — <b>a file of this name is there and will be replaced</b>` : ""}</p>
-    <p class="wrong" role="alert">${wrong}</p>
-    <p class="row-of-buttons end"><button type="submit" class="plain strong">Save</button></p>
-  </form>`;
+    <label class="choice wide-choice">Name <input value=${name} onInput=${type} onFocus=${({ target }) => target.select()} required autofocus /></label>
+    <p class="calm">In ${state.folder.value.folder}</p>
+    <p class="wrong" role="alert">${told.error}</p>
+    <p class="row-of-buttons end">${told.there && html`<${Button} label=${`Replace ${told.there}`} onClick=${() => put(true)} />`}<button type="submit" class="plain strong">Save</button></p>
+  </form>`; // prettier-ignore
 }
 
 /** Files dropped on the page are opened. */

@@ -149,6 +149,14 @@ export function findingsOf(findings, path) {
   return (findings ?? []).filter(({ where }) => where === at || where?.startsWith(`${at}.`));
 }
 
+/** Whether a part is of the model, stated by the file or drawn for its loop; a text that cannot be read tells nothing. */
+export function isPart({ entries, scene }, { kind, name }) {
+  if (!entries) return true;
+  if (kind !== "points") return dictionary(entries[kind])[name] !== undefined || Boolean(scene?.[kind]?.some((one) => one.name === name));
+  const [link, ...point] = name.split(".");
+  return dictionary(dictionary(entries.links)[link]?.points)[point.join(".")] !== undefined || Boolean(scene?.points[name]);
+}
+
 /** The part that a finding is about, {kind, name}, or null. */
 export function partOf({ where }, entries) {
   const [kind, name] = String(where ?? "").split(".");

@@ -3,7 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { hull } from "../web/data.js";
 import { openExample } from "./actions.js";
-import { decode } from "./socket.js";
+import { decode, request } from "./socket.js";
 import * as state from "./state.js";
 import { html } from "./ui.js";
 
@@ -44,7 +44,7 @@ function Picture({ name }) {
 }
 
 async function fetched(name) {
-  const reply = await fetch(`/thumbnail/${encodeURIComponent(name)}`);
+  const reply = await request(`/thumbnail/${encodeURIComponent(name)}`);
   return reply.ok ? decode(await reply.arrayBuffer()) : { links: [], paths: [] };
 }
 

@@ -3,15 +3,19 @@
 import { render } from "preact";
 import { start } from "./actions.js";
 import { App } from "./app.js";
+import { listenToFailures } from "./boundary.js";
 import { listenToDrops } from "./dialogs.js";
 import { keepOthers } from "./ghosts.js";
 import { listenToKeys } from "./keys.js";
 import { keepLayers } from "./layers.js";
 import { keepPhotos } from "./photo.js";
+import { enter } from "./socket.js";
 import { keepTheme } from "./theme.js";
 import { html } from "./ui.js";
 import { keepCompared } from "./variants.js";
 
+listenToFailures();
+enter();
 keepTheme();
 render(html`<${App} />`, document.getElementById("studio"));
 listenToKeys(document);

@@ -5,6 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import { set, svg } from "../web/dom.js";
 import { numberOf, plainNumber } from "./fields.js";
 import { enlarged, lengthOf, lengthText, lengthUnit } from "./geometry.js";
+import { keyOf } from "./keeping.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { Button, focusOn, html } from "./ui.js";
@@ -44,7 +45,7 @@ function settled(/** @type {IDBRequest} */ asked) {
 
 /** The photo of a sheet is no longer kept. */
 export async function forgetPhoto(/** @type {string | null} */ name) {
-  const key = state.keyOf(name);
+  const key = keyOf(name);
   await store().then((photos) => settled(photos.delete(key))).catch(() => {}); // storage is off: none was kept
 }
 
@@ -52,7 +53,7 @@ export async function forgetPhoto(/** @type {string | null} */ name) {
 export function keepPhotos() {
   effect(() => {
     const mine = state.opened.value;
-    const key = untracked(() => state.keyOf(state.fileName.value));
+    const key = untracked(() => keyOf(state.fileName.value));
     picking.value = null;
     store().then((photos) => settled(photos.get(key))).catch(() => null).then((found) => {
       if (mine === state.opened.value && state.photo.value === undefined) state.photo.value = found ?? null;
@@ -60,7 +61,7 @@ export function keepPhotos() {
   });
   effect(() => {
     const photo = state.photo.value;
-    const key = state.keyOf(state.fileName.value);
+    const key = keyOf(state.fileName.value);
     if (photo === undefined) return; // not known yet
     store().then((photos) => settled(photo ? photos.put(photo, key) : photos.delete(key))).catch(() => photo && state.say("The browser has no room for the picture: it is lost when the page is closed.", true));
   });

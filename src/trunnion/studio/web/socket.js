@@ -3,8 +3,35 @@
 /** @typedef {Record<string, any>} Answer */
 
 const AGAIN = 800; // ms until a lost connection is tried again
+const TOKEN = "trunnion studio token";
+const STORES = () => [localStorage, sessionStorage]; // the one for other tabs of this address; the other where that is full
 
-/** An answer's header with its columns as arrays, null for NaN; `body` are the bytes behind the header. */
+/** What the server knows this page by; it stays that of the server that the page came from. */
+let token = "";
+
+/** Take the token that the document came with and keep it, else that which was kept; its address goes out of sight. */
+export function enter() {
+  token = /** @type {HTMLMetaElement} */ (document.querySelector("meta[name=token]")).content;
+  if (!token) token = tried((store) => store.getItem(TOKEN)).find(Boolean) ?? "";
+  else if (tried((store) => (store.setItem(TOKEN, token), true)).some(Boolean)) history.replaceState(null, "", location.pathname + location.hash);
+}
+
+function tried(act) {
+  return [0, 1].map((order) => {
+    try {
+      return act(STORES()[order]);
+    } catch {
+      return null; // storage is off or full
+    }
+  });
+}
+
+/** Fetch what only the page may have. */
+export function request(/** @type {string} */ path, /** @type {RequestInit} */ how = {}) {
+  return fetch(path, { ...how, headers: { Authorization: `Bearer ${token}` } });
+}
+
+/** An answer's header with its columns as arrays, null for what is no number; `body` are the bytes behind the header. */
 export function decode(/** @type {ArrayBuffer} */ buffer) {
   const size = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));
@@ -19,7 +46,7 @@ function unpacked(part, floats) {
   const keys = Object.keys(part);
   if (keys.length === 1 && keys[0] === "column") {
     const [first, count] = part.column;
-    return Array.from(floats.subarray(first, first + count), (value) => (Number.isNaN(value) ? null : value));
+    return Array.from(floats.subarray(first, first + count), (value) => (Number.isFinite(value) ? value : null));
   }
   return Object.fromEntries(keys.map((key) => [key, unpacked(part[key], floats)]));
 }
@@ -28,21 +55,29 @@ function unpacked(part, floats) {
  * A connection that comes back by itself; `onState(open)` tells of it.
  * `ask(kind, fields)` gives the answer, or null where a newer question of its kind or a lost connection overtook it.
  */
-export function connection(/** @type {string} */ url, /** @type {(open: boolean) => void} */ onState) {
+export function connection(/** @type {(open: boolean) => void} */ onState) {
   const revisions = {};
   const waiting = {};
   let socket;
   let ready;
 
   const open = () => {
-    socket = new WebSocket(url);
+    socket = new WebSocket(`ws://${location.host}/socket`, ["trunnion", token]);
     socket.binaryType = "arraybuffer";
     ready = new Promise((resolve) => socket.addEventListener("open", resolve));
     socket.addEventListener("open", () => onState(true));
-    socket.addEventListener("message", ({ data }) => settle(decode(data)));
+    socket.addEventListener("message", ({ data }) => {
+      let answer;
+      try {
+        answer = decode(data);
+      } finally {
+        if (!answer) drop(); // nobody waits for what cannot be read
+      }
+      settle(answer);
+    });
     socket.addEventListener("close", () => {
       onState(false);
-      for (const kind of Object.keys(waiting)) finish(kind, null);
+      drop();
       setTimeout(open, AGAIN);
     });
   };
@@ -51,6 +86,7 @@ export function connection(/** @type {string} */ url, /** @type {(open: boolean)
     delete waiting[kind];
     one?.resolve(answer);
   };
+  const drop = () => Object.keys(waiting).forEach((kind) => finish(kind, null));
   const settle = (/** @type {Answer} */ answer) => {
     if (waiting[answer.ask]?.revision === answer.revision) finish(answer.ask, answer);
   };

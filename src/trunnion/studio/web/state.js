@@ -1,19 +1,20 @@
 // What the page knows: the file and its places, the latest answer, what is chosen, and the steps that can be undone.
 
-import { batch, computed, effect, signal } from "@preact/signals";
+import { batch, computed, signal } from "@preact/signals";
 /** @import { Signal } from "@preact/signals" */
 
 const STEPS = 100; // that can be undone
-const ROOM = 2e6; // characters of them that are kept over a reload
-const VARIANT = "trunnion studio variant A";
+export const VARIANT = "trunnion studio variant A";
 
 export const connected = signal(false);
-/** Whether the program behind the page is gone, or runs anew with another address. */
-export const stopped = signal(false);
+/** Why the program behind the page does not answer it, in words, or "". */
+export const stopped = signal("");
+/** What went wrong in the page itself, an error; or null. */
+export const failure = signal(null);
 /** Of the program: {version, examples, laws}. @type {Signal<Record<string, any>>} */
 export const about = signal({ version: "", examples: [], laws: [] });
-/** Of the opened folder: {folder, names}. */
-export const folder = signal({ folder: "", names: [] });
+/** Of the opened folder: {folder, id, names}. */
+export const folder = signal({ folder: "", id: "", names: [] });
 /** Name of the open file in the folder, or null for a sheet that was never saved. */
 export const fileName = signal(null);
 /** Picture behind the grid: null for none, undefined while it is not known; see photo.js. */
@@ -21,6 +22,10 @@ export const photo = signal(undefined);
 /** How many sheets were opened. */
 export const opened = signal(0);
 export const savedText = signal("");
+/** The text of the file that the work was begun from; another than `savedText` where the file was changed since. */
+export const basis = signal("");
+/** Whether the browser has no room for the present work. */
+export const unkept = signal(false);
 export const text = signal("");
 /** World positions, m, by "link.point": what unfinished mechanisms are drawn from. */
 export const places = signal({});
@@ -50,7 +55,7 @@ export const tab = signal("properties");
 export const dialog = signal(null);
 /** {words, bad}: the latest remark, said to screen readers too. */
 export const notice = signal({ words: "", bad: false });
-/** Work that was left unsaved on a sheet that is not the open one, {name, time}, its name null for one that has none; or null. */
+/** Work that was left unsaved on a sheet that is not the open one, {name, time, key}, its name null for one that has none; or null. */
 export const waiting = signal(null);
 /** When the recovered work was left, or null. */
 export const recovered = signal(null);
@@ -118,6 +123,7 @@ export function begin({ name, saved, content, steps = null }) {
   batch(() => {
     fileName.value = name;
     savedText.value = saved;
+    basis.value = steps && content !== saved ? steps.saved : saved;
     text.value = content;
     places.value = steps?.places ?? {};
     locked.value = steps?.locked ?? [];
@@ -137,53 +143,11 @@ export function begin({ name, saved, content, steps = null }) {
   });
 }
 
-/** The key of a sheet in what the browser keeps. */
-export const keyOf = (name) => `trunnion studio ${folder.value.folder} ${name ?? ""}`;
-const LAST = "trunnion studio last sheet";
-
-/** What was left of a sheet when the page was closed: {text, saved, places, locked, past, future, variant, time}, or null. */
-export function kept(name) {
-  return read(localStorage, keyOf(name));
-}
-
-/** The sheet that this tab showed before it was loaded again: {folder, name}, or null. */
-export function lastSheet() {
-  return read(sessionStorage, LAST);
-}
-
-function read(storage, key) {
+/** What a storage of the browser has under a key; null where it has nothing that can be read. */
+export function read(storage, key) {
   try {
     return JSON.parse(storage.getItem(key) ?? "null");
   } catch {
     return null; // storage is off, or of another version
   }
-}
-
-export function forget(name) {
-  try {
-    localStorage.removeItem(keyOf(name));
-  } catch {
-    // storage is off
-  }
-}
-
-/** Keep every step over a reload and a crash; older steps give way where there is no room. */
-export function keepSteps() {
-  effect(() => {
-    const [saved, name] = [savedText.value, fileName.value];
-    const work = { text: text.value, saved, places: places.peek(), locked: locked.value, past: past.value, future: future.value, variant: variant.value };
-    while (work.past.length > 5 && size(work) > ROOM) work.past = work.past.slice(Math.ceil(work.past.length / 2));
-    try {
-      sessionStorage.setItem(LAST, JSON.stringify({ folder: folder.value.folder, name }));
-      sessionStorage.setItem(VARIANT, JSON.stringify(variant.value));
-      if (work.text === saved && !work.past.length && !work.future.length && name) return;
-      localStorage.setItem(keyOf(name), JSON.stringify({ ...work, time: new Date().toISOString() }));
-    } catch {
-      // no room or no storage: the steps live as long as the page
-    }
-  });
-}
-
-function size({ past: before, future: after }) {
-  return [...before, ...after].reduce((sum, step) => sum + 2 * step.text.length, 0);
 }

@@ -31,11 +31,12 @@ from trunnion.cycle.near_locking import (
     passage,
     reverse,
 )
+from trunnion.cycle.summary import member_units
 from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
-from trunnion.results.dataset import Variable, described
+from trunnion.results.dataset import Variable, described, units_along, with_variables
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -58,7 +59,7 @@ VARIABLES = {
     ),
     "other_solutions": Variable(("position",), "1", "other solutions of the friction equations"),
     "drive_effort_reverse": Variable(
-        ("driver", "position"), "N m", "drive effort of the reversed motion; NaN where it locks"
+        ("driver", "position"), "effort", "drive effort of the reversed motion; NaN where it locks"
     ),
     "power_delivered_reverse": Variable(("position",), "W", "power delivered to the drivers when backdriven"),
     "power_given_reverse": Variable(("position",), "W", "power supplied by the useful loads when backdriven"),
@@ -116,7 +117,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "holding_multiple": holding_multiples(run, time, ahead, other),
         "locking_state": in_order(ahead._replace(locked=status == Status.LOCKED), other, known),
     }
-    found = result.assign(described(arrays, VARIABLES))
+    found = with_variables(result, described(arrays, VARIABLES, member_units(run.system)))
     found["locking_state"].attrs.update(codes("flag", LockingState))
     said = finding_rows(_notes(run, result))
     findings = {"findings": [*attribute(found, "findings"), *said]} if said else {}
@@ -191,7 +192,7 @@ def _reversing(run: Run, found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
     """The largest effort that each driver has to supply to go back over its range, as to open a clamp."""
     if run.cycle.periodic:
         return
-    units, time = attribute(found, "driver_units"), found["time"].values
+    units, time = units_along(found["drive_effort"], "driver"), found["time"].values
     for name, unit in zip(found["driver"].values.tolist(), units, strict=True):
         effort = found["drive_effort_reverse"].sel(driver=name).values
         supplied = -effort * np.sign(primal(run.system.drive(run.values, name, time)[1]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import KEPT, cited, encoded, figure_rows, finding_rows, origin
-from trunnion.results.dataset import driven
+from trunnion.results.dataset import MemberUnits, driven
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
@@ -49,6 +49,7 @@ __all__ = [
     "effort_units",
     "figures",
     "inputs",
+    "member_units",
     "model_notes",
     "peak",
     "references",
@@ -94,8 +95,6 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
             **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
             "method": method.name,
             **cited(references(mechanism)),
-            "driver_units": effort_units(run.system),
-            "spring_units": spring_units(run.system),
             "findings": finding_rows([*found, *measured.findings]),
             "summary": figure_rows([*figures(run, found_positions, near), *measured.summary()]),
             **_ranges(run, found_positions, near),
@@ -113,7 +112,7 @@ def dataset_of(
 ) -> xr.Dataset:
     """The Dataset of some positions."""
     along = driven(found.time, *found.dial)
-    own = found.arrays, found.labels, along, found.means, attributes, found.ideal
+    own = found.arrays, found.labels, along, found.means, attributes, member_units(run.system), found.ideal
     return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
 
 
@@ -156,10 +155,22 @@ def effort_units(system: System) -> list[str]:
     return ["N m" if system.turns(name) else "N" for name in system.mechanism.drivers]
 
 
-def spring_units(system: System) -> list[list[str]]:
-    """Units of every spring's force and elongation."""
-    turns = [spring.joint is not None and system.turns(spring.joint) for spring in system.mechanism.springs.values()]
-    return [["N m", "rad"] if turn else ["N", "m"] for turn in turns]
+def member_units(system: System) -> dict[str, MemberUnits]:
+    """Units of what a driver or a spring has, by the words of the variables, where it may turn or slide."""
+
+    def units(dim: str, turning: Iterable[bool], words: Mapping[str, tuple[str, str]]) -> dict[str, MemberUnits]:
+        turns = list(turning)
+        return {
+            word: MemberUnits(dim, [turn if own else slide for own in turns]) for word, (turn, slide) in words.items()
+        }
+
+    drives = {"effort": ("N m", "N"), "coordinate": ("rad", "m"), "rate": ("rad/s", "m/s")}
+    pulls = {"spring_force": ("N m", "N"), "spring_elongation": ("rad", "m")}
+    springs = system.mechanism.springs.values()
+    return {
+        **units("driver", map(system.turns, system.mechanism.drivers), drives),
+        **units("spring", (one.joint is not None and system.turns(one.joint) for one in springs), pulls),
+    }
 
 
 def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
@@ -237,7 +248,7 @@ def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
         if len(negative):
             yield finding_for("load.drives", path, at=at.dial.intervals(negative))
     for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
-        if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
+        if spring.joint is not None and run.system.turns(spring.joint):
             jumps = np.flatnonzero(np.abs(np.diff(at.arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
                 yield finding_for("spring.jump", f"springs.{name}", at=at.dial.at(int(jumps[0])))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
+from trunnion.cycle.summary import effort_units, inputs, member_units, references, scene_of
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.course import OVER_TIME, Courses
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
@@ -42,14 +42,14 @@ Array = NDArray[np.float64]
 
 # what there is beside the variables of a cycle
 MOTION: dict[str, Variable] = {
-    "drive_coordinate": Variable(("driver", "time"), "rad", "coordinate of the driver, whole turns included"),
-    "drive_rate": Variable(("driver", "time"), "rad/s", "rate of the driver's coordinate"),
+    "drive_coordinate": Variable(("driver", "time"), "coordinate", "coordinate of the driver, whole turns included"),
+    "drive_rate": Variable(("driver", "time"), "rate", "rate of the driver's coordinate"),
     "work_drive": Variable(("time",), "J", "work of the drivers since the start"),
     "work_loads": Variable(("time",), "J", "work of the loads since the start, positive into the mechanism"),
     "work_springs": Variable(("time",), "J", "work of springs and dampers since the start, likewise"),
     "work_friction": Variable(("time",), "J", "work lost to friction since the start"),
     "work_clutch": Variable(("time",), "J", "work lost in the clutch of a motor since the start"),
-    "rotor_speed": Variable(("driver", "time"), "rad/s", "speed of the motor's rotor behind its clutch"),
+    "rotor_speed": Variable(("driver", "time"), "rate", "speed of the motor's rotor behind its clutch"),
     "kinetic_energy": Variable(("time",), "J", "kinetic energy of the links"),
     "potential_energy": Variable(("time",), "J", "potential energy of the links in the field of gravity"),
     "energy_residual": Variable(("time",), "J", "works less changes of energy; 0 but for the errors of integration"),
@@ -128,8 +128,6 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
         {
             **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
             **cited(references(mechanism)),
-            "driver_units": effort_units(system),
-            "spring_units": spring_units(system),
             "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
             **(_named_contacts(motion, impacts) if stated else {}),
@@ -143,7 +141,9 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
 
     def build() -> xr.Dataset:
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
-        given = described(books.arrays, known) | described(_own(motion, run, solution, books, found.residual), MOTION)
+        units = member_units(system)
+        given = described(books.arrays, known, units)
+        given |= described(_own(motion, run, solution, books, found.residual), MOTION, units)
         labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
         coordinates = {"time": books.time}
         if stated is not None and books.touches is not None:

@@ -10,7 +10,8 @@ import numpy as np
 from trunnion.errors import Severity
 from trunnion.joints.pairs import GUIDED
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import attribute, findings_of
+from trunnion.results.attributes import findings_of
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import quantity
 from trunnion.solve.run import prepare
 from trunnion.studio.ways import ways
@@ -32,7 +33,7 @@ def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
     if not told:
         return {"rows": [], "why": []}
     study = tolerance(mechanism, list(told), methods=("linear",), steps=steps, jobs=1, engine="numpy")
-    units = attribute(study, "measure_units")
+    units = units_along(study["nominal"], "measure")
     values = (study[name].values for name in ("nominal", "worst_case_lower", "worst_case_upper", "deviation_linear"))
     rows = []
     for label, unit, nominal, lower, upper, deviation in zip(told.values(), units, *values, strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.summary import inputs
+from trunnion.cycle.summary import inputs, member_units
 from trunnion.errors import Coded, Finding
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
@@ -49,7 +49,7 @@ PARTS = ("joint", "end", "position")
 FIGURES: dict[str, Variable] = {
     "smallest_clearance": Variable((), "m", "the largest needed clearance of the cycle, between the positions too"),
     "largest_share": Variable((), "1", "the largest needed share of the cycle, between the positions too"),
-    "drive_coordinate": Variable(("driver", "position"), "", "coordinate of the driver, rad or m"),
+    "drive_coordinate": Variable(("driver", "position"), "coordinate", "coordinate of the driver"),
     "needed_share": Variable(
         LANES, "1", "share of the stated clearances that is needed to close the loops; above 1: too small"
     ),
@@ -233,12 +233,11 @@ class Result:
             inputs=inputs(mechanism),
             summary=figure_rows(self.summary()),
             findings=finding_rows(self.findings),
-            coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],
             periodic=int(self.system.cycle(self.values).periodic),
         ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
         along = driven(self.time, *self.system.dial(self.values, self.time))
         along["time"].attrs["long_name"] = "time"
-        variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
+        variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES, member_units(self.system))
         return dataset_of("assembly", variables, labels(self.system), attributes, along)
 
 

@@ -13,7 +13,7 @@ from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
 from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
 from trunnion.solve.shifts import Play
 
@@ -27,28 +27,34 @@ __all__ = ["VARIABLES", "dataset", "relied_on"]
 Array = NDArray[np.float64]
 
 
-# unit empty: that of each measure, in the attribute `measure_units`
+# unit "measure": that of each measure; "sensitivity": that over m
 OVER = ("measure", "position")
 BY_JOINT = ("measure", "joint", "position")
 VARIABLES: dict[str, Variable] = {
-    "value": Variable(OVER, "", "the measure with every pin in the middle of its hole"),
-    "worst_case": Variable(BY_JOINT, "", "largest change that the play of the joint can make, to either side"),
-    "deviation": Variable(BY_JOINT, "", "standard deviation by the play of the joint, pins anywhere in their holes"),
-    "worst_case_total": Variable(OVER, "", "worst case of all joints to first order: the sum"),
-    "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
-    "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
+    "value": Variable(OVER, "measure", "the measure with every pin in the middle of its hole"),
+    "worst_case": Variable(BY_JOINT, "measure", "largest change that the play of the joint can make, to either side"),
+    "deviation": Variable(
+        BY_JOINT, "measure", "standard deviation by the play of the joint, pins anywhere in their holes"
+    ),
+    "worst_case_total": Variable(OVER, "measure", "worst case of all joints to first order: the sum"),
+    "rss": Variable(OVER, "measure", "root of the sum of the squares of the joints' worst cases"),
+    "deviation_total": Variable(
+        OVER, "measure", "standard deviation by the play of all joints, independent of one another"
+    ),
     "sensitivity": Variable(
         ("measure", "joint", "end", "axis", "position"),
-        "/m",
+        "sensitivity",
         "change of the measure for an offset of 1 m at an end, of the link on which the worst case is larger",
     ),
     "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
     "extreme_worst_case": Variable(
-        ("measure", "joint"), "", "worst case of a maximum or minimum, or a stated place, there; NaN of other measures"
+        ("measure", "joint"),
+        "measure",
+        "worst case of a maximum or minimum, or a stated place, there; NaN of other measures",
     ),
     "extreme_deviation": Variable(
         ("measure", "joint"),
-        "",
+        "measure",
         "standard deviation of a maximum or minimum, or a stated place, there; NaN of other measures",
     ),
     "extreme_time": Variable(
@@ -103,8 +109,9 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         **_at_extremes(found),
     }
     units = [measure.unit(system) for measure in found.measures]
-    same = units[0] if len(set(units)) == 1 else ""
-    variables = described(arrays, VARIABLES, {"": same, "/m": f"{same}/m" if same else ""})
+    own = MemberUnits("measure", units)
+    per_length = MemberUnits("measure", [f"{unit}/m" for unit in units])
+    variables = described(arrays, VARIABLES, {"measure": own, "sensitivity": per_length})
     labels = {
         "measure": [measure.name for measure in found.measures],
         "joint": list(found.plays),
@@ -115,7 +122,6 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
     attributes = {
         **origin(mechanism, system.plan.formula),
         **cited(references(mechanism)),
-        "measure_units": units,
         "limits": [measure.limit for measure in found.measures],
         "inputs": inputs(mechanism),
         "drive": dial.of,

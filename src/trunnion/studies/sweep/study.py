@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, inputs, references
+from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
@@ -22,8 +22,8 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
 from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import cited, encoded, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.sweep.figures import FIGURES
@@ -187,10 +187,9 @@ def _dataset(
 ) -> xr.Dataset:
     mechanism, run, swept = points.mechanism, points.run, points.swept
     names = [one.name for one in swept]
-    variables = described(arrays, {name: one.over(*names) for name, one in figures.items()})
-    if "transmission_error_max" in variables:
-        units = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
-        variables["transmission_error_max"].attrs |= encoded({"member_units": units})
+    errors = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
+    units = {**member_units(run.system), "transmission_error": MemberUnits("joint", errors)}
+    variables = described(arrays, {name: one.over(*names) for name, one in figures.items()}, units)
     along: dict[str, xr.Variable] = {}
     for one in swept:
         along |= described({one.name: one.values}, {one.name: Variable((one.name,), one.unit, one.path)})
@@ -200,7 +199,6 @@ def _dataset(
         "method": points.method.name,
         **cited(references(mechanism)),
         "inputs": inputs(mechanism),
-        "driver_units": effort_units(run.system),
         "findings": finding_rows(findings),
     }
     return dataset_of("sweep", variables, labels, attributes, along)

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
 from trunnion.joints.pairs import GUIDED
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import (
     Abscissa,
@@ -80,7 +80,7 @@ FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))
 def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as a band."""
     over, drivers = abscissa(result), names(result, "driver")
-    units = attribute(result, "driver_units") or ["N m"] * len(drivers)
+    units = units_along(result["drive_effort"], "driver")
     title = (
         "Drive force" if units and set(units) == {"N"} else "Drive torque" if set(units) == {"N m"} else "Drive effort"
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import quantity
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def energies(rows: xr.Dataset) -> list[tuple[str, str, Array]]:
 
 def drivers_of(result: xr.Dataset) -> list[tuple[int, str, str]]:
     """Number, name and unit of effort of every free driver; of all where none is, as pins in play move alone."""
-    free, units = attribute(result, "free_drivers"), attribute(result, "driver_units")
+    free, units = attribute(result, "free_drivers"), units_along(result["drive_effort"], "driver")
     known = [str(name) for name in result["driver"].values]
     return [(i, name, units[i]) for i, name in enumerate(known) if name in free or not free]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import joined, prefixed, quantity
 from trunnion.studies.play.result import relied_on
 from trunnion.studies.play.study import IDLE
@@ -25,7 +26,7 @@ HEAD = ["joint", "play", "largest effect ±", "at", "share"]
 
 def tables(result: xr.Dataset) -> list[TextTable]:
     """For each measure: the joints with their play, largest effect and where, and share in the largest worst case."""
-    units, over = attribute(result, "measure_units"), abscissa_of(result)
+    units, over = units_along(result["value"], "measure"), abscissa_of(result)
     return [
         _table_there(result.isel(measure=i), str(name), unit, *there)
         if there

@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.model_measures import values_at
 from trunnion.cycle.positions import check_steps, positions, stretch
-from trunnion.cycle.summary import BALANCED, balance, books, dataset_of, figures, peak
+from trunnion.cycle.scales import peak, scales_of
+from trunnion.cycle.summary import BALANCED, balance, books, dataset_of, figures
 from trunnion.errors import Finding, Severity, Status
-from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
+from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.export import in_parts, saving
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.result import Result
+from trunnion.results.scales import EVERYWHERE, scales_in
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -61,6 +63,7 @@ def written(
     first = positions(run, BLOCK, method, None, kept.margin, True, engine, kept.variables, steps)
     attributes, measured = books(run, first, kept)
     extremes: dict[str, Figure] = {}
+    scales = scales_of(run)
     count = np.zeros(len(Status), np.int64)
     tails: tuple[dict[str, Any], ...] = {}, {}
     powers = {name: np.zeros(1) for name in BALANCED if name in first.arrays}  # the largest so far
@@ -79,7 +82,9 @@ def written(
                 extremes[figure.name] = _further(extremes.get(figure.name, figure), figure)
             if some.stop == steps:
                 unseen = [code for code in Status if count[code] and not np.any(first.arrays["status"] == code)]
-                attributes |= _concluded(Result(attributes, _none), extremes, balance(powers), count, unseen)
+                attributes |= _concluded(
+                    Result(attributes, _none), extremes, balance(powers, scales.floor("W")), count, unseen
+                )
             part = dataset_of(run, block, own, attributes, kept)
             for add in files:
                 add(part)
@@ -98,7 +103,8 @@ def _further(one: Figure, other: Figure) -> Figure:
         return one
     least = one.aspect == "minimum"
     a, b = (abs(value) if one.aspect.startswith("largest") else value for value in (one.value, other.value))
-    return other if (b < a if least else b > a) else one
+    further = other if (b < a if least else b > a) else one
+    return further if a == b or further.place != EVERYWHERE else replace(further, place="")
 
 
 def _concluded(
@@ -123,7 +129,7 @@ def _concluded(
             figure = replace(figure, value=float(np.sum(count[: Status.NOT_CONVERGED])), aspect=f"of {np.sum(count)}")
         told.append(figure)
     findings = [*findings_of(looked), *_left_out(count, unseen)]
-    return encoded({"summary": figure_rows(told), "findings": finding_rows(findings)})
+    return encoded({**scales_in(looked).summary(told), "findings": finding_rows(findings)})
 
 
 def _left_out(count: NDArray[np.int64], unseen: Sequence[Status]) -> Iterator[Finding]:

@@ -31,6 +31,7 @@ from trunnion.cycle.near_locking import (
     passage,
     reverse,
 )
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
 from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
@@ -38,6 +39,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described, units_along, with_variables
 from trunnion.results.figure import Figure
+from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_springs
@@ -173,7 +175,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     figures += _reversing(run, found, dial)
     backward = reverse_figure(run, _reverse(found), state)
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
-    return [*figures, backward or stays]
+    return scales_of(run).of_figures([*figures, backward or stays])
 
 
 def _turning(found: xr.Dataset) -> list[Figure]:
@@ -192,14 +194,16 @@ def _reversing(run: Run, found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
     """The largest effort that each driver has to supply to go back over its range, as to open a clamp."""
     if run.cycle.periodic:
         return
+    scales = scales_of(run)
     units, time = units_along(found["drive_effort"], "driver"), found["time"].values
     for name, unit in zip(found["driver"].values.tolist(), units, strict=True):
         effort = found["drive_effort_reverse"].sel(driver=name).values
         supplied = -effort * np.sign(primal(run.system.drive(run.values, name, time)[1]))
-        if np.any(supplied > ROUNDING * np.nanmax(np.abs(effort), initial=0.0)):
+        if np.any(supplied > (floor := scales.floor(unit))):
             k = int(np.nanargmax(supplied))
             subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} to reverse the motion"
-            yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", f"at {dial.at(k)}")
+            place = extreme_place(supplied, f"at {dial.at(k)}", floor)
+            yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", place)
 
 
 def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[Figure]:
@@ -208,7 +212,7 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
     if not np.any(np.isfinite(multiple)):
         return [least]
     at = int(np.nanargmin(multiple))
-    own = critical_figure(run, joint, float(multiple[at]), f"at {dial.at(at)}")
+    own = critical_figure(run, joint, float(multiple[at]), extreme_place(multiple, f"at {dial.at(at)}"))
     if own.name != least.name:
         return [least, own]
     return [own] if multiple[at] == 0 else [least]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import largest
 from trunnion.cycle.summary import effort_units, inputs, member_units, references, scene_of
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.course import OVER_TIME, Courses
@@ -26,10 +27,11 @@ from trunnion.dynamics.touching import SLOWEST
 from trunnion.errors import Finding, Status
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
-from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
+from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 
@@ -118,7 +120,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
     solution, books, impacts = found.solution, found.books, found.impacts
     run = stated or motion.run
     _note_switches(motion, solution)
-    mechanism, system = run.system.mechanism, run.system
+    mechanism, system, scales = run.system.mechanism, run.system, largest(run, books.arrays)
     findings = [
         *motion_findings(motion, solution, run, impacts),
         *_unbalanced(found),
@@ -131,7 +133,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
             "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
             **(_named_contacts(motion, impacts) if stated else {}),
-            "summary": figure_rows(_summary(motion, found, run)),
+            **scales.summary(_summary(motion, found, run, scales)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
             "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
@@ -383,7 +385,7 @@ def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
-def _summary(motion: FreeMotion, own: Found, run: Run) -> Sequence[Figure]:
+def _summary(motion: FreeMotion, own: Found, run: Run, scales: Scales) -> Sequence[Figure]:
     """The figures that one looks at first."""
     found: list[Figure] = []
     solution, books, impacts, names = own.solution, own.books, own.impacts, list(run.system.mechanism.drivers)
@@ -410,7 +412,7 @@ def _summary(motion: FreeMotion, own: Found, run: Run) -> Sequence[Figure]:
         return found
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
     for key, works in _works(solution, books).items():
-        if np.nanmax(np.abs(works)) > ROUNDING * own.turned_over:
+        if np.nanmax(np.abs(works)) > scales.floor("J"):
             found.append(Figure(f"work_{key}", WORDS[key], works[done], "J"))
     worst = float(np.nanmax(np.abs(own.residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))

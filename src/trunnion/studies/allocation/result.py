@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Severity
 from trunnion.model.prices import Price
-from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
+from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
+from trunnion.results.scales import scales_in
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation import findings
 from trunnion.studies.allocation.outcome import Allocated
@@ -91,7 +92,7 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
         "choices": found.way,
         "proven": int(found.answer.proven and not findings.contradicted(found, known)),
         "prices": [_plain(price) for price in found.prices.values()],
-        "summary": figure_rows([*findings.summary(found, known, arrays), *summary_of(known)]),
+        **scales_in(known).summary([*findings.summary(found, known, arrays), *summary_of(known)]),
         "findings": finding_rows([*own, *kept]),
         "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
     }

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle.summary import inputs, member_units
 from trunnion.errors import Coded, Finding
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
+from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.system import System, Values
 
@@ -24,7 +25,6 @@ __all__ = ["ENOUGH", "FIGURES", "AssemblyStatus", "Result", "labels"]
 
 Array = NDArray[np.float64]
 ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
-EVERYWHERE = "everywhere"
 SAME = 1e-6  # of a need: one that varies by less has no place
 TOLD = 0.05  # a joint's part in the need that is worth telling
 SOURCE = (
@@ -231,7 +231,7 @@ class Result:
             self.system.plan.formula,
             assembling=self.of,
             inputs=inputs(mechanism),
-            summary=figure_rows(self.summary()),
+            **Scales(float(np.max(self.system.size(self.values))), 1.0, 0.0).summary(self.summary()),
             findings=finding_rows(self.findings),
             periodic=int(self.system.cycle(self.values).periodic),
         ) | cited([SOURCE, *mechanism.references], AssemblyStatus)

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
+from trunnion.results.scales import Scales, extreme_place
 from trunnion.solve.shifts import Play
 
 if TYPE_CHECKING:
@@ -118,7 +120,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "end": [str(k + 1) for k in range(ends)],
         "axis": ["x", "y", "z"],
     }
-    dial = system.dial(found.run.values, found.time)
+    dial, scales = system.dial(found.run.values, found.time), scales_of(found.run)
     attributes = {
         **origin(mechanism, system.plan.formula),
         **cited(references(mechanism)),
@@ -128,7 +130,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "extremes": [_extreme_of(found, measure) for measure in found.measures],
-        "summary": figure_rows(_summary(found, units)),
+        **scales.summary(_summary(found, units, scales)),
         "findings": finding_rows(findings),
         "missed": [f"{one.where}: {one.what}" for one in findings if one.code.startswith("limit.exceeded")],
     }
@@ -167,7 +169,7 @@ def _radii(plays: Mapping[str, Play], ends: int) -> Array:
     return found
 
 
-def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
+def _summary(found: PlayEffects, units: Sequence[str], scales: Scales) -> Iterator[Figure]:
     """Of each measure the largest worst case, or that of its extreme: what each joint has in it, RSS and deviation."""
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
         name, there = measure.name, found.extremes.get(measure.name)
@@ -180,7 +182,7 @@ def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
             continue
         top = int(np.nanargmax(total))
         aspect = "maximum" if there is None else f"of the {measure.rule}" if measure.at is None else ""
-        yield Figure(*worst, total[top], unit, aspect, f"at {of.at(top)}")
+        yield Figure(*worst, total[top], unit, aspect, extreme_place(total, f"at {of.at(top)}", scales.floor(unit)))
         rss, deviation = (np.sqrt(np.sum(part[k, :, top] ** 2)) for part in (own.worst_case, own.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.deprecation import renamed
 from trunnion.dynamics.measured import slow_motions, unfound
@@ -24,8 +25,10 @@ from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
+from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run
 from trunnion.studies.sweep.figures import FIGURES
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
 from trunnion.studies.sweep.measures import left_out, measures_of
@@ -175,6 +178,12 @@ def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str,
             )  # fmt: skip
 
 
+def _scales(run: Run, arrays: Mapping[str, NDArray[Any]]) -> Scales:
+    """Those of the first point, with the largest reaction of all."""
+    scales = scales_of(run)
+    return scales._replace(force=max(scales.force, peak(arrays["reaction_max"])))
+
+
 # ---- the result -----------------------------------------------------------------------------------------------
 
 
@@ -200,5 +209,6 @@ def _dataset(
         **cited(references(mechanism)),
         "inputs": inputs(mechanism),
         "findings": finding_rows(findings),
+        **_scales(run, arrays).summary([]),
     }
     return dataset_of("sweep", variables, labels, attributes, along)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.corners import switch
@@ -16,7 +17,7 @@ from trunnion.measures.evaluation import looking
 from trunnion.measures.figures import moment
 from trunnion.measures.measures import Measure
 from trunnion.model.parameters import dimension_kinds
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
 from trunnion.studies.tolerance.findings import findings_of, summary
@@ -157,7 +158,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
         "stopped": int(outcome.stopped),
-        "summary": figure_rows(summary(outcome, counted, units, dial)),
+        **scales_of(found.run).summary(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
         "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],
     }

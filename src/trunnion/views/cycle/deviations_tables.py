@@ -8,6 +8,7 @@ import numpy as np
 
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, quantity
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, mean_friction, names, valid
 from trunnion.views.cycle.deviations import angle_scale, losses, outputs, worst_points
 
@@ -24,6 +25,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
     """Label, as built, ideal, difference and place of what errors change; none of a mechanism without errors."""
     if "point_error" not in result:
         return []
+    result = without_noise(result)
     over = abscissa(result)
     rows = [
         _error(f"Position error of {key}, largest", valid(result, error), "m", over)

@@ -19,6 +19,7 @@ from trunnion.files import whole
 from trunnion.joints.pairs import GUIDED
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import (
     Abscissa,
     Array,
@@ -60,7 +61,7 @@ from trunnion.views.cycle.seat_plot import seat
 from trunnion.views.cycle.speed import speed, varying
 from trunnion.views.space import figure as space_figure
 from trunnion.views.space import plots as space_plots
-from trunnion.views.space.bodies import is_spatial, without_noise
+from trunnion.views.space.bodies import is_spatial
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -160,16 +161,10 @@ def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y"
     return np.asarray(picked.values, dtype=float)
 
 
-def _sound(result: xr.Dataset, ideal: xr.Dataset | None) -> tuple[xr.Dataset, xr.Dataset | None]:
-    """Both without reactions that are rounding, as some are by the shape of the mechanism."""
-    return without_noise(result), None if ideal is None else without_noise(ideal)
-
-
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Magnitude of the reaction in each joint, of those with the same as one curve; without friction thin, dotted."""
     if is_spatial(result):
-        return space_plots.reactions(*_sound(result, ideal), FREE)
-    result, ideal = _sound(result, ideal)
+        return space_plots.reactions(result, ideal, FREE)
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
     free = [] if ideal is None else [np.hypot(*_reaction(ideal, joint)) for joint in joints]
@@ -195,7 +190,6 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """
     over, joints = abscissa(result), names(result, "joint")
     planes = space_plots.PLANES if is_spatial(result) else (("x", "y"),)
-    result, ideal = _sound(result, ideal)
     easy = ease(result)
     panels = [(index, joint, plane) for index, joint in enumerate(joints) for plane in planes]
     columns = min(len(panels), 2 if len(panels) in (2, 4) else 3) or 1
@@ -420,6 +414,7 @@ def figure(
     """
     check_kinds([kind])
     index = None if at is None else position_at(result, at)
+    result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     if kind == "mechanism":
         return mechanism(result, ideal, index)
     whole_figure = PLOTS[kind](result, ideal)

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from trunnion.joints.pairs import GUIDED
 from trunnion.results.dataset import units_along
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.deviations import losses
 from trunnion.views.cycle.deviations_scene import built
 from trunnion.views.cycle.speed import varying
-from trunnion.views.space.bodies import is_spatial, without_noise
+from trunnion.views.space.bodies import is_spatial
 from trunnion.views.space.scene import space_scene
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ import numpy as np
 from trunnion.results.attributes import attribute, findings_of
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legend, new, shade
 from trunnion.views.common.lettering import plain
@@ -33,6 +34,7 @@ def figure(result: xr.Dataset, measures: Sequence[int] | None = None) -> Figure:
 
     measures: their numbers; the first ones if not given.
     """
+    result = without_noise(result)
     over, names = abscissa_of(result), result["measure"].values
     chosen = range(len(names))[:MOST_PANELS] if measures is None else measures
     sheet = new("Effect of the play of the joints", result, height=1.0 + PANEL * len(chosen))

@@ -17,6 +17,7 @@ from trunnion.errors import Status
 from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, names
 
 if TYPE_CHECKING:
@@ -285,6 +286,7 @@ class MeasureReading:
 def readings(result: xr.Dataset) -> list[MeasureReading]:
     """Every measure of a result."""
     keys = ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
+    result = without_noise(result)
     units = units_along(result["nominal"], "measure")
     limits, bounds, texts, rules, courses = (attribute(result, key) for key in keys)
     found = []

@@ -8,6 +8,13 @@ from typing import Any
 
 from page_tables.cells import code, rows_of, unit
 
+UNITS = {
+    "effort": "N m or N", "coordinate": "rad or m", "rate": "rad/s or m/s", "spring_force": "N or N m",
+    "spring_elongation": "m or rad", "transmission_error": "rad or m", "measure": "of the measure",
+    "sensitivity": "of the measure, over m", "parameter": "of the parameter", "ratio": "one by the other",
+    "drive": "deg, mm, s", "saving": "1 by that of the measure", "curve": "of the curve",
+    "curve ratio": "curve by parameter",
+}  # fmt: skip
 PARTS = {"": "", "seats": "with a seat", "errors": "with an error"}
 
 
@@ -23,7 +30,7 @@ def results_table() -> str:
             forms = [("", forms[0][1])]
         for where, one in forms:
             there = ", ".join(word for word in (where, PARTS[one.part]) if word)
-            rows.append((code(name), there, ", ".join((*one.dims, "position")), unit(one.units), one.long_name))
+            rows.append((code(name), there, ", ".join((*one.dims, "position")), _unit(one), one.long_name))
     rows.append((code("efficiency"), "", "", "1", "useful work over drive work of the cycle"))
     rows.append((code("efficiency_ideal"), PARTS["errors"], "", "1", "efficiency of the mechanism without errors"))
     return rows_of(("variable", "only in", "dimensions", "unit", "meaning"), rows)
@@ -42,70 +49,52 @@ def moving_table() -> str:
     """Every variable of a motion in time beside those of a cycle."""
     from trunnion.dynamics.result import MOTION
 
-    slides = {"drive_coordinate": "rad or m", "drive_rate": "rad/s or m/s"}
-    rows = [
-        (code(name), ", ".join(one.dims), slides.get(name) or unit(one.units), one.long_name)
-        for name, one in MOTION.items()
-    ]
-    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+    return _described("dimensions", MOTION)
+
+
+def _described(dimensions: str, variables: Mapping[str, Any]) -> str:
+    rows = [(code(name), ", ".join(one.dims), _unit(one), one.long_name) for name, one in variables.items()]
+    return rows_of(("variable", dimensions, "unit", "meaning"), rows)
+
+
+def _unit(variable: Any) -> str:
+    """The unit of a variable, or what the word in its place means."""
+    return UNITS.get(variable.units) or unit(variable.units)
 
 
 def sweeps_table() -> str:
     """Every figure of a sweep."""
     from trunnion.studies.sweep.study import FIGURES
 
-    rows = [(code(name), ", ".join(one.dims), unit(one.units), one.long_name) for name, one in FIGURES.items()]
-    return rows_of(("variable", "dimension before the swept ones", "unit", "meaning"), rows)
+    return _described("dimension before the swept ones", FIGURES)
 
 
 def plays_table() -> str:
     """Every variable of the play of joints."""
     from trunnion.studies.play.result import VARIABLES
 
-    rows = [
-        (code(name), ", ".join(one.dims), unit(one.units) if one.units else "of the measure", one.long_name)
-        for name, one in VARIABLES.items()
-    ]
-    return rows_of(("variable", "dimension", "unit", "meaning"), rows)
+    return _described("dimension", VARIABLES)
 
 
 def tolerances_table() -> str:
     """Every variable of a tolerance analysis."""
     from trunnion.studies.tolerance.result import VARIABLES
 
-    return _toleranced(VARIABLES)
+    return _described("dimensions", VARIABLES)
 
 
 def identification_table() -> str:
     """Every variable of an identification."""
     from trunnion.rig.identification.result import VARIABLES
 
-    rows = [(code(name), ", ".join(one.dims), unit(one.units), one.long_name) for name, one in VARIABLES.items()]
-    return rows_of(("variable", "dimension", "unit", "meaning"), rows)
+    return _described("dimension", VARIABLES)
 
 
 def allocations_table() -> str:
     """Every variable of an allocation beside those of the tolerance analysis."""
     from trunnion.studies.allocation.result import VARIABLES
 
-    return _toleranced(VARIABLES)
-
-
-def _toleranced(variables: Mapping[str, Any]) -> str:
-    told = {
-        "": "of the measure", "parameter": "of the parameter", "ratio": "one by the other", "drive": "deg, mm, s",
-        "1/": "1 by that of the measure", "course": "of the course", "course ratio": "course by parameter",
-    }  # fmt: skip
-    rows = [
-        (
-            code(name),
-            ", ".join(one.dims),
-            "" if name == "choice" else told.get(one.units) or unit(one.units),
-            one.long_name,
-        )
-        for name, one in variables.items()
-    ]
-    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+    return _described("dimensions", VARIABLES)
 
 
 def comparisons_table() -> str:
@@ -124,8 +113,7 @@ def assembling_table() -> str:
     """Every variable of whether a mechanism goes together."""
     from trunnion.studies.assembly.study import FIGURES
 
-    rows = [(code(name), ", ".join(one.dims), unit(one.units), one.long_name) for name, one in FIGURES.items()]
-    return rows_of(("variable", "dimensions", "unit", "meaning"), rows)
+    return _described("dimensions", FIGURES)
 
 
 def status_table() -> str:

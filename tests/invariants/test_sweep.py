@@ -84,7 +84,8 @@ def test_a_point_equals_the_analysis_to_the_bit(model: str, name: str, text: str
         assert np.array_equal(swept[key].values[..., 0], value, equal_nan=True), key
     lost = float(one["friction_power_mean"].sum())
     assert swept["friction_power_mean"].values[..., 0] == pytest.approx(lost, rel=1e-12, abs=1e-12)
-    assert swept.attrs["driver_units"] == one.attrs["driver_units"]
+    for end in ("min", "max", "rms"):
+        assert swept[f"drive_effort_{end}"].attrs["units"] == one["drive_effort"].attrs["units"]
 
 
 def test_points_of_a_range_are_the_floats_of_their_texts() -> None:

@@ -212,7 +212,7 @@ def test_the_models_measures_in_the_result_of_a_cycle(tmp_path: Path) -> None:
     mechanism = measured_model()
     result = trunnion.analyse(mechanism, 36)
     assert list(result["measure"].values) == ["speed", "mu", "swing", "rest"]
-    assert json.loads(result.attrs["measure_figure_units"]) == ["m/s", "rad", "rad", "1"]
+    assert result["measure_figure_unit"].values.tolist() == ["m/s", "rad", "rad", "1"]
     speed = np.sqrt((result["point_velocity"].sel(point="rocker.C") ** 2).sum("axis"))
     np.testing.assert_allclose(result["measure_value"].sel(measure="speed"), speed, rtol=1e-12)
     rotation = result["joint_rotation"].sel(joint="D")

@@ -294,11 +294,11 @@ def test_power_residual_is_told_of_the_peak_power() -> None:
     """Of the drive, or of whatever has the most where that has none; of no power at all as it is."""
     arrays = {"power_residual": np.array([1e-6, -4e-6, 2e-6]), "drive_power": np.array([[3.0, -8.0, 5.0]]),
               "useful_power": np.array([1.0, 2.0, 0.5])}  # fmt: skip
-    assert balance(arrays) == pytest.approx(4e-6 / 8.0)
-    assert balance(arrays | {"drive_power": np.zeros((1, 3))}) == pytest.approx(4e-6 / 2.0)
-    assert balance({name: 1e3 * one for name, one in arrays.items()}) == pytest.approx(4e-6 / 8.0)
+    assert balance(arrays, 0.0) == pytest.approx(4e-6 / 8.0)
+    assert balance(arrays | {"drive_power": np.zeros((1, 3))}, 0.0) == pytest.approx(4e-6 / 2.0)
+    assert balance({name: 1e3 * one for name, one in arrays.items()}, 0.0) == pytest.approx(4e-6 / 8.0)
     nothing = {"drive_power": np.zeros((1, 3)), "useful_power": np.zeros(3)}
-    assert balance(arrays | nothing) == pytest.approx(4e-6)
+    assert balance(arrays | nothing, 0.0) == pytest.approx(4e-6)
 
 
 def test_root_mean_square_of_an_effort() -> None:

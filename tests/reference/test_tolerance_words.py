@@ -11,6 +11,7 @@ import pytest
 from mechanisms_parts import prismatic, revolute, slide
 from toleranced import clutch, rssr, slider_crank
 from trunnion import Mechanism, save, tolerance
+from trunnion.results.dataset import units_along
 from trunnion.views.tolerance.figure import drawable, figure
 from trunnion.views.tolerance.readings import readings
 from trunnion.views.tolerance.tables import figures, headline
@@ -83,8 +84,8 @@ def test_the_course_is_told_in_its_own_unit(result: Any) -> None:
     """Of a dead centre it is the slide in m, though its figure is an angle of the crank."""
     units = {"top": "m", "soon": "m", "swing": "rad", "back": "rad", "stroke": "m", "dead": "m", "late": "rad",
              "wave": "rad"}  # fmt: skip
-    assert told(result, "curve_units") == units
-    assert told(result, "measure_units") == units | {"dead": "rad"}
+    assert dict(zip(units, units_along(result["curve"], "measure"), strict=True)) == units
+    assert units_along(result["nominal"], "measure") == [*(units | {"dead": "rad"}).values()]
     texts = told(result, "curve_texts")
     assert texts["stroke"] == texts["dead"] == "slide of C"
     assert (texts["top"], texts["swing"], texts["wave"]) == ("x of piston.P", "angle of rod", "rotation of P")

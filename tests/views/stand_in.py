@@ -30,7 +30,7 @@ UNITS = {
 }  # fmt: skip
 
 
-def assemble(joints, links, points, drivers, columns, attrs):
+def assemble(joints, links, points, drivers, columns, attrs, effort="N m"):
     """A Dataset of the contract from plain arrays; velocities and accelerations by difference over time."""
     count = len(columns["time"])
     dims = {
@@ -46,7 +46,8 @@ def assemble(joints, links, points, drivers, columns, attrs):
         shape = dims.get({"reaction": "joint", "friction": "joint"}.get(key, key), ("position",))
         if values.ndim < len(shape):
             shape = ("position",) if values.ndim else ()
-        variables[name] = (shape, values, {"units": UNITS[name], "long_name": name.replace("_", " ")})
+        unit = effort if name.startswith("drive_effort") else UNITS[name]
+        variables[name] = (shape, values, {"units": unit, "long_name": name.replace("_", " ")})
     for name in ("joint_rotation", "joint_slide", "link_angle", "point_position"):
         shape, values, _ = variables[name]
         stem = "point" if name == "point_position" else name
@@ -141,7 +142,6 @@ def four_bar(count=360, friction=1.0, rename=None, gap=None):
         },
         {
             "name": "Four-bar of Durango, Calle and Ruiz (2010)", "formula": "I(0,1)R → II(2,3)RRR",
-            "driver_units": json.dumps(["N m"]),
             "scene": json.dumps({
                 "ground": "ground",
                 "links": {"ground": {"points": [a, d]}, "crank": {"points": [a, b]},
@@ -219,7 +219,7 @@ def slider(count=90):
             "status": np.zeros(count, np.int8),
         },
         {
-            "name": "Inclined pusher", "formula": "I(0,1)P → II(2,3)RRP", "driver_units": json.dumps(["N"]),
+            "name": "Inclined pusher", "formula": "I(0,1)P → II(2,3)RRP",
             "scene": json.dumps({
                 "ground": "frame",
                 "links": {"frame": {"points": ["S", "T"]}, "block": {"points": ["S", "Q"]},
@@ -231,4 +231,5 @@ def slider(count=90):
                 "loads": {"push": {"link": "foot", "at": "R", "force": [-50.0, 0], "moment": 0, "useful": True}},
             }),
         },
+        "N",
     )  # fmt: skip

@@ -123,7 +123,7 @@ def made(name, formula, links, joints, free, drivers, time, forces, moments, rot
                 "component": ["w", "x", "y", "z"]},
         attrs={"name": name, "formula": formula, "model_hash": "9f2c41d07ab35e68", "trunnion_version": "0.1.0",
                "method": "newton", "references": "", "findings": "[]", "inputs": "[]", "summary": "[]",
-               "driver_units": json.dumps(["N m"] * len(drivers)), "scene": json.dumps(scene),
+               "scene": json.dumps(scene),
                "passive": "[]", **attrs},
     )  # fmt: skip
 

@@ -8,9 +8,14 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
+from trunnion.results.dataset import MemberUnits, described, with_variables
 from trunnion.studies.sweep.study import FIGURES
 
 RPM, DEG = np.pi / 30, np.pi / 180
+UNITS = {
+    "effort": MemberUnits("driver", ["N m", "N m"]),
+    "transmission_error": MemberUnits("joint", ["rad", "rad", "m"]),
+}
 
 
 def scale(values, unit="1", written="", factor=1.0):
@@ -51,14 +56,13 @@ def swept(names, law=None, status=None, ideal=False, name="Cardan joint", margin
             values = np.where(codes == 5, 0.7, np.where(base > 0.85, np.inf, 1 + 8 * base))
         if key in ("status", "without_answer"):
             values = codes if key == "status" else np.where(codes >= 4, 3, 0)
-        given[key] = xr.Variable((*one.dims, *names), values, {"units": one.units, "long_name": one.long_name})
-    if ideal:
-        given["transmission_error_max"].attrs["member_units"] = '["rad", "rad", "m"]'
+        given |= described({key: values}, {key: one.over(*names)}, UNITS)
     attributes = {
-        "name": name, "swept": json.dumps(list(names), ensure_ascii=False), "driver_units": '["N m", "N m"]',
+        "name": name, "swept": json.dumps(list(names), ensure_ascii=False),
         "findings": "[]", "steps": 36,
     }  # fmt: skip
-    return xr.Dataset(given, {**{dim: (dim, np.array(one)) for dim, one in labels.items()}, **coordinates}, attributes)
+    empty = xr.Dataset({}, {**{dim: (dim, np.array(one)) for dim, one in labels.items()}, **coordinates}, attributes)
+    return with_variables(empty, given)
 
 
 def cardan(angle, speed, *_):

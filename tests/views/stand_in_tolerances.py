@@ -17,6 +17,7 @@ LENGTHS = {"ground": 0.1, "crank": 0.03, "coupler": 0.09, "rocker": 0.07}
 QUANTILES = (0.00135, 0.005, 0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975, 0.995, 0.99865)
 ODD = ["Ω—Welle", "</script><script>alert(1)</script>", '<img src=x onerror="alert(2)">', "_$x$ & <!-- 曲柄"]
 LIMIT = np.radians(0.1)
+UNITS = {"nominal": "rad", "curve": "rad", "parameter_nominal": "m"}
 
 
 def rocker(lengths, theta):
@@ -100,7 +101,7 @@ def toleranced(
                       for end, by in (("", 0.0), ("_low", -0.015), ("_high", 0.015))}  # fmt: skip
     labels = ["angle-error", *(f"angle-error-{k}" for k in range(2, measures + 1))]
     variables = {
-        name: (dims, np.asarray(values), {"units": "", "long_name": name.replace("_", " ")})
+        name: (dims, np.asarray(values), {"units": UNITS.get(name, ""), "long_name": name.replace("_", " ")})
         for name, (dims, values) in found.items()
     }
     period = 0.5
@@ -178,11 +179,9 @@ def _attributes(labels, names, methods, samples, limits, found):
     }  # fmt: skip
     return {
         "name": "Four-bar with tolerances", "formula": "I(0,1) → II(2,3)RRR",
-        "measure_units": json.dumps(["rad"] * len(labels)),
         "limits": json.dumps([[-LIMIT, LIMIT] if limits else None] * len(labels)),
         "bounds": json.dumps([[None, None]] * len(labels)),
         "measure_texts": json.dumps(["angle of rocker, largest deviation over the turn"] * len(labels)),
-        "parameter_units": json.dumps(["m"] * len(names)),
         "drive": "A", "drive_unit": "°", "periodic": 1, "methods": json.dumps(list(methods)),
         "samples": samples, "seed": 1,
         "sampling": "quasi-monte-carlo" if "quasi-monte-carlo" in methods else "monte-carlo",
@@ -204,7 +203,7 @@ def at_one_position():
     result["edge"] = (("measure", "edge"), [base + spread])
     result["histogram"] = (("measure", "bin"), [np.rint(4000 * mass).astype(int)])
     for name in ("mean", "nominal", "mean_low", "mean_high"):
-        result[name] = (("measure",), [base + 1e-5 * (name != "nominal")])
+        result[name] = (("measure",), [base + 1e-5 * (name != "nominal")], {"units": "rad"})
     for name, at in (("least", 0), ("most", -1)):
         result[name] = (("measure",), [base + spread[at]])
     sigma = float(result["deviation"].values[0])
@@ -243,8 +242,10 @@ def torque():
             continue
         moved = key in ("edge", "least", "most", "convergence_mean", "nominal") or key.startswith(("mean", "quantile_"))
         result[name] = (one.dims, (one.values - base) * factor + 9288.3 if moved else one.values * factor)
+    for name in ("nominal", "curve"):
+        result[name].attrs["units"] = "N m"
     result.attrs |= {
-        "measure_units": '["N m"]', "limits": "[null]", "bounds": "[[null, 9600.0]]",
+        "limits": "[null]", "bounds": "[[null, 9600.0]]",
         "measure_texts": '["torque of A, maximum over the turn"]',
     }  # fmt: skip
     return result.assign_coords(measure=["peak"])

@@ -16,6 +16,7 @@ from trunnion.joints.clearance import describing
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.results.figure import Figure
+from trunnion.results.scales import Scales, extreme_place
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.seating import loads_of
@@ -147,14 +148,16 @@ def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> 
 
 
 def error_figures(
-    run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial, valid: NDArray[np.bool_]
+    run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial, valid: NDArray[np.bool_], scales: Scales
 ) -> Iterator[Figure]:
-    """What the errors do, in the figures one looks at first; of valid positions."""
+    """What the errors do, in the figures one looks at first; of valid positions. scales: beside which they may
+    be rounding."""
     sizes = [np.where(valid, np.sqrt(np.sum(one**2, axis=0)), np.nan) for one in arrays["point_error"]]
     if any(np.any(np.isfinite(size)) for size in sizes):
         top = int(np.argmax([np.nanmax(size, initial=-1.0) for size in sizes]))
         at, most = int(np.nanargmax(sizes[top])), f"largest: {'.'.join(run.system.points[top])}"
-        yield Figure("point_error_max", "position error", sizes[top][at], "m", most, f"at {dial.at(at)}")
+        place = extreme_place(sizes[top], f"at {dial.at(at)}", scales.floor("m"))
+        yield Figure("point_error_max", "position error", sizes[top][at], "m", most, place)
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
@@ -162,15 +165,15 @@ def error_figures(
             error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
             if (what == "rotation") == (not PAIRS[kind].guided) and np.any(np.isfinite(error)):
                 at, name = int(np.nanargmax(error)), f"{joint}.{what}_error_max"
-                yield Figure(
-                    name, f"transmission error of {joint}", error[at], unit, "largest magnitude", f"at {dial.at(at)}"
-                )
+                place = extreme_place(error, f"at {dial.at(at)}", scales.floor(unit))
+                yield Figure(name, f"transmission error of {joint}", error[at], unit, "largest magnitude", place)
     for i, joint in enumerate(run.system.mechanism.drivers):
         change = np.where(valid, arrays["drive_effort_change"][i], np.nan)
         if np.any(np.isfinite(change)):
             at, name = int(np.nanargmax(np.abs(change))), f"{joint}.effort_change_max"
             kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
             subject = f"change of the drive {kind} of {joint} by the errors"
-            yield Figure(name, subject, change[at], unit, "largest magnitude", f"at {dial.at(at)}")
+            place = extreme_place(change, f"at {dial.at(at)}", scales.floor(unit))
+            yield Figure(name, subject, change[at], unit, "largest magnitude", place)
     if run.seats:
         yield Figure("seat_rounds", "seat iterations", np.max(arrays["seat_rounds"]), aspect="maximum")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Status
 from trunnion.groups import rpr, rrp, rrr
+from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
@@ -153,11 +154,13 @@ def findings(
     condition: NDArray[np.float64],
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
     margin: NDArray[np.float64],
+    scales: Scales,
     near: Locking | None = None,
     felt: Sequence[str] | None = None,
 ) -> list[Finding]:
     """One finding for each cause. efforts: least and largest effort and unit of every driver; margin: multiple of all
-    friction at which a position locks; felt: joints with friction that is not 0, all that have a law if not given."""
+    friction at which a position locks; felt: joints with friction that is not 0, all that have a law if not given;
+    scales: beside which an effort may be rounding."""
     felt = rubbing(causes.system) if felt is None else felt
     found = [_not_assembled(causes, dial, part) for part in causes.open_modules().values()]
     stuck = causes.stuck()
@@ -187,16 +190,19 @@ def findings(
         )
     holding = {*felt, *causes.system.resisted}  # without friction either way is the same
     for joints, positions in _together({name: at for name, at in causes.zero_slip().items() if name in holding}):
-        if not efforts or any(_matters(positions, lower, upper) for lower, upper, _ in efforts.values()):
+        if not efforts or any(_matters(positions, *effort, scales) for effort in efforts.values()):
             found.append(_zero_slip(dial, joints, positions, efforts))
     return found
 
 
-def _matters(positions: Positions, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> bool:
-    """Whether an effort has an interval worth a word at one of some positions: no bounds, or ends far enough apart."""
+def _matters(
+    positions: Positions, lower: NDArray[np.float64], upper: NDArray[np.float64], unit: str, scales: Scales
+) -> bool:
+    """Whether an effort has an interval worth a word at one of some positions: no bounds, or ends far enough apart, by
+    more than rounding."""
     widths = upper[positions] - lower[positions]
     largest = np.nanmax(np.abs([lower, upper]), initial=0.0)
-    return bool(np.any(np.isnan(widths) | (widths > NEGLIGIBLE * largest)))
+    return bool(np.any(np.isnan(widths) | (widths > np.fmax(NEGLIGIBLE * largest, scales.floor(unit)))))
 
 
 def _together(zero: dict[str, Positions]) -> list[tuple[list[str], Positions]]:

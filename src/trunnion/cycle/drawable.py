@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.cycle.positions import positions
-from trunnion.cycle.summary import effort_units, scene_of
+from trunnion.cycle.summary import member_units, scene_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.results import variables as results
 from trunnion.results.attributes import origin
@@ -34,9 +34,9 @@ def drawable(mechanism: Mechanism) -> xr.Dataset:
     arrays = {name: array for name, array in found.arrays.items() if not name.startswith("reaction_")}
     attributes = {
         **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
-        "driver_units": effort_units(run.system),
         "scene": scene_of(run),
         "periodic": int(run.cycle.periodic),
     }
     along = driven(found.time, *found.dial)
-    return results.dataset(arrays, found.labels, along, found.means, attributes, found.ideal)
+    units = member_units(run.system)
+    return results.dataset(arrays, found.labels, along, found.means, attributes, units, found.ideal)

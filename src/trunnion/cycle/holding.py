@@ -15,6 +15,7 @@ from trunnion.cycle.locking_states import PUSHES, LockingState, pushed
 from trunnion.cycle.near_locking import Passage, passed, reverse
 from trunnion.errors import counted
 from trunnion.results.figure import Figure
+from trunnion.results.scales import extreme_place
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
 from trunnion.solve.system import Dial, felt, law_of
@@ -143,7 +144,7 @@ def holding_figures(run: Run, multiples: Array, state: NDArray[np.int8], dial: D
     if not multiples[at] > 0:
         return []
     aspect, subject = "maximum" * bool(everywhere), "down to which it is self-locking" + _centred(run)
-    place, multiple = f"at {dial.at(at)}", float(multiples[at])
+    place, multiple = extreme_place(multiples, f"at {dial.at(at)}"), float(multiples[at])
     forward = state[at] == LockingState.SELF_LOCKING_FORWARD
     note = "below it the loads drive it on, onto a stop there" * bool(forward and not run.cycle.periodic)
     figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, "1", aspect, place, note)]

@@ -31,13 +31,16 @@ from trunnion.cycle.near_locking import (
     passage,
     reverse,
 )
+from trunnion.cycle.scales import scales_of
+from trunnion.cycle.summary import member_units
 from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
-from trunnion.results.dataset import Variable, described
+from trunnion.results.dataset import Variable, described, units_along, with_variables
 from trunnion.results.figure import Figure
+from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import useful_springs
@@ -59,7 +62,7 @@ VARIABLES = {
     ),
     "other_solutions": Variable(("position",), "1", "other solutions of the friction equations"),
     "drive_effort_reverse": Variable(
-        ("driver", "position"), "N m", "drive effort of the reversed motion; NaN where it locks"
+        ("driver", "position"), "effort", "drive effort of the reversed motion; NaN where it locks"
     ),
     "power_delivered_reverse": Variable(("position",), "W", "power delivered to the drivers when backdriven"),
     "power_given_reverse": Variable(("position",), "W", "power supplied by the useful loads when backdriven"),
@@ -118,7 +121,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "holding_multiple": holding_multiples(run, time, ahead, other),
         "locking_state": in_order(ahead._replace(locked=status == Status.LOCKED), other, known),
     }
-    found = result.assign(described(arrays, VARIABLES))
+    found = with_variables(result, described(arrays, VARIABLES, member_units(run.system)))
     found["locking_state"].attrs.update(codes("flag", LockingState))
     said = finding_rows(_notes(run, result))
     findings = {"findings": [*attribute(found, "findings"), *said]} if said else {}
@@ -174,7 +177,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     figures += _reversing(run, found, dial)
     backward = reverse_figure(run, _reverse(found), state)
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
-    return [*figures, backward or stays]
+    return scales_of(run).of_figures([*figures, backward or stays])
 
 
 def _turning(found: xr.Dataset) -> list[Figure]:
@@ -193,14 +196,16 @@ def _reversing(run: Run, found: xr.Dataset, dial: Dial) -> Iterator[Figure]:
     """The largest effort that each driver has to supply to go back over its range, as to open a clamp."""
     if run.cycle.periodic:
         return
-    units, time = attribute(found, "driver_units"), found["time"].values
+    scales = scales_of(run)
+    units, time = units_along(found["drive_effort"], "driver"), found["time"].values
     for name, unit in zip(found["driver"].values.tolist(), units, strict=True):
         effort = found["drive_effort_reverse"].sel(driver=name).values
         supplied = -effort * np.sign(primal(run.system.drive(run.values, name, time)[1]))
-        if np.any(supplied > ROUNDING * np.nanmax(np.abs(effort), initial=0.0)):
+        if np.any(supplied > (floor := scales.floor(unit))):
             k = int(np.nanargmax(supplied))
             subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} to reverse the motion"
-            yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", f"at {dial.at(k)}")
+            place = extreme_place(supplied, f"at {dial.at(k)}", floor)
+            yield Figure(f"{name}.effort_reverse", subject, effort[k], unit, "largest", place)
 
 
 def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -> list[Figure]:
@@ -209,7 +214,7 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
     if not np.any(np.isfinite(multiple)):
         return [least]
     at = int(np.nanargmin(multiple))
-    own = critical_figure(run, joint, float(multiple[at]), f"at {dial.at(at)}")
+    own = critical_figure(run, joint, float(multiple[at]), extreme_place(multiple, f"at {dial.at(at)}"))
     if own.name != least.name:
         return [least, own]
     return [own] if multiple[at] == 0 else [least]

@@ -14,8 +14,7 @@ from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of, figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import plan
-from trunnion.results.attributes import encoded
-from trunnion.results.dataset import Variable, described
+from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
@@ -28,10 +27,13 @@ if TYPE_CHECKING:
 __all__ = ["VARIABLES", "Watched", "positions_told", "watched"]
 
 Array = NDArray[np.float64]
-# the model's measures, each in its own unit, in the attributes `measure_units` and `measure_figure_units`
 VARIABLES = {
-    "measure_value": Variable(("measure", "position"), "", "the model's measure; NaN of one that has several numbers"),
-    "measure_figure": Variable(("measure",), "", "figure of the measure over the cycle; NaN of one that states none"),
+    "measure_value": Variable(
+        ("measure", "position"), "measure", "the model's measure; NaN of one that has several numbers"
+    ),
+    "measure_figure": Variable(
+        ("measure",), "measure_figure", "figure of the measure over the cycle; NaN of one that states none"
+    ),
 }
 SWITCHES = ", where a load begins or ends or a joint reverses, and the pins cross their play"
 # figures of single positions, and the course whose extremes these are
@@ -66,12 +68,12 @@ class Watched:
             return result
         system, values = self.run.system, self.run.values
         arrays = {"measure_value": self.values, "measure_figure": self.figures}
-        attributes = {
-            "measure_units": [one.unit(system) for one in self.measures],
-            "measure_figure_units": [one.figure_unit(system, values) for one in self.measures],
+        units = {
+            "measure": MemberUnits("measure", [one.unit(system) for one in self.measures]),
+            "measure_figure": MemberUnits("measure", [one.figure_unit(system, values) for one in self.measures]),
         }
         labelled = result.assign_coords(measure=np.asarray([one.name for one in self.measures], dtype=str))
-        return labelled.assign(described(arrays, VARIABLES)).assign_attrs(encoded(attributes))
+        return with_variables(labelled, described(arrays, VARIABLES, units))
 
     def summary(self) -> Iterator[Figure]:
         """The figure of each; of one that states none its extremes over the positions."""

@@ -16,6 +16,7 @@ from trunnion.algebra import linalg
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
 from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
 from trunnion.solve import continuation
 from trunnion.solve.backward import Backward, Given, backward
@@ -171,7 +172,9 @@ def least_margin(name: str, subject: str, values: Array, dial: Dial, note: str =
     if not np.any(np.isfinite(values)):
         return Figure(name, subject, MARGIN, aspect=MORE_THAN, note=note)
     at = int(np.nanargmin(values))
-    return Figure(name, subject, values[at], aspect="minimum", place=f"at {dial.at(at)}", note=note)
+    return Figure(
+        name, subject, values[at], aspect="minimum", place=extreme_place(values, f"at {dial.at(at)}"), note=note
+    )
 
 
 def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure:
@@ -267,12 +270,12 @@ class Locking:
         joint = min(sound, key=sound.__getitem__, default="")
         return (joint, sound[joint]) if joint else None
 
-    def figures(self, run: Run, dial: Dial) -> list[Figure]:
-        """The joint that decides. dial: names the position of `first`."""
+    def figures(self, run: Run, dial: Dial, margin: Array) -> list[Figure]:
+        """The joint that decides. dial: names the position of `first`; margin: of every position."""
         decides = self.responsible()
         if decides is None or self.first is None:
             return []
-        return [critical_figure(run, *decides, f"at {dial.at(self.first)}")]
+        return [critical_figure(run, *decides, extreme_place(margin, f"at {dial.at(self.first)}"))]
 
 
 def look(run: Run, time: Array, margin: Array, method: FrictionMethod, walked: Backward | None = None) -> Locking:

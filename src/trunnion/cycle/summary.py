@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
 from trunnion.cycle.model_measures import Watched, positions_told, watched
 from trunnion.cycle.positions import Positions
+from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.scene import COURSE, DRAWN, courses
 from trunnion.cycle.variables import fill_of
 from trunnion.errors import Finding, Status
@@ -26,11 +28,12 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
-from trunnion.results.attributes import KEPT, cited, encoded, figure_rows, finding_rows, origin
-from trunnion.results.dataset import driven
+from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, driven
 from trunnion.results.figure import Figure
 from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
+from trunnion.results.scales import Scales, extreme_place
 from trunnion.results.sentences import finding_for
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import locking_margin
@@ -44,6 +47,7 @@ if TYPE_CHECKING:
 __all__ = [
     "effort_units",
     "inputs",
+    "member_units",
     "model_notes",
     "references",
     "result_of",
@@ -88,10 +92,8 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
             **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
             "method": method.name,
             **cited(references(mechanism)),
-            "driver_units": effort_units(run.system),
-            "spring_units": spring_units(run.system),
             "findings": finding_rows([*found, *measured.findings]),
-            "summary": figure_rows([*figures(run, found_positions, near), *measured.summary()]),
+            **scales_of(run).summary([*figures(run, found_positions, near), *measured.summary()]),
             **_ranges(run, found_positions, near),
             **drawn,
             "periodic": int(run.cycle.periodic),
@@ -107,22 +109,28 @@ def dataset_of(
 ) -> xr.Dataset:
     """The Dataset of some positions."""
     along = driven(found.time, *found.dial)
-    own = found.arrays, found.labels, along, found.means, attributes, found.ideal
+    own = found.arrays, found.labels, along, found.means, attributes, member_units(run.system), found.ideal
     return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
 
 
 def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
     """What is to be known of a mechanism at some positions of its cycle, and how near to locking it is."""
-    near = _near_locking(run, at)
+    near, units, scales = _near_locking(run, at), effort_units(run.system), scales_of(run)
+    efforts = {
+        name: np.array([scales.zeroed(row, unit) for row, unit in zip(at.arrays[name], units, strict=True)])
+        for name in at.arrays
+        if name in ("drive_effort", "drive_effort_lower", "drive_effort_upper", "drive_effort_change")
+    }
+    at = replace(at, arrays={**at.arrays, **efforts})
     return [
         *run.once("notes", lambda: model_notes(run.system.mechanism, run.system)),
         *run.chosen.findings,
         *run.once("far hints", lambda: list(_far_hints(run))),
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at, near),
-        *_missed_peaks(run.system, at),
-        *jumps.findings(run, at.time, at.arrays, effort_units(run.system)),
-        *jumps.moved(run, at, effort_units(run.system)),
+        *_missed_peaks(run.system, at, scales),
+        *jumps.findings(run, at.time, at.arrays, units),
+        *jumps.moved(run, at, units),
         *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
@@ -150,10 +158,22 @@ def effort_units(system: System) -> list[str]:
     return ["N m" if system.turns(name) else "N" for name in system.mechanism.drivers]
 
 
-def spring_units(system: System) -> list[list[str]]:
-    """Units of every spring's force and elongation."""
-    turns = [spring.joint is not None and system.turns(spring.joint) for spring in system.mechanism.springs.values()]
-    return [["N m", "rad"] if turn else ["N", "m"] for turn in turns]
+def member_units(system: System) -> dict[str, MemberUnits]:
+    """Units of what a driver or a spring has, by the words of the variables, where it may turn or slide."""
+
+    def units(dim: str, turning: Iterable[bool], words: Mapping[str, tuple[str, str]]) -> dict[str, MemberUnits]:
+        turns = list(turning)
+        return {
+            word: MemberUnits(dim, [turn if own else slide for own in turns]) for word, (turn, slide) in words.items()
+        }
+
+    drives = {"effort": ("N m", "N"), "coordinate": ("rad", "m"), "rate": ("rad/s", "m/s")}
+    pulls = {"spring_force": ("N m", "N"), "spring_elongation": ("rad", "m")}
+    springs = system.mechanism.springs.values()
+    return {
+        **units("driver", map(system.turns, system.mechanism.drivers), drives),
+        **units("spring", (one.joint is not None and system.turns(one.joint) for one in springs), pulls),
+    }
 
 
 def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
@@ -197,8 +217,8 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
         for i, name in enumerate(run.system.mechanism.drivers)
     }
     found = diagnosis.findings(
-        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, arrays["locking_margin"], near,
-        felt(run.system, run.values),
+        at.causes, at.dial, arrays["status"], arrays["condition"], efforts, arrays["locking_margin"],
+        scales_of(run), near, felt(run.system, run.values),
     )  # fmt: skip
     found += near_locking.findings(near, _dial_of(near, run, at)) if near else []
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
@@ -209,14 +229,14 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
     return [*found, *_loads_over_the_cycle(run, at)]
 
 
-def _missed_peaks(system: System, at: Positions) -> Iterator[Finding]:
+def _missed_peaks(system: System, at: Positions, scales: Scales) -> Iterator[Finding]:
     """An effort whose mean square says that it is larger between the positions than at any of them."""
     sound = sound_positions(at.arrays["status"])
     if not len(sound):
         return
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
-        if rms > (1 + 1e-6) * largest:
+        if rms > (1 + 1e-6) * largest + scales.floor(unit):
             yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
 
 
@@ -231,7 +251,7 @@ def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
         if len(negative):
             yield finding_for("load.drives", path, at=at.dial.intervals(negative))
     for i, (name, spring) in enumerate(run.system.mechanism.springs.items()):
-        if spring.joint is not None and spring_units(run.system)[i][1] == "rad":
+        if spring.joint is not None and run.system.turns(spring.joint):
             jumps = np.flatnonzero(np.abs(np.diff(at.arrays["spring_elongation"][i])) > np.pi)
             if len(jumps):
                 yield finding_for("spring.jump", f"springs.{name}", at=at.dial.at(int(jumps[0])))
@@ -282,7 +302,7 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
     # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
     sound = sound_positions(status)
     with np.errstate(all="ignore"):
-        top = _Tops(found, sound, jumps.sides(run, found))
+        top = _Tops(found, sound, jumps.sides(run, found), scales_of(run))
         yield from _effort_figures(run.system, found, top)
         yield from _reaction_figures(run.system, arrays, top)
         if rubbing(run.system):
@@ -292,10 +312,10 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
         yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
         if found.ideal is not None:
             yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
-            yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST)
+            yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST, top.scales)
         if near and (back := reverse_figure(run, near.back, _states(found, near))):
             yield back
-        residual = balance(arrays) if np.any(counted) else None
+        residual = balance(arrays, top.scales.floor("W")) if np.any(counted) else None
         yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
     rounds = int(np.max(arrays["friction_iterations"]))
     yield Figure("friction_iterations", "friction iterations", rounds, aspect="maximum")
@@ -312,9 +332,10 @@ class _Tops(NamedTuple):
     found: Positions
     sound: NDArray[np.intp]
     sides: Positions | None
+    scales: Scales
 
-    def of(self, course: Callable[[Arrays], NDArray[np.float64]]) -> tuple[float, str]:
-        """The largest of a course, (position,), and its place."""
+    def of(self, course: Callable[[Arrays], NDArray[np.float64]], unit: str) -> tuple[float, str]:
+        """The largest of a course, (position,), in a unit, and its place."""
         own = course(self.found.arrays)
         k = int(self.sound[np.argmax(own[self.sound])])
         if self.sides is not None:
@@ -322,14 +343,14 @@ class _Tops(NamedTuple):
             beside = np.where(solved, course(self.sides.arrays), -np.inf)
             if np.max(beside) > own[k]:
                 return float(np.max(beside)), f"at {self.sides.dial.at(int(np.argmax(beside)))}"
-        return float(own[k]), f"at {self.found.dial.at(k)}"
+        return float(own[k]), extreme_place(own[self.sound], f"at {self.found.dial.at(k)}", self.scales.floor(unit))
 
 
 def _effort_figures(system: System, found: Positions, top: _Tops) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
         for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)) if len(top.sound) else ():
-            value, at = top.of(lambda arrays, i=i, sign=sign: sign * arrays["drive_effort"][i])  # type: ignore[misc]
+            value, at = top.of(lambda arrays, i=i, sign=sign: sign * arrays["drive_effort"][i], unit)  # type: ignore[misc]
             yield Figure(f"{name}.effort_{end}", subject, sign * value, unit, aspect, at)
         yield Figure(f"{name}.effort_rms", subject, found.means.drive_effort_rms[i], unit, "RMS")
 
@@ -340,14 +361,14 @@ def _friction_figures(run: Run, found: Positions, near: near_locking.Locking | N
     if found.method.margin_up_to:
         margin = np.where(valid, found.arrays["locking_margin"], np.nan)
         yield near_locking.least_margin("locking_margin", "locking margin", margin, found.dial, TIMES)
-    yield from near.figures(run, found.dial) if near else ()
+    yield from near.figures(run, found.dial, found.arrays["locking_margin"]) if near else ()
     means = found.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
     if means.supposed > 0:
         off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
     if len(top.sound):
-        lost, at = top.of(lambda arrays: np.sum(arrays["friction_power"], axis=0))
+        lost, at = top.of(lambda arrays: np.sum(arrays["friction_power"], axis=0), "W")
         yield Figure("friction_power_max", "friction power", lost, "W", "maximum", at)
 
 
@@ -365,15 +386,11 @@ def _reaction_figures(system: System, arrays: Arrays, top: _Tops) -> Iterator[Fi
     loads = [("reaction", "reaction_force", "N")]
     if system.mechanism.space == "spatial":
         loads.append(("reaction moment", "reaction_moment", "N m"))
-    rounding = {variable: _rounding(arrays, variable) for _, variable, _ in loads}
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         for what, variable, unit in loads if len(top.sound) else ():
-            size, at = top.of(lambda arrays, of=variable, i=i: np.sqrt(np.sum(arrays[of][i] ** 2, axis=0)))  # type: ignore[misc]
-            key, planar = f"{name}.{what.replace(' ', '_')}_max", system.mechanism.space == "planar"
-            if size > rounding[variable] or (planar and size == 0):
-                yield Figure(key, f"{what} of {name}", size, unit, "maximum", at)
-            elif planar:  # rounding has no place
-                yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
+            size, at = top.of(lambda arrays, of=variable, i=i: np.sqrt(np.sum(arrays[of][i] ** 2, axis=0)), unit)  # type: ignore[misc]
+            if size > top.scales.floor(unit) or system.mechanism.space == "planar":
+                yield Figure(f"{name}.{what.replace(' ', '_')}_max", f"{what} of {name}", size, unit, "maximum", at)
         if not PAIRS[kind].guided:
             continue
         valid = arrays["status"] != Status.CONTACT_LOST
@@ -381,11 +398,6 @@ def _reaction_figures(system: System, arrays: Arrays, top: _Tops) -> Iterator[Fi
         if np.any(np.isfinite(slide)):
             stroke, note = np.nanmax(slide) - np.nanmin(slide), positions_told(valid)
             yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
-
-
-def _rounding(arrays: Arrays, variable: str) -> float:
-    """What is no more than rounding of the reactions or of the drive."""
-    return 1e-11 * max(peak(arrays[variable]), peak(arrays["drive_effort"]), 1e-300)
 
 
 def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
@@ -431,16 +443,16 @@ def _states(found: Positions, near: near_locking.Locking) -> NDArray[np.int8]:
 BALANCED = ("power_residual", "drive_power", "useful_power", "friction_power", "spring_power")
 
 
-def balance(arrays: Arrays) -> float:
-    """Largest power residual over the largest power that any driver, or else any load, has."""
+def balance(arrays: Arrays, floor: float) -> float:
+    """Largest power residual over the largest power that any driver, or else any load, has; 0 where all are rounding.
+
+    floor: power that is rounding, W.
+    """
     residual, *powers = (peak(arrays[name]) for name in BALANCED if name in arrays)
     highest = max(powers)
+    if max(residual, highest) <= floor:
+        return 0.0
     return residual / highest if highest > 0 else residual
-
-
-def peak(values: NDArray[np.float64]) -> float:
-    """Largest magnitude, without a copy of the values."""
-    return float(max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)))
 
 
 def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, inputs, references, scene_of, spring_units
+from trunnion.cycle.scales import largest
+from trunnion.cycle.summary import effort_units, inputs, member_units, references, scene_of
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.course import OVER_TIME, Courses
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
@@ -26,10 +27,11 @@ from trunnion.dynamics.touching import SLOWEST
 from trunnion.errors import Finding, Status
 from trunnion.joints.contact import restitution_of
 from trunnion.results import variables as results
-from trunnion.results.attributes import cited, encoded, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, encoded, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
+from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 
@@ -42,14 +44,14 @@ Array = NDArray[np.float64]
 
 # what there is beside the variables of a cycle
 MOTION: dict[str, Variable] = {
-    "drive_coordinate": Variable(("driver", "time"), "rad", "coordinate of the driver, whole turns included"),
-    "drive_rate": Variable(("driver", "time"), "rad/s", "rate of the driver's coordinate"),
+    "drive_coordinate": Variable(("driver", "time"), "coordinate", "coordinate of the driver, whole turns included"),
+    "drive_rate": Variable(("driver", "time"), "rate", "rate of the driver's coordinate"),
     "work_drive": Variable(("time",), "J", "work of the drivers since the start"),
     "work_loads": Variable(("time",), "J", "work of the loads since the start, positive into the mechanism"),
     "work_springs": Variable(("time",), "J", "work of springs and dampers since the start, likewise"),
     "work_friction": Variable(("time",), "J", "work lost to friction since the start"),
     "work_clutch": Variable(("time",), "J", "work lost in the clutch of a motor since the start"),
-    "rotor_speed": Variable(("driver", "time"), "rad/s", "speed of the motor's rotor behind its clutch"),
+    "rotor_speed": Variable(("driver", "time"), "rate", "speed of the motor's rotor behind its clutch"),
     "kinetic_energy": Variable(("time",), "J", "kinetic energy of the links"),
     "potential_energy": Variable(("time",), "J", "potential energy of the links in the field of gravity"),
     "energy_residual": Variable(("time",), "J", "works less changes of energy; 0 but for the errors of integration"),
@@ -118,7 +120,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
     solution, books, impacts = found.solution, found.books, found.impacts
     run = stated or motion.run
     _note_switches(motion, solution)
-    mechanism, system = run.system.mechanism, run.system
+    mechanism, system, scales = run.system.mechanism, run.system, largest(run, books.arrays)
     findings = [
         *motion_findings(motion, solution, run, impacts),
         *_unbalanced(found),
@@ -128,12 +130,10 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
         {
             **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
             **cited(references(mechanism)),
-            "driver_units": effort_units(system),
-            "spring_units": spring_units(system),
             "free_drivers": _shown(motion, run),
             "findings": finding_rows(findings),
             **(_named_contacts(motion, impacts) if stated else {}),
-            "summary": figure_rows(_summary(motion, found, run)),
+            **scales.summary(_summary(motion, found, run, scales)),
             "inputs": inputs(mechanism),
             "scene": scene_of(run),
             "events": [[one.kind, one.of, one.figure if np.isfinite(one.figure) else None, one.unit]
@@ -143,7 +143,9 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
 
     def build() -> xr.Dataset:
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
-        given = described(books.arrays, known) | described(_own(motion, run, solution, books, found.residual), MOTION)
+        units = member_units(system)
+        given = described(books.arrays, known, units)
+        given |= described(_own(motion, run, solution, books, found.residual), MOTION, units)
         labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
         coordinates = {"time": books.time}
         if stated is not None and books.touches is not None:
@@ -383,7 +385,7 @@ def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[
 # ---- summary --------------------------------------------------------------------------------------------------
 
 
-def _summary(motion: FreeMotion, own: Found, run: Run) -> Sequence[Figure]:
+def _summary(motion: FreeMotion, own: Found, run: Run, scales: Scales) -> Sequence[Figure]:
     """The figures that one looks at first."""
     found: list[Figure] = []
     solution, books, impacts, names = own.solution, own.books, own.impacts, list(run.system.mechanism.drivers)
@@ -410,7 +412,7 @@ def _summary(motion: FreeMotion, own: Found, run: Run) -> Sequence[Figure]:
         return found
     done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
     for key, works in _works(solution, books).items():
-        if np.nanmax(np.abs(works)) > ROUNDING * own.turned_over:
+        if np.nanmax(np.abs(works)) > scales.floor("J"):
             found.append(Figure(f"work_{key}", WORDS[key], works[done], "J"))
     worst = float(np.nanmax(np.abs(own.residual)))
     found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))

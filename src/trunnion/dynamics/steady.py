@@ -15,9 +15,10 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.steady_cycle import INDIFFERENT, SteadyCycle, refuse_unsteady, steady_cycle
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import encoded, figure_rows, finding_rows, findings_of, summary_of
+from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
+from trunnion.results.scales import scales_in
 from trunnion.results.sentences import finding_for
 from trunnion.solve.run import prepare
 
@@ -52,7 +53,7 @@ def steady(
     attributes = encoded({
         **cycle.attrs,
         "findings": finding_rows(findings),
-        "summary": figure_rows([*_figures(found, each, missing), *summary_of(cycle)]),
+        **scales_in(cycle).summary([*_figures(found, each, missing), *summary_of(cycle)]),
         "steady": 1,
     })  # fmt: skip
     return Result(attributes, lambda: cycle.dataset.assign_attrs(attributes))

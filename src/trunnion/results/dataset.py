@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,15 +15,27 @@ from trunnion.results.attributes import encoded
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["TIME", "Variable", "dataset_of", "described", "driven"]
+__all__ = [
+    "TIME",
+    "UNITS_OF_EACH",
+    "MemberUnits",
+    "Variable",
+    "dataset_of",
+    "described",
+    "driven",
+    "unit_of",
+    "units_along",
+    "with_variables",
+]
 
 
 @dataclass(frozen=True)
 class Variable:
     """Dimensions, unit and long name of a variable of a result, and what its numbers are kept as.
 
-    units: or a word for one that only a result knows, as "parameter" for that of its parameters. Of what not every
-    result has: part, such as "errors" of a mechanism with any; space, the only one, "planar" or "spatial".
+    units: or a word for one that only a result knows, as "parameter" for that of its parameters, see `described`. Of
+    what not every result has: part, such as "errors" of a mechanism with any; space, the only one, "planar" or
+    "spatial".
     """
 
     dims: tuple[str, ...]
@@ -44,23 +56,77 @@ class Variable:
 
 
 TIME = Variable(("position",), "s", "time from the start of the cycle")
+UNITS_OF_EACH = "units_of_each"  # attribute of a variable: the coordinate that has the unit of each member
+
+
+class MemberUnits(NamedTuple):
+    """The units of the members of a dimension, as of the efforts of the drivers."""
+
+    dim: str
+    each: Sequence[str]
+
+    @property
+    def text(self) -> str:
+        """The unit of all, or the units of any: "N m or N"."""
+        return " or ".join(dict.fromkeys(self.each))
 
 
 def described(
-    arrays: Mapping[str, ArrayLike], known: Mapping[str, Variable], units: Mapping[str, str] | None = None
+    arrays: Mapping[str, ArrayLike],
+    known: Mapping[str, Variable],
+    units: Mapping[str, str | MemberUnits] | None = None,
 ) -> dict[str, xr.Variable]:
-    """The arrays with dimensions, units and long names. units: for the words that stand for one."""
+    """Describe arrays by their dimensions, units and long names.
+
+    Parameters
+    ----------
+    arrays
+        By their names.
+    known
+        What describes each.
+    units
+        For each word in place of a unit, the unit. Where the members of a dimension have different ones, a variable
+        names them all and, in its attribute `units_of_each`, the coordinate that has that of each: `effort_unit` for
+        the word "effort".
+
+    Returns
+    -------
+    dict
+        The arrays as variables, and these coordinates.
+    """
     import xarray as xr
 
-    return {
-        name: xr.Variable(
-            (one := known[name]).dims,
-            np.asarray(array),
-            {"units": (units or {}).get(one.units, one.units), "long_name": one.long_name},
-            fastpath=True,  # else xarray loads dask, where it is installed, to see whether the array is one of its own
-        )
-        for name, array in arrays.items()
-    }
+    found: dict[str, xr.Variable] = {}
+    for name, array in arrays.items():
+        one = known[name]
+        unit = (units or {}).get(one.units, one.units)
+        attributes = {"units": unit, "long_name": one.long_name}
+        if isinstance(unit, MemberUnits):
+            attributes["units"] = unit.text
+            if len(set(unit.each)) > 1:
+                attributes[UNITS_OF_EACH] = coordinate = f"{one.units}_unit"
+                meaning = {"long_name": f"unit of the {one.units.replace('_', ' ')}"}
+                found[coordinate] = xr.Variable((unit.dim,), np.asarray(unit.each, dtype=str), meaning)
+        # without fastpath xarray loads dask, where it is installed, to see whether the array is one of its own
+        found[name] = xr.Variable(one.dims, np.asarray(array), attributes, fastpath=True)
+    return found
+
+
+def unit_of(array: xr.DataArray, index: Sequence[int] = ()) -> str:
+    """The unit of the part of a variable at an index along its first dimensions; of several units all."""
+    each = array.coords.get(array.attrs.get(UNITS_OF_EACH))
+    if each is None:
+        return str(array.attrs["units"])
+    if each.ndim == 0:
+        return str(each.values)
+    along = array.dims.index(each.dims[0])
+    return str(each.values[index[along]] if along < len(index) else array.attrs["units"])
+
+
+def units_along(array: xr.DataArray, dim: str) -> list[str]:
+    """The unit of each member of a variable along a dimension."""
+    before = array.dims.index(dim) * (0,)
+    return [unit_of(array, (*before, member)) for member in range(array.sizes[dim])]
 
 
 def driven(time: NDArray[np.float64], values: ArrayLike, unit: str, of: str) -> dict[str, xr.Variable]:
@@ -110,7 +176,18 @@ def dataset_of(
         names["position"] = drive
     # those without an index go in at once: to add them afterwards takes as long as all else
     plain = {name: one for name, one in (along or {}).items() if isinstance(one, xr.Variable) and name not in one.dims}
-    coordinates = xr.Coordinates(names | plain, indexes)
-    found = xr.Dataset(variables, coordinates, {"kind": kind, **encoded(attributes)})
+    units = {name: variables[name] for name in _unit_coordinates(variables)}
+    coordinates = xr.Coordinates(names | plain | units, indexes)
+    rest = {name: one for name, one in variables.items() if name not in units}
+    found = xr.Dataset(rest, coordinates, {"kind": kind, **encoded(attributes)})
     indexed = {name: one for name, one in (along or {}).items() if name not in plain}
     return found.assign_coords(indexed) if indexed else found
+
+
+def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> xr.Dataset:
+    """A result with more variables of `described`."""
+    return result.assign(variables).set_coords(_unit_coordinates(variables))
+
+
+def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> set[str]:
+    return {one.attrs[UNITS_OF_EACH] for one in variables.values() if UNITS_OF_EACH in one.attrs}

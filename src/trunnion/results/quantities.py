@@ -67,12 +67,11 @@ def joined(text: str, shown: str) -> str:
 def parts(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
     """A number and its unit for a line of plain text or a table of the terminal: ("18.75", "kN m").
 
-    No thin spaces and no zeros at the end, so that it can be searched for and copied; below 10⁻¹² of the unit it is
-    left in the unit itself, for it is no more than rounding.
+    No thin spaces and no zeros at the end, so that it can be searched for and copied.
     """
     if unit == "mm" and abs(value) < 0.01:
         value, unit = value * 1e-3, "m"
-    factor, shown = (1.0, unit) if unit != "rad" and 0 < abs(value) < 1e-12 else prefixed(value, unit)
+    factor, shown = prefixed(value, unit)
     text = number(value * factor, digits).replace("\u202f", "")
     if "." in text and "×" not in text:
         text = text.rstrip("0").rstrip(".")

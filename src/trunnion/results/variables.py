@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,12 +52,16 @@ VARIABLES: dict[str, Variable] = {
         ("joint", "axis"), "N m", "friction moment on the second link, about the middle of the bearing", space="spatial"
     ),
     "friction_power": Variable(("joint",), "W", "power lost to friction"),
-    "drive_effort": Variable(("driver",), "N m", "drive effort on the second link by the first"),
-    "drive_effort_lower": Variable(("driver",), "N m", "least drive effort where a friction is an interval"),
-    "drive_effort_upper": Variable(("driver",), "N m", "largest drive effort where a friction is an interval"),
+    "drive_effort": Variable(("driver",), "effort", "drive effort on the second link by the first"),
+    "drive_effort_lower": Variable(("driver",), "effort", "least drive effort where a friction is an interval"),
+    "drive_effort_upper": Variable(("driver",), "effort", "largest drive effort where a friction is an interval"),
     "drive_power": Variable(("driver",), "W", "power of the driver"),
-    "spring_force": Variable(("spring",), "N", "pull of the spring and its damper; N m in a joint that turns"),
-    "spring_elongation": Variable(("spring",), "m", "length beyond the free length; angle, rad, in a joint that turns"),
+    "spring_force": Variable(
+        ("spring",), "spring_force", "pull of the spring and its damper; a torque in a joint that turns"
+    ),
+    "spring_elongation": Variable(
+        ("spring",), "spring_elongation", "length beyond the free length; an angle in a joint that turns"
+    ),
     "spring_power": Variable(("spring",), "W", "power of the spring and its damper, positive into the mechanism"),
     "damping_power": Variable(("spring",), "W", "power lost in the spring's damper"),
     "gear_torque": Variable(("gear",), "N m", "torque of the gear pair in its second joint, on its second link"),
@@ -107,7 +111,9 @@ VARIABLES: dict[str, Variable] = {
     "reaction_force_change": Variable(
         ("joint", "axis"), "N", "reaction less that of the ideal mechanism", part="errors"
     ),
-    "drive_effort_change": Variable(("driver",), "N m", "drive effort less that of the ideal mechanism", part="errors"),
+    "drive_effort_change": Variable(
+        ("driver",), "effort", "drive effort less that of the ideal mechanism", part="errors"
+    ),
     "friction_power_change": Variable(
         ("joint",), "W", "power lost to friction less that of the ideal mechanism", part="errors"
     ),
@@ -133,7 +139,7 @@ CYCLE: dict[str, Variable] = {
     "efficiency_error": Variable(
         (), "1", "how far the errors of the integrals and pins that do not settle may have moved it"
     ),
-    "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
+    "drive_effort_rms": Variable(("driver",), "effort", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
     "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
     "friction_power_mean": Variable(("joint",), "W", "mean power lost to friction"),
@@ -226,18 +232,20 @@ def dataset(
     along: Mapping[str, xr.Variable],
     means: CycleMeans,
     attributes: Mapping[str, Any],
+    units: Mapping[str, MemberUnits],
     ideal: CycleMeans | None = None,
     kept: Collection[str] | None = None,
     dtype: str = "float64",
 ) -> xr.Dataset:
-    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; kept: variables of
-    every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
-    taken out of their dict one by one, so that both need not be in memory.
+    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; units: those of
+    drivers and springs; kept: variables of every position that it has, all if not given; dtype: of their floats. Where
+    that is another than theirs, arrays are taken out of their dict one by one, so that both need not be in memory.
     """
     known = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]
     own = {name: arrays[name] if dtype == "float64" else _as(arrays.pop(name), dtype) for name in names}
-    found = described(own, known) | described({name: getattr(means, name) for name in CYCLE}, CYCLE)
+    found = described(own, known, units)
+    found |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:
         found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
     return dataset_of("cycle", found, labels, attributes, along)

@@ -14,12 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.transmission import pressure_angles
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
 from trunnion.results.figure import Figure
+from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
@@ -403,7 +405,7 @@ def all_instant_centres(walk: Forward) -> dict[tuple[str, str], tuple[Array, Arr
 def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[Figure]:
     """The figures that one looks at first."""
     run = _planar(mechanism)
-    found = design(mechanism, steps)
+    found, scales = design(mechanism, steps), scales_of(run)
     driver = next(iter(mechanism.drivers), "")
     turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
@@ -414,7 +416,7 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
     for name, angle in found.transmission_angle.items():
         subject = f"transmission angle of {name}"
         figures.append(Figure(f"{name}.transmission_angle", subject, angle * 180 / np.pi, "°", "minimum"))
-    figures += [_pressure(name, extremes, scale, unit) for name, extremes in found.pressure_angle.items()]
+    figures += [_pressure(name, extremes, scale, unit, scales) for name, extremes in found.pressure_angle.items()]
     for name, places in found.dead_centres.items():
         if places:
             text = ", ".join(f"{place * scale:.6g}" for place in places)
@@ -434,30 +436,29 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
         subject = f"flywheel for a fluctuation of {fluctuation:g}"
         figures.append(Figure("flywheel", subject, found.flywheel(fluctuation), "kg m^2"))
     if any(PAIRS[kind].turns and mechanism.fixed_link in links for kind, links in run.system.joints.values()):
-        figures += _balanced(run)
-    return figures
+        figures += _balanced(run, scales)
+    return scales.of_figures(figures)
 
 
-def _pressure(name: str, extremes: Extremes, scale: float, unit: str) -> Figure:
+def _pressure(name: str, extremes: Extremes, scale: float, unit: str, scales: Scales) -> Figure:
     """The extremes of a pressure angle, in degrees, with their places; scale, unit: of the places."""
     low, high = np.degrees(extremes.least), np.degrees(extremes.largest)
     key, subject = f"{name}.pressure_angle", f"pressure angle of {name}"
-    if not high - low > 1e-9:
-        return Figure(key, subject, low, "°", place="everywhere")
+    if not high - low > scales.floor("°"):
+        return Figure(key, subject, low, "°", place=EVERYWHERE)
     gap = "" if unit == "°" else " "
     places = " and ".join(f"{place * scale:.5g}{gap}{unit}" for place in (extremes.at_least, extremes.at_largest))
     return Figure(key, subject, f"{low:.6g} … {high:.6g}", "°", place=f"at {places}")
 
 
-def _balanced(run: Run) -> Iterator[Figure]:
+def _balanced(run: Run, scales: Scales) -> Iterator[Figure]:
     """The counterweights; without mass there is nothing to balance."""
     weights, left = counterweights(run)
     for weight in weights if np.isfinite(left) else ():
-        x, y = (0.0 if abs(part) < 1e-9 * math.hypot(weight.x, weight.y) else part for part in (weight.x, weight.y))
+        x, y = scales.zeroed(np.array([weight.x, weight.y]), "kg m")
         place = f"({x:.5g}, {y:.5g})"
         subject = f"counterweight on {weight.link}, mass × position in its frame"
         yield Figure(f"{weight.link}.counterweight", subject, place, "kg m")
     if np.isfinite(left):
-        yield Figure(
-            "shaking_left", "residual shaking force with counterweights", left if left > 1e-12 else 0.0, "of its RMS"
-        )
+        left = float(scales.zeroed(np.array(left), "1"))
+        yield Figure("shaking_left", "residual shaking force with counterweights", left, "of its RMS")

@@ -10,15 +10,16 @@ import numpy as np
 from trunnion.errors import Severity
 from trunnion.joints.pairs import GUIDED
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.attributes import attribute, findings_of
+from trunnion.results.attributes import findings_of
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import quantity
+from trunnion.results.scales import without_noise
 from trunnion.solve.run import prepare
 from trunnion.studio.ways import ways
 
 __all__ = ["tolerated"]
 
 MOST = 4  # strokes that are told
-ROUNDING = 1e-10  # of a value: a smaller change of it is none
 
 
 def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
@@ -31,14 +32,11 @@ def tolerated(mechanism: Mechanism, steps: int) -> dict[str, Any]:
     told = dict(_measures(mechanism, steps))
     if not told:
         return {"rows": [], "why": []}
-    study = tolerance(mechanism, list(told), methods=("linear",), steps=steps, jobs=1, engine="numpy")
-    units = attribute(study, "measure_units")
+    study = without_noise(tolerance(mechanism, list(told), methods=("linear",), steps=steps, jobs=1, engine="numpy"))
+    units = units_along(study["nominal"], "measure")
     values = (study[name].values for name in ("nominal", "worst_case_lower", "worst_case_upper", "deviation_linear"))
     rows = []
     for label, unit, nominal, lower, upper, deviation in zip(told.values(), units, *values, strict=True):
-        lower, upper, deviation = (
-            one if abs(one) > ROUNDING * abs(nominal) else 0.0 for one in (lower, upper, deviation)
-        )
         even = np.isclose(-lower, upper, rtol=1e-3)
         worst = f"± {quantity(float(upper), unit)}" if even else f"{_signed(lower, unit)} / {_signed(upper, unit)}"
         texts = [quantity(float(nominal), unit), worst, quantity(float(deviation), unit)]

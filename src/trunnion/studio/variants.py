@@ -13,8 +13,9 @@ import numpy as np
 
 from trunnion.errors import MechanismError, Status
 from trunnion.model.units import unit
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, quantity
+from trunnion.results.scales import without_noise
 from trunnion.solve.system import rubbing
 from trunnion.studio.loaded import Loaded
 from trunnion.studio.margin import margin_of
@@ -73,7 +74,8 @@ def _signed(value: float) -> str:
 
 def figures(result: xr.Dataset, rubs: bool, ways: Sequence[Way] = ()) -> Iterator[Figure]:
     """Peak effort of each driver, efficiency, least locking margin, largest reaction, mean friction power, strokes."""
-    units = attribute(result, "driver_units")
+    result = without_noise(result)
+    units = units_along(result["drive_effort"], "driver")
     for driver, of in zip(names(result, "driver"), units, strict=False):
         effort = result["drive_effort"].sel(driver=driver).values
         yield Figure(f"peak {'force' if of == 'N' else 'torque'}, drive {driver}", _most(np.abs(effort)), of)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
+from trunnion.results.dataset import unit_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,4 +51,4 @@ def column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...])
         return "", "", lambda window: np.zeros(0)
     array = result[variable]
     values = array.values[index]
-    return name, str(array.attrs["units"]), lambda window: values[window]
+    return name, unit_of(array, index), lambda window: values[window]

@@ -92,10 +92,7 @@ def rest(result: xr.Dataset) -> list[Column]:
         if not dim:
             found.append(column(result, variable, name, ()))
         else:
-            own = attribute(result, "driver_units") if variable == "drive_effort_reverse" else []
-            for i, of in enumerate(result[dim].values):
-                title, unit, values = column(result, variable, f"{of}.{name}", (i,))
-                found.append((title, own[i] if own else unit, values))
+            found += [column(result, variable, f"{of}.{name}", (i,)) for i, of in enumerate(result[dim].values)]
     found += _locking_state(result)
     if "link_error" in result:
         for i, link in enumerate(result["link"].values):
@@ -114,11 +111,8 @@ def locking(result: xr.Dataset) -> list[Column]:
     if "drive" in result.coords:
         found.append(("drive", str(result["drive"].attrs["units"]), lambda window: result["drive"].values[window]))
     found += [one for one in rest(result) if one[0] == "locking_margin" or one[0].endswith(".critical_multiple")]
-    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
-        for end in ("", "_reverse"):
-            if f"drive_effort{end}" in result:
-                values = column(result, f"drive_effort{end}", "", (i,))[2]
-                found.append((f"{driver}.effort{end}", unit, values))
+    for i, driver in enumerate(result["driver"].values):
+        found += [column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,)) for end in ("", "_reverse")]
     wanted = ("efficiency_instant", "efficiency_reverse_instant", "other_solutions", "power_delivered_reverse")
     more = ("power_given_reverse", "holding_multiple")
     found += [column(result, name, name, ()) for name in (*wanted, *more) if name in result]
@@ -135,10 +129,8 @@ def _locking_state(result: xr.Dataset) -> list[Column]:
 
 def _measures(result: xr.Dataset) -> list[Column]:
     """The model's measures, by their names."""
-    return [
-        (str(result["measure"].values[i]), unit, column(result, "measure_value", "", (i,))[2])
-        for i, unit in enumerate(attribute(result, "measure_units"))
-    ]
+    names = result["measure"].values if "measure" in result.dims else ()
+    return [column(result, "measure_value", str(name), (i,)) for i, name in enumerate(names)]
 
 
 def _planar_joint(result: xr.Dataset, i: int, joint: str, kind: str) -> list[Column]:
@@ -214,24 +206,18 @@ def _spatial_link(result: xr.Dataset, i: int, link: str) -> list[Column]:
 
 
 def _drivers(result: xr.Dataset) -> list[Column]:
-    """Effort of each driver with the ends of its interval, in the unit of the driver."""
-    found: list[Column] = []
-    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
-        for end in ("", "_lower", "_upper"):
-            name, _, values = column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,))
-            found.append((name, unit, values))
-        if "drive_effort_change" in result:
-            name, _, values = column(result, "drive_effort_change", f"{driver}.effort_change", (i,))
-            found.append((name, unit, values))
-    return found
+    """Effort of each driver with the ends of its interval, and its change by errors."""
+    return [
+        column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,))
+        for i, driver in enumerate(result["driver"].values)
+        for end in ("", "_lower", "_upper", "_change")
+    ]
 
 
 def _springs(result: xr.Dataset) -> list[Column]:
     found: list[Column] = []
     for i, spring in enumerate(result["spring"].values if "spring" in result.dims else ()):
-        for variable, unit in zip(("force", "elongation"), attribute(result, "spring_units")[i], strict=True):
-            name, _, values = column(result, f"spring_{variable}", f"{spring}.{variable}", (i,))
-            found.append((name, unit, values))
+        found += [column(result, f"spring_{name}", f"{spring}.{name}", (i,)) for name in ("force", "elongation")]
         found.append(column(result, "spring_power", f"{spring}.spring_power", (i,)))
         found.append(column(result, "damping_power", f"{spring}.damping_power", (i,)))
     return found

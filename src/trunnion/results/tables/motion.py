@@ -30,14 +30,11 @@ ENERGY = (
 def times(result: xr.Dataset) -> list[Column]:
     """What a cycle has at a position, with coordinates and rates of the drivers, works and energies."""
     found = cycle.positions(result)
-    for i, (driver, unit) in enumerate(zip(result["driver"].values, attribute(result, "driver_units"), strict=True)):
-        moves = "rad" if unit == "N m" else "m"
-        for variable, name, own in (("drive_coordinate", "coordinate", moves), ("drive_rate", "rate", f"{moves}/s")):
-            title, _, values = column(result, variable, f"{driver}.{name}", (i,))
-            found.append((title, own, values))
+    for i, driver in enumerate(result["driver"].values):
+        for variable, name in (("drive_coordinate", "coordinate"), ("drive_rate", "rate")):
+            found.append(column(result, variable, f"{driver}.{name}", (i,)))
         if "rotor_speed" in result and np.any(np.isfinite(result["rotor_speed"].values[i])):
-            _, _, values = column(result, "rotor_speed", f"{driver}.rotor_speed", (i,))
-            found.append((f"{driver}.rotor_speed", f"{moves}/s", values))
+            found.append(column(result, "rotor_speed", f"{driver}.rotor_speed", (i,)))
     if "work_clutch" in result:
         found.append(column(result, "work_clutch", "work_clutch", ()))
     if "contact" in result.dims:

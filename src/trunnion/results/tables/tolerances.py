@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import UNITS_OF_EACH, units_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,16 +42,16 @@ SHARES = (
 
 
 def _units(result: xr.Dataset) -> list[str]:
-    return [str(unit) for unit in attribute(result, "measure_units")]
+    return units_along(result["nominal"], "measure")
 
 
 def _course_units(result: xr.Dataset) -> list[str]:
     """Of the course of each measure; that of a dead centre is no angle of the drive."""
-    return [str(unit) for unit in attribute(result, "curve_units") or _units(result)]
+    return units_along(result["curve"], "measure")
 
 
 def _parameter_units(result: xr.Dataset) -> list[str]:
-    return [str(unit) for unit in attribute(result, "parameter_units")]
+    return units_along(result["parameter_nominal"], "parameter")
 
 
 def _common(units: list[str]) -> str:
@@ -59,8 +60,8 @@ def _common(units: list[str]) -> str:
 
 
 def _stated(one: Any) -> str:
-    """The unit that a variable names."""
-    return str(one.attrs.get("units", ""))
+    """The unit of all of a variable; empty if there are several."""
+    return "" if UNITS_OF_EACH in one.attrs else str(one.attrs.get("units", ""))
 
 
 def _by(unit: str, other: str) -> str:

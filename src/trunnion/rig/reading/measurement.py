@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding
 from trunnion.model.units import Dimension
-from trunnion.results.attributes import encoded, finding_rows
-from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.attributes import finding_rows
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
 from trunnion.rig.reading.repeated_steps import LeftOfSteps
 
 if TYPE_CHECKING:
@@ -32,9 +32,9 @@ __all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "d
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
 VARIABLES = {
-    "mean": Variable(COURSE, "of the channel", "mean over the turns"),
-    "scatter": Variable(COURSE, "of the channel", "standard deviation between turns"),
-    "uncertainty": Variable(COURSE, "of the channel", "its standard uncertainty"),
+    "mean": Variable(COURSE, "channel", "mean over the turns"),
+    "scatter": Variable(COURSE, "channel", "standard deviation between turns"),
+    "uncertainty": Variable(COURSE, "channel", "its standard uncertainty"),
     "turns": Variable(COURSE, "1", "turns with a value at the position"),
     "set": Variable(("condition", "setting"), "SI", "what was set"),
     "speed": Variable(("condition",), "rad/s", "mean speed of the driver"),
@@ -257,10 +257,8 @@ def dataset(measurement: Measurement) -> xr.Dataset:
     values = np.array([[one.values.get(name, np.nan) for name in names] for one in conditions])
     speeds = np.array([one.speed for one in conditions])
     arrays = {**courses, "set": values.reshape(len(conditions), len(names)), "speed": speeds}
-    variables = described(arrays, VARIABLES)
-    units = encoded({"member_units": [first[name].unit for name in channels]})
-    for name in ("mean", "scatter", "uncertainty"):
-        variables[name].attrs |= units
+    units = {"channel": MemberUnits("channel", [first[name].unit for name in channels])}
+    variables = described(arrays, VARIABLES, units)
     labels = {"condition": [one.name for one in conditions], "channel": channels, "setting": names}
     attributes = {
         "name": measurement.name,

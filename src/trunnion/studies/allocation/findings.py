@@ -9,7 +9,7 @@ import numpy as np
 
 from trunnion.dynamics.measured import slow_motions
 from trunnion.errors import Finding, Severity
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, share_of
@@ -188,7 +188,7 @@ def contradicted(found: Allocated, known: xr.Dataset) -> dict[str, str]:
 
 def _searched(found: Allocated, known: xr.Dataset, otherwise: Mapping[str, str]) -> Iterator[Finding]:
     """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
-    units = attribute(known, "measure_units")
+    units = units_along(known["nominal"], "measure")
     for k, of in enumerate(found.study.linear.measures):
         lower, upper = limits(of)
         low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])

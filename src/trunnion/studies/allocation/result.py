@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Severity
 from trunnion.model.prices import Price
-from trunnion.results.attributes import attribute, encoded, figure_rows, finding_rows, findings_of, summary_of
-from trunnion.results.dataset import Variable, described
+from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
+from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
+from trunnion.results.scales import scales_in
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation import findings
 from trunnion.studies.allocation.outcome import Allocated
@@ -40,7 +41,7 @@ VARIABLES: dict[str, Variable] = {
     "used": Variable(M, "1", "largest share of its limits that the measure uses, by the criterion"),
     "used_curve": Variable(("measure", "position"), "1", "share of its limits that the measure uses, by the criterion"),
     "yield_margin": Variable(M, "1", "margin of the limits that a required yield asks for, in standard deviations"),
-    "saving": Variable(M, "1/", "cost saved by limits one unit wider at every position"),
+    "saving": Variable(M, "saving", "cost saved by limits one unit wider at every position"),
     "cost_total": Variable((), "1", "cost of all tolerances found"),
     "cost_total_before": Variable((), "1", "cost of all tolerances as stated"),
     "cost_bound": Variable((), "1", "lower bound of the cost of feasible tolerances, to first order"),
@@ -77,8 +78,9 @@ def stated_cost(found: Allocated) -> float:
 def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     """The result with the numbers of the allocation. known: `tolerance` of the mechanism with the tolerances found."""
     arrays = {**_bought(found, known), **_rows(found, known), **_whole(found, known.sizes["measure"])}
-    units = attribute(known, "parameter_units")
-    variables = described(arrays, VARIABLES, {"parameter": units[0] if len(set(units)) == 1 else "", "1/": ""})
+    parameters = MemberUnits("parameter", units_along(known["parameter_nominal"], "parameter"))
+    saving = MemberUnits("measure", [f"1/({unit})" for unit in units_along(known["nominal"], "measure")])
+    variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
     # the criterion says what is to be kept
     kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
     own = list(findings.findings_of(found, known))
@@ -90,11 +92,11 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
         "choices": found.way,
         "proven": int(found.answer.proven and not findings.contradicted(found, known)),
         "prices": [_plain(price) for price in found.prices.values()],
-        "summary": figure_rows([*findings.summary(found, known, arrays), *summary_of(known)]),
+        **scales_in(known).summary([*findings.summary(found, known, arrays), *summary_of(known)]),
         "findings": finding_rows([*own, *kept]),
         "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
     }
-    return known.assign(variables).assign_attrs(encoded(attributes))
+    return with_variables(known, variables).assign_attrs(encoded(attributes))
 
 
 def _plain(price: Price) -> dict[str, Any]:

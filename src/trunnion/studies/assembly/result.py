@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.summary import inputs
+from trunnion.cycle.summary import inputs, member_units
 from trunnion.errors import Coded, Finding
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
+from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
+from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.system import System, Values
 
@@ -24,7 +25,6 @@ __all__ = ["ENOUGH", "FIGURES", "AssemblyStatus", "Result", "labels"]
 
 Array = NDArray[np.float64]
 ENOUGH = 1 + 1e-9  # of the stated clearances: all of it is enough
-EVERYWHERE = "everywhere"
 SAME = 1e-6  # of a need: one that varies by less has no place
 TOLD = 0.05  # a joint's part in the need that is worth telling
 SOURCE = (
@@ -49,7 +49,7 @@ PARTS = ("joint", "end", "position")
 FIGURES: dict[str, Variable] = {
     "smallest_clearance": Variable((), "m", "the largest needed clearance of the cycle, between the positions too"),
     "largest_share": Variable((), "1", "the largest needed share of the cycle, between the positions too"),
-    "drive_coordinate": Variable(("driver", "position"), "", "coordinate of the driver, rad or m"),
+    "drive_coordinate": Variable(("driver", "position"), "coordinate", "coordinate of the driver"),
     "needed_share": Variable(
         LANES, "1", "share of the stated clearances that is needed to close the loops; above 1: too small"
     ),
@@ -231,14 +231,13 @@ class Result:
             self.system.plan.formula,
             assembling=self.of,
             inputs=inputs(mechanism),
-            summary=figure_rows(self.summary()),
+            **Scales(float(np.max(self.system.size(self.values))), 1.0, 0.0).summary(self.summary()),
             findings=finding_rows(self.findings),
-            coordinate_units=["rad" if self.system.turns(name) else "m" for name in mechanism.drivers],
             periodic=int(self.system.cycle(self.values).periodic),
         ) | cited([SOURCE, *mechanism.references], AssemblyStatus)
         along = driven(self.time, *self.system.dial(self.values, self.time))
         along["time"].attrs["long_name"] = "time"
-        variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES)
+        variables = described({name: self.arrays[name] for name in FIGURES}, FIGURES, member_units(self.system))
         return dataset_of("assembly", variables, labels(self.system), attributes, along)
 
 

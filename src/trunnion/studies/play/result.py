@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references
 from trunnion.errors import Finding, Status
 from trunnion.measures.measures import Measure
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
+from trunnion.results.scales import Scales, extreme_place
 from trunnion.solve.shifts import Play
 
 if TYPE_CHECKING:
@@ -27,28 +29,34 @@ __all__ = ["VARIABLES", "dataset", "relied_on"]
 Array = NDArray[np.float64]
 
 
-# unit empty: that of each measure, in the attribute `measure_units`
+# unit "measure": that of each measure; "sensitivity": that over m
 OVER = ("measure", "position")
 BY_JOINT = ("measure", "joint", "position")
 VARIABLES: dict[str, Variable] = {
-    "value": Variable(OVER, "", "the measure with every pin in the middle of its hole"),
-    "worst_case": Variable(BY_JOINT, "", "largest change that the play of the joint can make, to either side"),
-    "deviation": Variable(BY_JOINT, "", "standard deviation by the play of the joint, pins anywhere in their holes"),
-    "worst_case_total": Variable(OVER, "", "worst case of all joints to first order: the sum"),
-    "rss": Variable(OVER, "", "root of the sum of the squares of the joints' worst cases"),
-    "deviation_total": Variable(OVER, "", "standard deviation by the play of all joints, independent of one another"),
+    "value": Variable(OVER, "measure", "the measure with every pin in the middle of its hole"),
+    "worst_case": Variable(BY_JOINT, "measure", "largest change that the play of the joint can make, to either side"),
+    "deviation": Variable(
+        BY_JOINT, "measure", "standard deviation by the play of the joint, pins anywhere in their holes"
+    ),
+    "worst_case_total": Variable(OVER, "measure", "worst case of all joints to first order: the sum"),
+    "rss": Variable(OVER, "measure", "root of the sum of the squares of the joints' worst cases"),
+    "deviation_total": Variable(
+        OVER, "measure", "standard deviation by the play of all joints, independent of one another"
+    ),
     "sensitivity": Variable(
         ("measure", "joint", "end", "axis", "position"),
-        "/m",
+        "sensitivity",
         "change of the measure for an offset of 1 m at an end, of the link on which the worst case is larger",
     ),
     "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
     "extreme_worst_case": Variable(
-        ("measure", "joint"), "", "worst case of a maximum or minimum, or a stated place, there; NaN of other measures"
+        ("measure", "joint"),
+        "measure",
+        "worst case of a maximum or minimum, or a stated place, there; NaN of other measures",
     ),
     "extreme_deviation": Variable(
         ("measure", "joint"),
-        "",
+        "measure",
         "standard deviation of a maximum or minimum, or a stated place, there; NaN of other measures",
     ),
     "extreme_time": Variable(
@@ -103,26 +111,26 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         **_at_extremes(found),
     }
     units = [measure.unit(system) for measure in found.measures]
-    same = units[0] if len(set(units)) == 1 else ""
-    variables = described(arrays, VARIABLES, {"": same, "/m": f"{same}/m" if same else ""})
+    own = MemberUnits("measure", units)
+    per_length = MemberUnits("measure", [f"{unit}/m" for unit in units])
+    variables = described(arrays, VARIABLES, {"measure": own, "sensitivity": per_length})
     labels = {
         "measure": [measure.name for measure in found.measures],
         "joint": list(found.plays),
         "end": [str(k + 1) for k in range(ends)],
         "axis": ["x", "y", "z"],
     }
-    dial = system.dial(found.run.values, found.time)
+    dial, scales = system.dial(found.run.values, found.time), scales_of(found.run)
     attributes = {
         **origin(mechanism, system.plan.formula),
         **cited(references(mechanism)),
-        "measure_units": units,
         "limits": [measure.limit for measure in found.measures],
         "inputs": inputs(mechanism),
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "extremes": [_extreme_of(found, measure) for measure in found.measures],
-        "summary": figure_rows(_summary(found, units)),
+        **scales.summary(_summary(found, units, scales)),
         "findings": finding_rows(findings),
         "missed": [f"{one.where}: {one.what}" for one in findings if one.code.startswith("limit.exceeded")],
     }
@@ -161,7 +169,7 @@ def _radii(plays: Mapping[str, Play], ends: int) -> Array:
     return found
 
 
-def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
+def _summary(found: PlayEffects, units: Sequence[str], scales: Scales) -> Iterator[Figure]:
     """Of each measure the largest worst case, or that of its extreme: what each joint has in it, RSS and deviation."""
     for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
         name, there = measure.name, found.extremes.get(measure.name)
@@ -174,7 +182,7 @@ def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
             continue
         top = int(np.nanargmax(total))
         aspect = "maximum" if there is None else f"of the {measure.rule}" if measure.at is None else ""
-        yield Figure(*worst, total[top], unit, aspect, f"at {of.at(top)}")
+        yield Figure(*worst, total[top], unit, aspect, extreme_place(total, f"at {of.at(top)}", scales.floor(unit)))
         rss, deviation = (np.sqrt(np.sum(part[k, :, top] ** 2)) for part in (own.worst_case, own.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)

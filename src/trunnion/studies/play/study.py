@@ -28,6 +28,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.cycle.positions import check_steps
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
@@ -56,12 +57,11 @@ from trunnion.studies.play.result import dataset, relied_on
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["IDLE", "Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
+__all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
 
 CHUNK = 4096  # positions at a time
 EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
 STEP = 1e-5  # of the size of the mechanism: of a difference
-IDLE = 1e-9  # of the largest effect of a joint: what is less is rounding
 
 Array = NDArray[np.float64]
 Loads = dict[str, list[Vector]]  # load at each end, by joint
@@ -472,15 +472,16 @@ def _idle(run: Run, effect: Effect, i: int) -> Iterator[Finding]:
     the other joints hold it, whatever is driven.
     """
     measure, course = effect.measures[i], effect.value[i]
+    floor = scales_of(run).floor(measure.unit(run.system))
     largest = [float(np.nanmax(row, initial=0.0)) for row in effect.worst_case[i]]
-    idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= IDLE * max(largest)]
+    idle = [joint for joint, most in zip(effect.plays, largest, strict=True) if most <= floor]
     told: dict[str, Any] = {"where": f"measures.{measure.name}", "joints": idle, "measure": measure.name}
     known, drivers = course[np.isfinite(course)], list(run.system.mechanism.drivers)
     if not idle:
         return
     if len(effect.time) == 1:  # elsewhere it may have some
         yield finding_for("play.no_effect_there", at=run.system.dial(run.values, effect.time).at(0), **told)
-    elif len(known) and np.ptp(known) <= IDLE * max(float(np.max(np.abs(known))), 1.0):
+    elif len(known) and np.ptp(known) <= floor:
         yield finding_for("play.held", holding=[joint for joint in effect.plays if joint not in idle], **told)
     else:
         yield finding_for("play.no_effect", drivers=drivers, count=len(drivers), **told)

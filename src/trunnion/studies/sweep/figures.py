@@ -28,15 +28,18 @@ FIGURES: dict[str, Variable] = {
         (), "1", "how far the errors of its integrals and pins that do not settle may have moved it"
     ),
     "efficiency_ideal": Variable((), "1", "efficiency of the mechanism without errors", part="errors"),
-    "drive_effort_min": Variable(("driver",), "N m", "minimum drive effort"),
-    "drive_effort_max": Variable(("driver",), "N m", "maximum drive effort"),
-    "drive_effort_rms": Variable(("driver",), "N m", "root mean square of the drive effort"),
+    "drive_effort_min": Variable(("driver",), "effort", "minimum drive effort"),
+    "drive_effort_max": Variable(("driver",), "effort", "maximum drive effort"),
+    "drive_effort_rms": Variable(("driver",), "effort", "root mean square of the drive effort"),
     "drive_power_mean": Variable((), "W", "mean power of all drivers"),
     "useful_power_mean": Variable((), "W", "mean power delivered to the useful loads"),
     "friction_power_mean": Variable((), "W", "mean power lost to friction"),
     "reaction_max": Variable(("joint",), "N", "maximum reaction"),
     "transmission_error_max": Variable(
-        ("joint",), "rad", "largest error of the joint's rotation, of a prismatic joint its slide", part="errors"
+        ("joint",),
+        "transmission_error",
+        "largest error of the joint's rotation, of a prismatic joint its slide",
+        part="errors",
     ),
     "locking_margin": Variable(
         (), "1", "least multiple of the friction at which a position locks, ∞ if beyond 10", part="margin"

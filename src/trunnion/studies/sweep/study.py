@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.summary import effort_units, inputs, references
+from trunnion.cycle.scales import peak, scales_of
+from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
@@ -22,10 +23,12 @@ from trunnion.measures.measures import Measure
 from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
-from trunnion.results.attributes import cited, encoded, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
+from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run
 from trunnion.studies.sweep.figures import FIGURES
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
 from trunnion.studies.sweep.measures import left_out, measures_of
@@ -182,6 +185,12 @@ def _not_steady(points: Points, watched: Iterable[Measure], arrays: Mapping[str,
             )  # fmt: skip
 
 
+def _scales(run: Run, arrays: Mapping[str, NDArray[Any]]) -> Scales:
+    """Those of the first point, with the largest reaction of all."""
+    scales = scales_of(run)
+    return scales._replace(force=max(scales.force, peak(arrays["reaction_max"])))
+
+
 # ---- the result -----------------------------------------------------------------------------------------------
 
 
@@ -194,10 +203,9 @@ def _dataset(
 ) -> xr.Dataset:
     mechanism, run, swept = points.mechanism, points.run, points.swept
     names = [one.name for one in swept]
-    variables = described(arrays, {name: one.over(*names) for name, one in figures.items()})
-    if "transmission_error_max" in variables:
-        units = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
-        variables["transmission_error_max"].attrs |= encoded({"member_units": units})
+    errors = ["m" if PAIRS[kind].guided else "rad" for kind, _ in run.system.joints.values()]
+    units = {**member_units(run.system), "transmission_error": MemberUnits("joint", errors)}
+    variables = described(arrays, {name: one.over(*names) for name, one in figures.items()}, units)
     along: dict[str, xr.Variable] = {}
     for one in swept:
         along |= described({one.name: one.values}, {one.name: Variable((one.name,), one.unit, one.path)})
@@ -207,7 +215,7 @@ def _dataset(
         "method": points.method.name,
         **cited(references(mechanism)),
         "inputs": inputs(mechanism),
-        "driver_units": effort_units(run.system),
         "findings": finding_rows(findings),
+        **_scales(run, arrays).summary([]),
     }
     return dataset_of("sweep", variables, labels, attributes, along)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
@@ -20,6 +21,7 @@ from trunnion.model.checks.values import check_values
 from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
+from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
 from trunnion.studies.tolerance.sampling import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed, scatters
@@ -62,7 +64,9 @@ def _of_measure(outcome: Outcome, of: Of, i: int, unit: str, dial: Any) -> Itera
     if of.measure.rule != "deviation":
         yield Figure(f"{name}.nominal", f"{name}, nominal", of.reference.figure, unit)
     placed = of.place >= 0 and outcome.study.run.cycle.duration > 0
+    course = np.asarray(of.course.spread.half if of.measure.rule == "deviation" else of.curve, float)
     at = f"at {dial.at(of.reference.window.index[of.place])}" if placed else ""
+    at = at and extreme_place(course, at, scales_of(outcome.study.run).floor(unit))
     lower, upper, rss, _, deviation = map(float, of.total)
     yield Figure(f"{name}.worst_case", f"{name}, worst case, linear", max(-lower, upper), unit, place=at)
     if outcome.worst is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
 from trunnion.measures.corners import switch
@@ -16,8 +17,8 @@ from trunnion.measures.evaluation import looking
 from trunnion.measures.figures import moment
 from trunnion.measures.measures import Measure
 from trunnion.model.parameters import dimension_kinds
-from trunnion.results.attributes import cited, figure_rows, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described, driven
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.solve.system import System
 from trunnion.studies.tolerance.findings import findings_of, summary
 from trunnion.studies.tolerance.first_order import ToleranceStudy
@@ -34,12 +35,11 @@ if TYPE_CHECKING:
 __all__ = ["VARIABLES", "course_text", "dataset", "text_of"]
 
 Array = NDArray[np.float64]
-# units: empty: that of each measure, in the attribute `measure_units`; "parameter": that of each parameter, in
-# `parameter_units`; "ratio": measure over parameter; "course": that of each course, in `curve_units`; "course ratio":
-# course over parameter; "drive": deg, mm or s, as `drive_unit` says
+# units: "measure": that of each figure; "curve": of each course; "parameter": of each parameter; "ratio" and "curve
+# ratio": the former over the latter; "drive": deg, mm or s, as `drive_unit` says
 M, P, MP, MPOS = ("measure",), ("parameter",), ("measure", "parameter"), ("measure", "position")
 VARIABLES: dict[str, Variable] = {
-    "nominal": Variable(M, "", "figure of the nominal mechanism"),
+    "nominal": Variable(M, "measure", "figure of the nominal mechanism"),
     "place": Variable(M, "drive", "drive coordinate of the measure; for an extreme, the nominal one"),
     "parameter_nominal": Variable(P, "parameter", "nominal value; of a clearance its radius"),
     "parameter_lower": Variable(P, "parameter", "lower limit of the deviation from nominal"),
@@ -47,44 +47,46 @@ VARIABLES: dict[str, Variable] = {
     "parameter_deviation": Variable(P, "parameter", "standard deviation; of a clearance, of an offset along one axis"),
     "parameter_shift": Variable(P, "parameter", "mean deviation from nominal"),
     "sensitivity": Variable(MP, "ratio", "derivative of the figure; of a clearance, by its radius in the worst case"),
-    "contribution_worst_case": Variable(MP, "", "largest change of the figure by the parameter alone, to first order"),
+    "contribution_worst_case": Variable(
+        MP, "measure", "largest change of the figure by the parameter alone, to first order"
+    ),
     "contribution_rss": Variable(MP, "1", "share of the parameter in the square of the RSS half width"),
     "contribution_variance": Variable(
         MP, "1", "share of the parameter in the variance, to first order: its covariance with the figure, signed"
     ),
-    "worst_case_lower": Variable(M, "", "least deviation of the figure, to first order"),
-    "worst_case_upper": Variable(M, "", "largest deviation of the figure, to first order"),
-    "rss": Variable(M, "", "half width by the root of the sum of squares; without correlation"),
-    "deviation_linear": Variable(M, "", "standard deviation, to first order"),
-    "shift_linear": Variable(M, "", "mean deviation from nominal, to first order"),
-    "searched_lower": Variable(M, "", "least deviation found on the mechanism itself"),
-    "searched_upper": Variable(M, "", "largest deviation found on the mechanism itself"),
+    "worst_case_lower": Variable(M, "measure", "least deviation of the figure, to first order"),
+    "worst_case_upper": Variable(M, "measure", "largest deviation of the figure, to first order"),
+    "rss": Variable(M, "measure", "half width by the root of the sum of squares; without correlation"),
+    "deviation_linear": Variable(M, "measure", "standard deviation, to first order"),
+    "shift_linear": Variable(M, "measure", "mean deviation from nominal, to first order"),
+    "searched_lower": Variable(M, "measure", "least deviation found on the mechanism itself"),
+    "searched_upper": Variable(M, "measure", "largest deviation found on the mechanism itself"),
     "corner_lower": Variable(MP, "parameter", "value of the parameter at the least deviation"),
     "corner_upper": Variable(MP, "parameter", "value of the parameter at the largest deviation"),
-    "curve": Variable(MPOS, "course", "curve of the measure of the nominal mechanism"),
-    "curve_sensitivity": Variable(("measure", "parameter", "position"), "course ratio", "derivative of the curve"),
-    "curve_worst_case_lower": Variable(MPOS, "course", "least deviation of the curve, to first order"),
-    "curve_worst_case_upper": Variable(MPOS, "course", "largest deviation of the curve, to first order"),
+    "curve": Variable(MPOS, "curve", "curve of the measure of the nominal mechanism"),
+    "curve_sensitivity": Variable(("measure", "parameter", "position"), "curve ratio", "derivative of the curve"),
+    "curve_worst_case_lower": Variable(MPOS, "curve", "least deviation of the curve, to first order"),
+    "curve_worst_case_upper": Variable(MPOS, "curve", "largest deviation of the curve, to first order"),
     "curve_rss": Variable(
-        MPOS, "course", "half width of the curve by the root of the sum of squares; without correlation"
+        MPOS, "curve", "half width of the curve by the root of the sum of squares; without correlation"
     ),
-    "curve_shift": Variable(MPOS, "course", "mean deviation of the curve from nominal, to first order"),
-    "curve_deviation": Variable(MPOS, "course", "standard deviation of the curve, to first order"),
+    "curve_shift": Variable(MPOS, "curve", "mean deviation of the curve from nominal, to first order"),
+    "curve_deviation": Variable(MPOS, "curve", "standard deviation of the curve, to first order"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings"),
     "samples": Variable((), "1", "number of samples"),
-    "mean": Variable(M, "", "mean of the figure"),
-    "mean_low": Variable(M, "", "mean, lower end of the 95 % interval"),
-    "mean_high": Variable(M, "", "mean, upper end of the 95 % interval"),
-    "deviation": Variable(M, "", "standard deviation of the figure"),
-    "deviation_low": Variable(M, "", "standard deviation, lower end of the 95 % interval"),
-    "deviation_high": Variable(M, "", "standard deviation, upper end of the 95 % interval"),
+    "mean": Variable(M, "measure", "mean of the figure"),
+    "mean_low": Variable(M, "measure", "mean, lower end of the 95 % interval"),
+    "mean_high": Variable(M, "measure", "mean, upper end of the 95 % interval"),
+    "deviation": Variable(M, "measure", "standard deviation of the figure"),
+    "deviation_low": Variable(M, "measure", "standard deviation, lower end of the 95 % interval"),
+    "deviation_high": Variable(M, "measure", "standard deviation, upper end of the 95 % interval"),
     "skewness": Variable(M, "1", "skewness of the figure"),
     "kurtosis": Variable(M, "1", "kurtosis of the figure, 3 of a normal distribution"),
-    "least": Variable(M, "", "least figure"),
-    "most": Variable(M, "", "largest figure"),
-    "quantile_value": Variable(("measure", "quantile"), "", "figure that this share does not exceed"),
-    "quantile_low": Variable(("measure", "quantile"), "", "quantile, lower end of the 95 % interval"),
-    "quantile_high": Variable(("measure", "quantile"), "", "quantile, upper end of the 95 % interval"),
+    "least": Variable(M, "measure", "least figure"),
+    "most": Variable(M, "measure", "largest figure"),
+    "quantile_value": Variable(("measure", "quantile"), "measure", "figure that this share does not exceed"),
+    "quantile_low": Variable(("measure", "quantile"), "measure", "quantile, lower end of the 95 % interval"),
+    "quantile_high": Variable(("measure", "quantile"), "measure", "quantile, upper end of the 95 % interval"),
     "yield": Variable(
         M, "1", "share of the samples within the limits of the measure, or with an answer if it has none"
     ),
@@ -97,15 +99,15 @@ VARIABLES: dict[str, Variable] = {
     "cpk": Variable(M, "1", "capability index C_pk of the figure"),
     "failed": Variable(("cause",), "1", "samples not solved, by the gravest status of their positions"),
     "histogram": Variable(("measure", "bin"), "1", "samples in a bin"),
-    "edge": Variable(("measure", "edge"), "", "edges of the bins; those at the ends stand for all beyond"),
+    "edge": Variable(("measure", "edge"), "measure", "edges of the bins; those at the ends stand for all beyond"),
     "band": Variable(
         ("measure", "quantile", "position"),
-        "course",
+        "curve",
         "quantile of the deviation of the curve from nominal",
     ),
     "convergence_samples": Variable(("size",), "1", "first so many samples"),
-    "convergence_mean": Variable(("measure", "size"), "", "mean of the first samples"),
-    "convergence_deviation": Variable(("measure", "size"), "", "standard deviation of the first samples"),
+    "convergence_mean": Variable(("measure", "size"), "measure", "mean of the first samples"),
+    "convergence_deviation": Variable(("measure", "size"), "measure", "standard deviation of the first samples"),
     "convergence_yield": Variable(("measure", "size"), "1", "yield of the first samples"),
     "first_order": Variable(MP, "1", "Sobol' index of first order: share of the variance by the parameter alone"),
     "first_order_low": Variable(MP, "1", "first order, lower end of the 95 % interval"),
@@ -130,7 +132,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     parameter_units = [kinds[name].unit if name in kinds else "m" for name in found.inputs.names]
     dial = system.dial(found.run.values, found.plan.times)
     variables = described(arrays, VARIABLES, _units(units, curve_units, parameter_units, dial.unit))
-    used = {dim for name in variables for dim in VARIABLES[name].dims}
+    used = {dim for one in variables.values() for dim in one.dims}
     labels = {
         "measure": [measure.name for measure in found.measures],
         "parameter": found.inputs.names,
@@ -145,8 +147,7 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "sampling": outcome.job.method if outcome.job else "",
         "engine": outcome.job.engine if outcome.job else "numpy",
         "seed": outcome.job.seed if outcome.job else -1,
-        **_of_measures(found, units, curve_units),
-        "parameter_units": parameter_units,
+        **_of_measures(found),
         "distributions": [
             *(one.distribution for one in found.inputs.tolerances),
             *("play" for _ in found.inputs.loose),
@@ -157,34 +158,49 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
         "stopped": int(outcome.stopped),
-        "summary": figure_rows(summary(outcome, counted, units, dial)),
+        **scales_of(found.run).summary(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
         "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],
     }
     return dataset_of("tolerance", variables, labels, attributes, {**quantiles, **driven(found.plan.times, *dial)})
 
 
-def _of_measures(found: ToleranceStudy, units: Sequence[str], curve_units: Sequence[str]) -> dict[str, list[Any]]:
+def _of_measures(found: ToleranceStudy) -> dict[str, list[Any]]:
     """Attributes that are a list each, an entry for each measure."""
     system, measures = found.run.system, found.measures
     limits = [None if (one.lower, one.upper) == (None, None) else [one.lower, one.upper] for one in measures]
     return {
-        "measure_units": list(units),
         "measure_texts": [text_of(one, system) for one in measures],
         "measure_rules": [one.rule for one in measures],
-        "curve_units": list(curve_units),
         "curve_texts": [course_text(one, system) for one in measures],
         "limits": limits,
         "bounds": [[one.at_least, one.at_most] for one in measures],
     }
 
 
-def _units(own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str) -> dict[str, str]:
-    """The units that `Variable` names by another: where it is one for all measures and parameters, else none."""
-    figure, course, parameter = (many[0] if len(set(many)) == 1 else "" for many in (own, courses, parameters))
-    ratios = (f"{one}/{parameter}" if one and parameter else "" for one in (figure, course))
-    found = {"": figure, "course": course, "parameter": parameter, "drive": drive.strip().replace("°", "deg")}
-    return found | dict(zip(("ratio", "course ratio"), ratios, strict=True))
+def _units(
+    own: Sequence[str], courses: Sequence[str], parameters: Sequence[str], drive: str
+) -> dict[str, str | MemberUnits]:
+    """The units that `Variable` names by a word."""
+    figure, curve, parameter = (
+        MemberUnits("measure", own),
+        MemberUnits("measure", courses),
+        MemberUnits("parameter", parameters),
+    )
+    return {
+        "measure": figure,
+        "curve": curve,
+        "parameter": parameter,
+        "ratio": _over(figure, parameter),
+        "curve ratio": _over(curve, parameter),
+        "drive": drive.strip().replace("°", "deg"),
+    }
+
+
+def _over(one: MemberUnits, other: MemberUnits) -> str:
+    """The unit of a ratio: "N m/m", "(N m or rad)/(m)" where several units meet."""
+    several = len({*one.each}) > 1 or len({*other.each}) > 1
+    return f"({one.text})/({other.text})" if several else f"{one.text}/{other.text}"
 
 
 def _linear(found: ToleranceStudy) -> dict[str, Any]:

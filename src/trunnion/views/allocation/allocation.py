@@ -9,6 +9,7 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.statistics.costs import Cost
 from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.allocation.tables import bought, headed, offers_table, room, tables, trials
@@ -70,7 +71,7 @@ def _limit(result: xr.Dataset) -> tuple[str, float, str] | None:
 
 def prices(result: xr.Dataset) -> list[PriceCurve]:
     """What each tolerance with a cost would cost at other half widths."""
-    units = dict(zip(names(result, "parameter"), attribute(result, "parameter_units"), strict=True))
+    units = dict(zip(names(result, "parameter"), units_along(result["tolerance"], "parameter"), strict=True))
     place = {name: j for j, name in enumerate(names(result, "parameter"))}
     found = []
     for one in attribute(result, "prices"):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import drawn_in, joined
 from trunnion.views.common.cycle import names
 from trunnion.views.common.table import TextTable
@@ -54,7 +55,7 @@ def headed(result: xr.Dataset) -> str:
 def bought(result: xr.Dataset) -> TextTable:
     """Each tolerance that has a cost: what it is to be, what it costs, and what it was."""
     rows = []
-    units = attribute(result, "parameter_units")
+    units = units_along(result["tolerance"], "parameter")
     paths, choices = names(result, "parameter"), [str(one) for one in result["choice"].values]
     keys = ("bought", "tolerance", "cost", "cost_share", "tolerance_before", "cost_before")
     columns = {key: np.asarray(result[key].values, float) for key in keys}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import unit_of
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.views.common.cycle import Abscissa, Array, column, names
 from trunnion.views.common.figures import INK, MUTED, PALETTE, SHADE, along, curve, legend, new, style_of
@@ -52,7 +52,7 @@ def _over(result: xr.Dataset) -> Abscissa:
     """The coordinate of the only driver if it runs one way, else time."""
     drivers, time = names(result, "driver"), np.asarray(result["time"].values, float)
     if len(drivers) == 1:
-        unit = attribute(result, "coordinate_units")[0]
+        unit = unit_of(result["drive_coordinate"], (0,))
         values = np.asarray(result["drive_coordinate"].values[0], float)
         steps = np.diff(values)
         if np.all(steps > 0) or np.all(steps < 0):

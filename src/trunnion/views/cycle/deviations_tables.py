@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import number, quantity
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, mean_friction, names, valid
 from trunnion.views.cycle.deviations import angle_scale, losses, outputs, worst_points
 
@@ -24,6 +25,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
     """Label, as built, ideal, difference and place of what errors change; none of a mechanism without errors."""
     if "point_error" not in result:
         return []
+    result = without_noise(result)
     over = abscissa(result)
     rows = [
         _error(f"Position error of {key}, largest", valid(result, error), "m", over)
@@ -33,9 +35,7 @@ def error_rows(result: xr.Dataset) -> list[Row]:
         _error(f"Transmission error, {one.label}, largest", valid(result, one.error), one.unit, over)
         for one in outputs(result)
     ]
-    units = attribute(result, "driver_units")
-    for index, driver in enumerate(names(result, "driver")):
-        unit = units[index] if index < len(units) else "N m"
+    for driver, unit in zip(names(result, "driver"), units_along(result["drive_effort"], "driver"), strict=True):
         noun = "force" if unit == "N" else "torque"
         rows.append(_change(result, "drive_effort", "driver", driver, f"Drive {noun} of {driver}, largest", unit, over))
     changes = [_change(result, "reaction_force", "joint", joint, f"Reaction of {joint}, largest", "N", over)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed
 from trunnion.views.common.cycle import abscissa, column
 from trunnion.views.common.figures import PALETTE, along, curve, frame_peak, new, shade
@@ -34,7 +34,7 @@ def measures(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     if not rows:
         what = "there is no measure with one number at every position"
         raise MechanismError(Finding(what, "measures", "state measures: in the model"))
-    units = attribute(result, "measure_units")
+    units = units_along(result["measure_value"], "measure")
     figure = new("Measures", result, 2.0 + 2.0 * len(rows))
     panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     for axes, i in zip(panels, rows, strict=True):

@@ -18,8 +18,9 @@ from matplotlib.lines import Line2D
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.files import whole
 from trunnion.joints.pairs import GUIDED
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import (
     Abscissa,
     Array,
@@ -61,7 +62,7 @@ from trunnion.views.cycle.seat_plot import seat
 from trunnion.views.cycle.speed import speed, varying
 from trunnion.views.space import figure as space_figure
 from trunnion.views.space import plots as space_plots
-from trunnion.views.space.bodies import is_spatial, without_noise
+from trunnion.views.space.bodies import is_spatial
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,7 +82,7 @@ FREE: dict[str, Any] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (3, 2))
 def torque(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Drive effort over the drive, one panel a driver; without friction dashed, its interval at zero slip as a band."""
     over, drivers = abscissa(result), names(result, "driver")
-    units = attribute(result, "driver_units") or ["N m"] * len(drivers)
+    units = units_along(result["drive_effort"], "driver")
     title = (
         "Drive force" if units and set(units) == {"N"} else "Drive torque" if set(units) == {"N m"} else "Drive effort"
     )
@@ -161,16 +162,10 @@ def _reaction(result: xr.Dataset, joint: str, plane: tuple[str, str] = ("x", "y"
     return np.asarray(picked.values, dtype=float)
 
 
-def _sound(result: xr.Dataset, ideal: xr.Dataset | None) -> tuple[xr.Dataset, xr.Dataset | None]:
-    """Both without reactions that are rounding, as some are by the shape of the mechanism."""
-    return without_noise(result), None if ideal is None else without_noise(ideal)
-
-
 def reactions(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """Magnitude of the reaction in each joint, of those with the same as one curve; without friction thin, dotted."""
     if is_spatial(result):
-        return space_plots.reactions(*_sound(result, ideal), FREE)
-    result, ideal = _sound(result, ideal)
+        return space_plots.reactions(result, ideal, FREE)
     over, joints = abscissa(result), names(result, "joint")
     forces = [np.hypot(*_reaction(result, joint)) for joint in joints]
     free = [] if ideal is None else [np.hypot(*_reaction(ideal, joint)) for joint in joints]
@@ -196,7 +191,6 @@ def polar(result: xr.Dataset, ideal: xr.Dataset | None = None) -> Figure:
     """
     over, joints = abscissa(result), names(result, "joint")
     planes = space_plots.PLANES if is_spatial(result) else (("x", "y"),)
-    result, ideal = _sound(result, ideal)
     easy = ease(result)
     panels = [(index, joint, plane) for index, joint in enumerate(joints) for plane in planes]
     columns = min(len(panels), 2 if len(panels) in (2, 4) else 3) or 1
@@ -421,6 +415,7 @@ def figure(
     """
     check_kinds([kind])
     index = None if at is None else position_at(result, at)
+    result, ideal = without_noise(result), None if ideal is None else without_noise(ideal)
     if kind == "mechanism":
         return mechanism(result, ideal, index)
     whole_figure = PLOTS[kind](result, ideal)

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.joints.pairs import GUIDED
-from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import abscissa, column, course, intervals, layout, names, numbers, series
 from trunnion.views.common.peaks import ease
 from trunnion.views.cycle.deviations import losses
 from trunnion.views.cycle.deviations_scene import built
 from trunnion.views.cycle.speed import varying
-from trunnion.views.space.bodies import is_spatial, without_noise
+from trunnion.views.space.bodies import is_spatial
 from trunnion.views.space.scene import space_scene
 
 if TYPE_CHECKING:
@@ -200,14 +201,13 @@ def _springs(result: xr.Dataset, stated: dict[str, Any], points: dict[str, Any])
 
 def _drivers(result: xr.Dataset, ideal: xr.Dataset | None, stated: dict[str, Any]) -> list[dict[str, Any]]:
     """Drivers with effort (an interval where friction leaves it open), power, and effort without friction."""
-    units = attribute(result, "driver_units")
+    units = units_along(result["drive_effort"], "driver")
     speeds = {} if result.attrs.get("kind") == "motion" else varying(result)
     rows = []
-    for index, name in enumerate(names(result, "driver")):
+    for name, unit in zip(names(result, "driver"), units, strict=True):
         values = {key: series(column(result, f"drive_{key}", driver=name))
                   for key in ("effort", "effort_lower", "effort_upper", "power")}  # fmt: skip
         free = None if ideal is None else series(column(ideal, "drive_effort", driver=name))
-        unit = units[index] if index < len(units) else "N m"
         kind = stated["joints"].get(name, {}).get("type", "revolute")
         values["speed"] = series(speeds[name][0]) if name in speeds else []
         rows.append({"name": name, "unit": unit, "type": kind, "ideal": free, **values})

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import quantity
+from trunnion.results.scales import without_noise
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +39,6 @@ ENERGIES = (
 )
 
 
-NOISE = 1e-12  # of the largest reaction times 1 m, or of the largest energy: below is rounding
 # findings that tell where a motion ends early
 EARLY = ("range", "no_acceleration", "unsolved", "not_assembled", "dead_centre", "step", "events", "stopped")
 ENDS = {f"simulate.{code}" for code in (*EARLY, "no_contact_force")}
@@ -71,7 +72,7 @@ def shown(result: xr.Dataset) -> Shown:
     time = result["time"].values
     known = np.flatnonzero(np.isfinite(result["kinetic_energy"].values))
     last = int(known[-1]) if known.size else 0
-    rows = as_positions(_without_noise(result.isel(time=slice(0, last + 1))))
+    rows = as_positions(_resting(without_noise(result.isel(time=slice(0, last + 1)))))
     ends = [row["figures"]["time"] for row in attribute(result, "findings") if row.get("code") in ENDS]
     end = float(min([time[-1], *ends])) if known.size else 0.0
     return Shown(rows, end, float(time[-1]), happenings(result))
@@ -80,13 +81,12 @@ def shown(result: xr.Dataset) -> Shown:
 def energies(rows: xr.Dataset) -> list[tuple[str, str, Array]]:
     """Name, title and course of every work and energy since the start, J, of those that are more than rounding."""
     changes = [(name, text, rows[name].values - rows[name].values[0]) for name, text in ENERGIES if name in rows]
-    sizes = [float(np.nanmax(np.abs(change), initial=0.0)) for *_, change in changes]
-    return [one for one, size in zip(changes, sizes, strict=True) if size > NOISE * max(sizes)]
+    return [one for one in changes if np.nanmax(np.abs(one[-1]), initial=0.0) > 0]
 
 
 def drivers_of(result: xr.Dataset) -> list[tuple[int, str, str]]:
     """Number, name and unit of effort of every free driver; of all where none is, as pins in play move alone."""
-    free, units = attribute(result, "free_drivers"), attribute(result, "driver_units")
+    free, units = attribute(result, "free_drivers"), units_along(result["drive_effort"], "driver")
     known = [str(name) for name in result["driver"].values]
     return [(i, name, units[i]) for i, name in enumerate(known) if name in free or not free]
 
@@ -96,16 +96,10 @@ def as_positions(result: xr.Dataset) -> xr.Dataset:
     return result.rename_dims(time="position").drop_vars("time").assign_coords(time=("position", result["time"].values))
 
 
-def _without_noise(result: xr.Dataset) -> xr.Dataset:
-    """The result with 0 where rounding is all there is: powers at rest, and the effort of a driver without a motor."""
-    resting = result["resting"] == 1
-    forces = np.abs(result["reaction_force"].values)
-    most = float(np.nanmax(forces, initial=0.0)) if forces.size else 0.0
-    efforts = abs(result["drive_effort"])
-    idle = efforts.max("time") < NOISE * most
-    zero = {"drive_power": resting | idle, "friction_power": resting}
-    zero |= {name: idle for name in ("drive_effort", "drive_effort_lower", "drive_effort_upper") if name in result}
-    return result.assign({name: result[name].where(~where, 0.0) for name, where in zero.items()})
+def _resting(result: xr.Dataset) -> xr.Dataset:
+    """The result with no power at rest, which the solution leaves within its tolerance."""
+    moves = result["resting"] != 1
+    return result.assign({name: result[name].where(moves, 0.0) for name in ("drive_power", "friction_power")})
 
 
 def happenings(result: xr.Dataset) -> tuple[Happening, ...]:

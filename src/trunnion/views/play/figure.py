@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.attributes import attribute, findings_of
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, PALETTE, along, frame_peak, legend, new, shade
 from trunnion.views.common.lettering import plain
@@ -32,10 +34,11 @@ def figure(result: xr.Dataset, measures: Sequence[int] | None = None) -> Figure:
 
     measures: their numbers; the first ones if not given.
     """
+    result = without_noise(result)
     over, names = abscissa_of(result), result["measure"].values
     chosen = range(len(names))[:MOST_PANELS] if measures is None else measures
     sheet = new("Effect of the play of the joints", result, height=1.0 + PANEL * len(chosen))
-    units, limits = (attribute(result, key) for key in ("measure_units", "limits"))
+    units, limits = units_along(result["value"], "measure"), attribute(result, "limits")
     panels = sheet.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
     for i, axes in zip(chosen, panels, strict=True):
         _panel(axes, result.isel(measure=i), over, str(names[i]), units[i], limits[i])

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import joined, prefixed, quantity
+from trunnion.results.dataset import units_along
+from trunnion.results.quantities import quantity
+from trunnion.results.scales import without_noise
 from trunnion.studies.play.result import relied_on
-from trunnion.studies.play.study import IDLE
 from trunnion.views.common.cycle import Abscissa, Array
 from trunnion.views.common.table import TextTable
 
@@ -25,7 +26,8 @@ HEAD = ["joint", "play", "largest effect ±", "at", "share"]
 
 def tables(result: xr.Dataset) -> list[TextTable]:
     """For each measure: the joints with their play, largest effect and where, and share in the largest worst case."""
-    units, over = attribute(result, "measure_units"), abscissa_of(result)
+    result = without_noise(result)
+    units, over = units_along(result["value"], "measure"), abscissa_of(result)
     return [
         _table_there(result.isel(measure=i), str(name), unit, *there)
         if there
@@ -43,7 +45,7 @@ def _table(result: xr.Dataset, over: Abscissa, name: str, unit: str) -> TextTabl
         effect = effects[j]
         where = over.say(int(np.nanargmax(effect))) if np.nanmax(effect) > 0 else "—"
         share = f"{100 * effect[top] / total[top]:.1f} %" if total[top] > 0 else "—"
-        rows.append([str(joint), _play(result, j), _size(np.nanmax(effect), total[top], unit), where, share])
+        rows.append([str(joint), _play(result, j), quantity(float(np.nanmax(effect)), unit), where, share])
     for label, key in zip(SUMS, ("worst_case_total", "rss", "deviation_total"), strict=True):
         row = _relied_on(result, key)
         best = int(np.nanargmax(row))
@@ -64,17 +66,12 @@ def _table_there(result: xr.Dataset, name: str, unit: str, word: str, where: str
     total, rows = float(np.sum(effects)), list[list[str]]()
     for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
         share = f"{100 * effect / total:.1f} %" if total > 0 else "—"
-        rows.append([str(joint), _play(result, j), _size(effect, total, unit), where, share])
+        rows.append([str(joint), _play(result, j), quantity(float(effect), unit), where, share])
     sums = total, np.sqrt(np.sum(effects**2)), np.sqrt(np.sum(deviations**2))
     for label, number in zip(SUMS, sums, strict=True):
         rows.append([label, "", quantity(float(number), unit), where, ""])
     title = f"{name}, at {where}" if word == "value" else f"{name}: the {word}, at {where}"
     return TextTable(title, ["joint", "play", "effect ±", "at", "share"], rows)
-
-
-def _size(effect: float, total: float, unit: str) -> str:
-    """One effect; what is no more than rounding of them all is 0."""
-    return quantity(float(effect), unit) if effect > IDLE * total else joined("0", prefixed(float(total), unit)[1])
 
 
 def _relied_on(result: xr.Dataset, name: str) -> Array:

@@ -16,20 +16,18 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.attributes import attribute
-from trunnion.views.common.cycle import Array, column, layout, names
+from trunnion.views.common.cycle import Array, layout, names
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["BodyPose", "Space", "gathered", "is_spatial", "rotation_matrix", "space", "without_noise"]
+__all__ = ["BodyPose", "Space", "gathered", "is_spatial", "rotation_matrix", "space"]
 
 PIN = 14.0  # a mechanism is drawn at least as large as so many radii of its thickest pin
 NEAR = 0.1  # joints whose points lie closer than this share of the size are drawn apart
 SMALLEST = 1e-9  # m, of a mechanism that has a size
 APART = 0.34  # as far from their common point as this share of the size, where all axes meet in one
 ASIDE = 0.16  # where only some do
-ROUNDING = 1e-11  # of the largest reaction or drive effort in the plane: a joint that never bears more bears none
-NOISE = 1e-9  # reactions below this share of what moments and lengths make likely are rounding
 
 
 @dataclass(frozen=True)
@@ -207,27 +205,6 @@ def space(result: xr.Dataset) -> Space:
         what = "no position of the mechanism can be assembled: there is nothing to draw"
         raise MechanismError(Finding(what, remedy="change the lengths or the range of the driver"))
     return shown
-
-
-def without_noise(result: xr.Dataset) -> xr.Dataset:
-    """The result with zero for reactions that are only rounding: in space beside the moments, and the other way round;
-    in the plane of joints that bear nothing, such as a guide of a massless rod, beside the other joints and the drive.
-    """
-    force, moment = column(result, "reaction_force"), column(result, "reaction_moment")
-    if force is None or moment is None or not force.size:
-        return result
-    if not is_spatial(result):
-        effort = column(result, "drive_effort")
-        most = [np.nanmax(np.abs(one), initial=0.0) for one in (force, effort) if one is not None]
-        forces = result["reaction_force"]
-        largest = abs(forces).max(["axis", "position"])
-        return result.assign(reaction_force=forces.where(~(largest <= ROUNDING * max(most)), 0.0))
-    size = gathered(result).size
-    most = [float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in (force, moment)]
-    floors = {"reaction_force": NOISE * most[1] / size, "reaction_moment": NOISE * most[0] * size}
-    return result.assign(
-        {name: result[name].where(~(np.abs(result[name]) < floor), 0.0) for name, floor in floors.items()}
-    )
 
 
 def gathered(result: xr.Dataset) -> Space:

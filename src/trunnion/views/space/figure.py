@@ -10,13 +10,14 @@ from matplotlib.patheffects import Normal, Stroke
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.quantities import prefixed
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Array, abscissa, column, status_text
 from trunnion.views.common.drawing import PALE
 from trunnion.views.common.figures import INK, MUTED, PALETTE, new
 from trunnion.views.common.labels import Labels
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.space.bodies import Space, space, without_noise
+from trunnion.views.space.bodies import Space, space
 from trunnion.views.space.paint import JOINT, Strokes, paint
 from trunnion.views.space.scenery import Scenery, scenery
 

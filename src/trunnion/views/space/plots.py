@@ -16,7 +16,6 @@ from trunnion.views.common.figures import along, curve, frame_peak, legend, new,
 from trunnion.views.common.joined import joined
 from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease, usual_peak
-from trunnion.views.space.bodies import NOISE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -148,20 +147,6 @@ def turned_from_start(rotation: Array | None) -> Array | None:
     return np.asarray(2 * np.arctan2(np.sqrt(x * x + y * y + z * z), w), dtype=float)
 
 
-def _without_noise(members: Members) -> Members:
-    """Second rates that are rounding beside first rate²/span are zero, as of what moves at constant speed."""
-    known = [_known(values[0]) for values in members.values()]
-    span = max((float(np.ptp(values)) for values in known if values.size), default=0.0)
-    fastest = _peak({name: values[1] for name, values in members.items()})
-    if not span > 0:
-        return members
-    floor = NOISE * fastest**2 / span
-    return {
-        name: [*values[:2], None if values[2] is None else np.where(np.abs(values[2]) < floor, 0.0, values[2])]
-        for name, values in members.items()
-    }
-
-
 def _known(values: Array | None) -> Array:
     """The values that are numbers; none if there are no values."""
     return np.empty(0) if values is None else values[np.isfinite(values)]
@@ -170,7 +155,6 @@ def _known(values: Array | None) -> Array:
 def _rates(panels: list[Axes], result: xr.Dataset, over: Abscissa, noun: str, unit: str, members: Members) -> None:
     """Three panels: the quantity and its first and second rate."""
     link = noun.startswith("turn")
-    members = _without_noise(members)
     for order, axes in enumerate(panels):
         columns = {name: values[order] for name, values in members.items()}
         scope = usual_peak(ease(result), *columns.values())

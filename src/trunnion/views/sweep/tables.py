@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from trunnion.errors import Status
+from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures
 from trunnion.solve.friction_method import MARGIN
 from trunnion.views.sweep.scales import Arrangement, arrange, cause, grid, statuses, thinned
@@ -28,7 +29,6 @@ __all__ = ["SweepTable", "tables"]
 MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
 LEAST_COLUMNS = 3
 LEAST_ROWS, MOST_TABLES = 6, 6  # where there are several
-ROUNDING = 1e-9  # of the largest effort: what is less has no sign
 BESIDE = "friction_power_mean", "locking_margin"  # told beside the measure, if the sweep has them
 
 
@@ -48,6 +48,7 @@ def tables(
 
     room: characters in a line, which limit how many columns of a long table are shown.
     """
+    result = without_noise(result)
     plan = arrange(result, x, family)
     if plan.other is None:
         return [_list(result, measures, plan)]
@@ -79,8 +80,7 @@ def _efforts(found: dict[str, tuple[str, Any]]) -> list[str]:
     for driver in (name.removesuffix(".effort_max") for name in found if name.endswith(".effort_max")):
         ends = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
         beyond = {name: float(np.nanmax(sign * found[name][1], initial=0.0)) for name, sign in ends.items()}
-        least = ROUNDING * max(beyond.values())
-        shown += [name for name, most in beyond.items() if most > least] or [f"{driver}.effort_max"]
+        shown += [name for name, most in beyond.items() if most > 0] or [f"{driver}.effort_max"]
     return shown
 
 

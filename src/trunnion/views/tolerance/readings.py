@@ -15,7 +15,9 @@ import numpy as np
 
 from trunnion.errors import Status
 from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
 from trunnion.results.quantities import decimals_of, drawn_in, joined, number, scale_of
+from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, names
 
 if TYPE_CHECKING:
@@ -261,7 +263,7 @@ class MeasureReading:
     @cached_property
     def contributions(self) -> list[ContributionRow]:
         """Of every toleranced number, the largest share first."""
-        units = attribute(self.result, "parameter_units")
+        units = units_along(self.result["parameter_nominal"], "parameter")
         paths = names(self.result, "parameter")
         empty = np.full(len(paths), np.nan)
         worst, rss, variance, slope, lower, upper = (
@@ -283,8 +285,10 @@ class MeasureReading:
 
 def readings(result: xr.Dataset) -> list[MeasureReading]:
     """Every measure of a result."""
-    keys = ("measure_units", "limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
-    units, limits, bounds, texts, rules, courses = (attribute(result, key) for key in keys)
+    keys = ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
+    result = without_noise(result)
+    units = units_along(result["nominal"], "measure")
+    limits, bounds, texts, rules, courses = (attribute(result, key) for key in keys)
     found = []
     for i, name in enumerate(names(result, "measure")):
         about = [(one[i] if i < len(one) else None) or (None, None) for one in (limits, bounds)]

@@ -1,0 +1,152 @@
+"""Where the members of a variable have units of their own, the variable says so, and a coordinate has that of each."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+import trunnion
+from mechanisms import excavator, model, slider_crank
+from mechanisms_space import draw
+from trunnion import Mechanism
+from trunnion.results.dataset import unit_of, units_along
+from trunnion.results.export import save
+from trunnion.results.tables import columns
+
+MIXED = {"S": "N", "K": "N m"}
+COORDINATES = {"S": "m", "K": "rad"}
+
+
+def mixed(space: str) -> Mechanism:
+    """A cylinder S and a motor K, each with a driver."""
+    if space == "spatial":
+        joints = {"S": ("prismatic", "ground", "slide"), "K": ("revolute", "slide", "hand")}
+        return Mechanism(**draw(3, joints, ("S", "K")).data)
+    data = excavator()
+    data["joints"]["C"]["pin"] = {"radius": 0.01, "clearance": 1e-4, "length": 0.03}
+    data["springs"] = {
+        "coil": {"between": ["ground.B", "boom.K"], "stiffness": 10.0, "free_length": 1.0},
+        "torsion": {"joint": "K", "stiffness": 2.0, "free_angle": 0.1},
+    }
+    data["measures"] = {
+        "push": {"effort": "S", "as": "maximum"},
+        "turn": {"effort": "K", "as": "maximum"},
+        "swing": {"angle": "boom"},
+    }
+    data["dimensions"] = {"reach": "0.9 m"}
+    data["links"]["boom"]["points"]["C"] = ["reach", 0.15]
+    data["tolerances"] = {"reach": 1e-3, "joint_defaults.friction.coefficient": 0.01}
+    return Mechanism(**model(data))
+
+
+def of_each(variable: xr.DataArray, dim: str) -> dict[str, str]:
+    """The unit of every member, which is the coordinate's where there are several."""
+    units = dict(zip(variable[dim].values.tolist(), units_along(variable, dim), strict=True))
+    assert variable.attrs["units"] == " or ".join(dict.fromkeys(units.values()))
+    for member, unit in units.items():
+        assert unit_of(variable.sel({dim: member})) == unit
+    if len(set(units.values())) > 1:
+        assert variable[variable.attrs["units_of_each"]].values.tolist() == list(units.values())
+    return units
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_efforts_of_mixed_drivers(space: str) -> None:
+    result = trunnion.locking(mixed(space), 6)
+    for end in ("", "_lower", "_upper", "_rms", "_reverse"):
+        assert of_each(result[f"drive_effort{end}"], "driver") == MIXED
+    flat = {name: unit for name, unit, _ in columns(result)}
+    assert {name: flat[f"{name}.effort"] for name in MIXED} == MIXED
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_xarray_labels_a_mixed_effort_with_both_units_and_titles_it_with_its_own(space: str) -> None:
+    axes = Figure().subplots()
+    trunnion.analyse(mixed(space), 6)["drive_effort"].sel(driver="S").plot(ax=axes)
+    assert " or " in axes.get_ylabel()
+    assert "effort_unit = N" in axes.get_title()
+
+
+@pytest.mark.parametrize(("driver", "unit"), [("A", "N m"), ("C", "N")])
+def test_drivers_of_one_kind_have_one_unit_and_no_more_coordinates(driver: str, unit: str) -> None:
+    data = slider_crank()
+    data["drivers"] = {driver: {"speed": 0.1, "range": [0.8, 1.1]}}
+    result = trunnion.analyse(Mechanism(**model(data)), 6)
+    assert result["drive_effort"].attrs["units"] == result["drive_effort_rms"].attrs["units"] == unit
+    assert not [name for name in result.coords if str(name).endswith("_unit")]
+
+
+def test_springs_and_measures() -> None:
+    result = trunnion.analyse(mixed("planar"), 6)
+    assert of_each(result["spring_force"], "spring") == {"coil": "N", "torsion": "N m"}
+    assert of_each(result["spring_elongation"], "spring") == {"coil": "m", "torsion": "rad"}
+    assert of_each(result["measure_value"], "measure") == {"push": "N", "turn": "N m", "swing": "rad"}
+    assert of_each(result["measure_figure"], "measure") == {"push": "N", "turn": "N m", "swing": "rad"}
+
+
+def test_sweep_and_its_errors_of_joints() -> None:
+    data = excavator()
+    data["joints"]["C"]["pin"] = {"radius": 0.01, "clearance": 1e-4, "length": 0.03}
+    data["joints"]["C"]["seat"] = {"xi": 0.5}
+    data["dimensions"] = {"reach": "0.9 m"}
+    data["links"]["boom"]["points"]["C"] = ["reach", 0.15]
+    swept = trunnion.sweep(Mechanism(**model(data)), {"reach": [0.9, 0.91]}, steps=6)
+    for end in ("min", "max", "rms"):
+        assert of_each(swept[f"drive_effort_{end}"], "driver") == MIXED
+    assert of_each(swept["transmission_error_max"], "joint") == {**dict.fromkeys("ABCK", "rad"), "S": "m"}
+    assert {name: unit for name, unit, _ in columns(swept)}["S.effort_max"] == "N"
+
+
+def test_motion_in_time() -> None:
+    data = excavator()
+    data["drivers"]["S"] |= {"free": True}
+    result = trunnion.simulate(Mechanism(**model(data)), 0.02, steps=4)
+    assert of_each(result["drive_effort"], "driver") == MIXED
+    assert of_each(result["drive_coordinate"], "driver") == COORDINATES
+    assert of_each(result["drive_rate"], "driver") == {name: f"{unit}/s" for name, unit in COORDINATES.items()}
+    flat = {name: unit for name, unit, _ in columns(result)}
+    assert {name: flat[f"{name}.coordinate"] for name in MIXED} == COORDINATES
+
+
+def test_play_and_tolerance() -> None:
+    mechanism = mixed("planar")
+    played = trunnion.play(mechanism, measures=["effort:S", "effort:K", "angle:boom"], steps=6)
+    units = ["N", "N m", "rad"]
+    assert list(of_each(played["worst_case_total"], "measure").values()) == units
+    assert list(of_each(played["sensitivity"], "measure").values()) == [f"{unit}/m" for unit in units]
+    study = trunnion.tolerance(mechanism, ["push", "turn"], methods=["linear"], steps=6)
+    assert of_each(study["rss"], "measure") == {"push": "N", "turn": "N m"}
+    assert set(of_each(study["parameter_nominal"], "parameter").values()) == {"m", "1"}
+    assert study["sensitivity"].attrs["units"] == "(N or N m)/(m or 1)"
+
+
+def test_what_assembles() -> None:
+    assert of_each(trunnion.assemble(mixed("planar"), 6)["drive_coordinate"], "driver") == COORDINATES
+
+
+@pytest.mark.parametrize("ending", ["nc", "zarr", "json"])
+def test_files_keep_the_unit_of_each(ending: str, tmp_path: Path) -> None:
+    readers: dict[str, Callable[[Path], xr.Dataset]] = {"nc": xr.load_dataset, "zarr": xr.open_zarr}
+    path = tmp_path / f"x.{ending}"
+    if ending == "zarr":
+        pytest.importorskip("zarr")
+    save(trunnion.analyse(mixed("planar"), 6), path)
+    if ending in readers:
+        assert of_each(readers[ending](path)["drive_effort"], "driver") == MIXED
+    else:
+        assert '"effort_unit"' in path.read_text()
+
+
+def test_the_units_row_has_the_unit_of_each(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    save(trunnion.analyse(mixed("planar"), 6), path, units_row=True)
+    with path.open() as file:
+        names, units = (next(rows) for rows in [csv.reader(file)] * 2)
+    row = dict(zip(names, units, strict=True))
+    meant = {"S.effort": "N", "K.effort": "N m", "coil.force": "N", "torsion.force": "N m", "torsion.elongation": "rad"}
+    assert {name: row[name] for name in meant} == meant

@@ -125,7 +125,7 @@ def _zarr(result: xr.Dataset, path: Path, units_row: bool, columns: Columns) -> 
 
 
 def _uninterrupted(write: Callable[[], object]) -> None:
-    """Write in a thread of its own, to its end: a signal raises in the main thread alone, and Zarr goes on behind one."""
+    """Write to the end in a thread of its own: a signal raises in the main thread, and Zarr would go on behind it."""
     with ThreadPoolExecutor(1) as thread:
         thread.submit(write).result()
 

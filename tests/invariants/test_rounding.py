@@ -1,0 +1,200 @@
+"""What is no more than rounding is 0 in every figure, has no place and makes no finding, however large all is."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import trunnion
+from mechanisms import inverted_slider_crank, model, slider_crank, transformed
+from mechanisms_space import rssr
+from trunnion import Mechanism
+from trunnion.results.quantities import parts
+from trunnion.results.scales import Scales, extreme_place, scales_in, without_noise
+
+Data = dict[str, Any]
+SIZES = [(1.0, 1.0), (1e-6, 1e-6), (1e6, 1e6), (1e-6, 1e6), (1e6, 1e-6)]
+
+
+def sized(data: Any, length: float, force: float, key: str = "") -> Any:
+    """A model with all its lengths and forces so many times as large, at the same angular speeds."""
+    powers = {
+        **dict.fromkeys(("at", "centre", "radius", "length", "bearing", "clearance", "gravity", "points"), length),
+        **dict.fromkeys(("moment", "resisting_torque", "inertia"), force * length),
+        "force": force,
+        "mass": force / length,
+    }
+    factor = powers.get(key, 1.0)
+    if isinstance(data, dict):
+        inner = key if key in ("points", "inertia", "assembly") else ""
+        return {name: sized(value, length, force, name if name in powers or not inner else inner)
+                for name, value in data.items()}  # fmt: skip
+    if isinstance(data, list) and data and not isinstance(data[0], str):
+        return [length * one if key == "assembly" else factor * one for one in data]
+    return factor * data if isinstance(data, float | int) and factor != 1.0 else data
+
+
+def balanced(space: str = "planar") -> Data:
+    """A massless mechanism whose loads cancel but for rounding, rocked back and forth by its driver."""
+    moments = {"a": 0.3, "b": -0.1, "c": -0.2}
+    if space == "spatial":
+        data = rssr(friction=0.1).data
+        loads = {
+            name: {"link": "rocker", "moment": [0.0, 0.0, one]}
+            for name, one in zip("abc", (0.3, -0.1, -0.2), strict=True)
+        }
+    else:
+        data = transformed(model(slider_crank(offset=0.0), friction=0.1), 0.3)
+        loads = {name: {"link": "rod", "moment": one} for name, one in moments.items()}
+    data["drivers"] = {"A": {"law": "harmonic", "mean": 1.0, "amplitude": 0.4, "period": 1.0}}
+    for link in data["links"].values():
+        for key in ("mass", "centre", "inertia"):
+            link.pop(key, None)
+    return {**data, "gravity": [0.0] * len(data["gravity"]), "loads": loads}
+
+
+def parallel() -> Data:
+    """A parallelogram, of which neither the coupler turns nor the distance of its pins changes."""
+    return {
+        "gravity": [0, -9.81],
+        "links": {
+            "ground": {"points": {"A": [0, 0], "D": [0.1, 0.07]}},
+            "crank": {"points": {"A": [0, 0], "B": [0.03, 0]}},
+            "coupler": {"points": {"B": [0, 0], "C": [0.1, 0.07]}, "mass": 1.0},
+            "rocker": {"points": {"D": [0, 0], "C": [0.03, 0]}},
+        },
+        "joints": {
+            name: {"type": "revolute", "links": list(links)}
+            for name, links in {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"),
+                                "D": ("ground", "rocker")}.items()
+        },
+        "joint_defaults": {"pin": {"radius": 0.005}, "friction": 0.1},
+        "drivers": {"A": {"speed": 2.0, "range": [1.0, 3.0]}},
+        "assembly": {"C": [0.1162, 0.0952]},
+        "measures": {
+            "tilt": {"angle": "coupler", "as": "peak-to-peak"},
+            "turn": {"angular_velocity": "coupler", "as": "maximum"},
+        },
+    }  # fmt: skip
+
+
+def digits(result: Any) -> list[tuple[str, str]]:
+    """Labels and significant digits of the summary, as the terminal prints them."""
+    rows = []
+    for one in result.trunnion.summary:
+        if not one.numerical:
+            text = one.value if isinstance(one.value, str) or one.value is None else parts(one.value, one.unit)[0]
+            rows.append((one.label, str(text).replace(".", "").lstrip("−0")))
+    return rows
+
+
+@pytest.mark.parametrize(("length", "force"), SIZES[1:])
+@pytest.mark.parametrize("name", ["slider-crank", "inverted", "rssr", "balanced", "balanced rssr", "parallelogram"])
+def test_digits_do_not_depend_on_the_size_of_a_mechanism(name: str, length: float, force: float) -> None:
+    data = {
+        "slider-crank": lambda: model(slider_crank(offset=0.0)), "inverted": lambda: model(inverted_slider_crank()),
+        "rssr": lambda: rssr(friction=0.1).data, "balanced": balanced, "balanced rssr": lambda: balanced("spatial"),
+        "parallelogram": parallel,
+    }[name]()  # fmt: skip
+    one = trunnion.analyse(Mechanism(**copy.deepcopy(data)), 24)
+    other = trunnion.analyse(Mechanism(**sized(data, length, force)), 24)
+    assert digits(other) == digits(one)
+    assert [f.code for f in other.trunnion.findings] == [f.code for f in one.trunnion.findings]
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize(("length", "force"), SIZES)
+def test_forces_that_cancel_are_0_everywhere_and_no_finding(space: str, length: float, force: float) -> None:
+    result = trunnion.analyse(Mechanism(**sized(balanced(space), length, force)), 24)
+    for one in result.trunnion.summary:
+        if one.unit in ("N", "N m", "W"):
+            assert one.value == 0, one
+            assert one.place in ("", "everywhere"), one
+    codes = [one.code for one in result.trunnion.findings]
+    assert not [code for code in codes if code.startswith(("friction.", "effort."))]
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_forces_that_cancel_leave_rounding(space: str) -> None:
+    """Else the test above would show nothing."""
+    assert np.any(trunnion.analyse(Mechanism(**balanced(space)), 24)["drive_effort"].values != 0)
+
+
+@pytest.mark.parametrize(("length", "force"), SIZES)
+def test_a_measure_that_does_not_move_is_0(length: float, force: float) -> None:
+    result = trunnion.analyse(Mechanism(**sized(parallel(), length, force)), 24)
+    figures = {one.name: one.value for one in result.trunnion.summary}
+    assert figures["tilt"] == figures["turn"] == 0
+    assert without_noise(result)["link_angle_velocity"].sel(link="coupler").values.tolist() == [0.0] * 24
+
+
+@pytest.mark.parametrize(("length", "force"), SIZES)
+def test_what_is_constant_has_no_place(length: float, force: float) -> None:
+    """A gear pair whose torque, friction and margin are the same all the way round."""
+    data = {
+        "gravity": [0, 0],
+        "links": {"ground": {"points": {"A": [0, 0], "B": [0.06, 0]}}, "one": {"points": {"A": [0, 0]}},
+                  "two": {"points": {"B": [0, 0]}}},
+        "joints": {"A": {"type": "revolute", "links": ["ground", "one"]},
+                   "B": {"type": "revolute", "links": ["ground", "two"]}},
+        "gears": {"G": {"joints": ["A", "B"], "ratio": -1.0}},
+        "joint_defaults": {"pin": {"radius": 0.02}, "friction": 0.5},
+        "drivers": {"A": {"speed": 1.0}},
+        "loads": {"pump": {"link": "two", "moment": 5.0, "useful": True}},
+    }  # fmt: skip
+    mechanism = Mechanism(**sized(data, length, force))
+    placed = {one.name: one.place for one in trunnion.analyse(mechanism, 31).trunnion.summary if one.place}
+    assert {"A.effort_min", "B.reaction_max", "locking_margin", "B.critical_coefficient"} <= placed.keys()
+    assert set(placed.values()) == {"everywhere"}
+
+
+def test_what_moves_keeps_its_place() -> None:
+    summary = trunnion.analyse(Mechanism(**model(slider_crank())), 24).trunnion.summary
+    places = [one.place for one in summary if one.name in ("A.effort_min", "A.effort_max", "C.reaction_max")]
+    assert len(places) == 3
+    assert all(place.startswith("at ") for place in places)
+
+
+def test_play_and_tolerances_that_do_nothing() -> None:
+    """The length of a parallelogram's cranks does not tilt its coupler while both are alike."""
+    data = parallel()
+    data["dimensions"] = {"crank": "30 mm"}
+    for link, pin in (("crank", "B"), ("rocker", "C")):
+        data["links"][link]["points"][pin] = ["crank", 0]
+    data["tolerances"] = {"crank": "±0.1 mm"}
+    study = trunnion.tolerance(Mechanism(**data), ["angle:coupler"], methods=("linear",), steps=12)
+    assert {one.value for one in study.trunnion.summary if one.unit == "rad"} == {0}
+
+
+def test_a_sweep_tells_its_scales() -> None:
+    swept = trunnion.sweep(Mechanism(**balanced()), {"joint_defaults.friction.coefficient": [0.1, 0.2]}, steps=12)
+    assert np.all(without_noise(swept)["drive_effort_max"].values == 0)
+
+
+@given(st.floats(1e-9, 1e9), st.floats(1e-6, 1e6), st.floats(1e-9, 1e9))
+def test_a_floor_follows_the_dimension_of_its_unit(length: float, rate: float, force: float) -> None:
+    floor, unit = Scales(length, rate, force).floor, Scales(1.0, 1.0, 1.0).floor("1")
+    made = {"m": length, "mm": 1e3 * length, "1/s": rate, "rad/s": rate, "m/s^2": length * rate**2, "N": force,
+            "N m": force * length, "W": force * length * rate, "kg m^2": force * length / rate**2,
+            "rad": 1.0, "1": 1.0, "": 1.0}  # fmt: skip
+    for name, size in made.items():
+        if name != "1/s":
+            assert floor(name) == pytest.approx(unit * size, rel=1e-9)
+    assert np.isnan(floor("of its RMS"))
+
+
+def test_an_unloaded_mechanism_has_no_floor_of_forces_and_a_bare_dataset_none() -> None:
+    assert Scales(1.0, 1.0, 0.0).floor("rad/(N s)") == Scales(1.0, 1.0, 0.0).floor("N m") == 0
+    result = trunnion.analyse(Mechanism(**model(slider_crank())), 6)
+    bare = result.assign_attrs(dict.fromkeys(result.attrs, ""))
+    bare.attrs = {}
+    assert np.isnan(scales_in(bare).length)
+    assert without_noise(bare).identical(bare)
+    assert extreme_place(np.array([np.nan, 2.0, 2.0]), "at 4°") == "everywhere"
+    assert extreme_place(np.array([2.0]), "at 4°") == "at 4°"
+    assert extreme_place(np.array([2.0, np.inf]), "at 4°") == "at 4°"

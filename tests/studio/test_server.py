@@ -257,7 +257,7 @@ def test_another_file_is_replaced_only_where_that_is_said(served, content):
         {"opened": "other.yaml", "saved": "services: {}\n"},
     ):
         status, told = saved(served, "compose", "name: mine", **how)
-        assert (status, told["there"]) == (409, "compose.yaml")
+        assert (status, told["existing"]) == (409, "compose.yaml")
         assert there.read_bytes() == content
     assert saved(served, "compose", "name: mine", over=True) == (200, {"saved": "compose.yaml"})
     assert saved(served, "compose.yaml", "name: more", opened="compose.yaml", saved="name: mine")[0] == 200

@@ -131,11 +131,11 @@ class Studio:
     def _knows(self, token: str) -> bool:
         return secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
 
-    def _own(self, handle: Handler, known: Callable[[Request], bool] = lambda _: True) -> Handler:
+    def _own(self, handle: Handler, admits: Callable[[Request], bool] = lambda _: True) -> Handler:
         """A handler for requests of the own page. What it cannot do is an answer in words."""
 
         async def guarded(request: Request) -> Response:
-            refusal = self._refusal(request) or (None if known(request) else PRINTED)
+            refusal = self._refusal(request) or (None if admits(request) else PRINTED)
             if refusal is not None:
                 return PlainTextResponse(refusal, status_code=403)
             try:
@@ -239,24 +239,20 @@ class Studio:
         """Save `{text, opened, saved, over}` under a name, .yaml where it has no ending.
 
         opened, saved: the file that the page shows and the text that it has read there or written; over: whether
-        another text that is there may be lost. Without that it stays, and the answer says so, 409 with `there`.
+        another text that is there may be lost. Without that it stays, and the answer says so, 409 with `existing`.
         """
-        asked, name = json.loads(await request.body()), request.path_params["name"]
-        if not isinstance(asked, dict) or not isinstance(asked.get("text"), str):
+        body, name = json.loads(await request.body()), request.path_params["name"]
+        if not isinstance(body, dict) or not isinstance(body.get("text"), str):
             raise ValueError("there is no text to be saved")
-        content = asked["text"].encode()
+        content = body["text"].encode()
         if len(content) > MOST_BYTES:
             raise ValueError(f"a model of {len(content):,} bytes is not saved; {MOST_BYTES:,} at most")
         path = self._model(name if Path(name).suffix else f"{name}.yaml")
-        opened = path.name == asked.get("opened")
+        opened = path.name == body.get("opened")
         made = not path.exists()
-        if (
-            not made
-            and asked.get("over") is not True
-            and self._other(path, asked["text"], opened and asked.get("saved"))
-        ):
+        if not made and body.get("over") is not True and self._other(path, body["text"], opened and body.get("saved")):
             what = "was changed elsewhere since it was opened" if opened else "is there already, with another text"
-            return JSONResponse({"error": f"{path.name} {what}.", "there": path.name}, status_code=409)
+            return JSONResponse({"error": f"{path.name} {what}.", "existing": path.name}, status_code=409)
         if made:
             path.touch(exist_ok=False)  # a file that comes meanwhile is not replaced
         try:
@@ -284,8 +280,8 @@ class Studio:
         await socket.accept(subprotocol=SUBPROTOCOL)
         with contextlib.suppress(WebSocketDisconnect):
             while (question := await socket.receive())["type"] == "websocket.receive":
-                asked = question.get("bytes") or (question.get("text") or "").encode()
-                await socket.send_bytes(await run_in_threadpool(_answered, asked))
+                content = question.get("bytes") or (question.get("text") or "").encode()
+                await socket.send_bytes(await run_in_threadpool(_answered, content))
 
 
 async def _thumbnail(request: Request) -> Response:

@@ -13,11 +13,10 @@ import { connection, decode, request } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
-const PRINTED = "the address that `trunnion studio` prints";
-const STOPPED = `The studio on this machine has stopped. Start it again and open its new address, ${PRINTED}: your work is kept in this browser and offered there, on the same port.`;
-const STRANGER = `This browser is not let in yet. Open ${PRINTED}. A link that holds a model goes on with #m=: open it again then, or paste it under File, Open.`;
+const STOPPED = "The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.";
+const STRANGER = "This browser is not let in yet. Open the address that `trunnion studio` printed. A link that holds a model goes on with #m=: open it again then, or paste it under File, Open.";
 
-let link;
+let link = { ask: async (_kind, _fields) => null }; // nobody, until this page is let in
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
 export function start() {
@@ -26,7 +25,7 @@ export function start() {
 }
 
 async function begun() {
-  const reply = await request("/files");
+  const [reply] = await Promise.all([request("/files"), enterTab()]);
   if (reply.status === 403) return void (state.stopped.value = STRANGER);
   link = connection((open) => {
     state.connected.value = open;
@@ -36,7 +35,6 @@ async function begun() {
   });
   const files = reply.ok ? await reply.json() : { folder: "", id: "", files: [], open: null };
   state.folder.value = { folder: files.folder, id: files.id, names: files.files };
-  await enterTab();
   if (!sheets) await opened(files);
   if (!reply.ok) state.say("The folder could not be read.", true);
   state.waiting.value = leftBehind(files.files);
@@ -306,7 +304,7 @@ async function shipped({ name, title }) {
   await openText(found.text, `Example ${title || name} opened`);
 }
 
-/** Save under a name, or ask for one; `over`: another text that is there may be lost. {error, there} where it was refused, else {}. */
+/** Save under a name, or ask for one; `over`: another text that is there may be lost. {error, existing} where it was refused, else {}. */
 export function save(name = state.fileName.value, over = false) {
   const gone = () => refused({ error: `${name} was not saved: the studio on this machine does not answer.` });
   if (name) return counted(stored(name, over).catch(gone));
@@ -331,9 +329,10 @@ async function stored(name, over) {
   return {};
 }
 
-function refused(told) {
-  state.say(told.there && !state.dialog.value ? `${told.error} Replace it by File, Save as; save under another name; or open it again.` : told.error, true);
-  return told;
+function refused(refusal) {
+  const remedy = refusal.existing && !state.dialog.value ? " Replace it by File, Save as; save under another name; or open it again." : "";
+  state.say(`${refusal.error}${remedy}`, true);
+  return refusal;
 }
 
 /** Export and hand the file to the browser. */

@@ -9,7 +9,7 @@ import { carries } from "./links.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
-const NO_REFUSAL = { error: "", there: "" };
+const NO_REFUSAL = { error: "", existing: "" };
 
 export function Dialogs() {
   const name = state.dialog.value;
@@ -48,22 +48,22 @@ function Open() {
 
 function Save() {
   const [name, setName] = useState(state.fileName.value ?? `${stemOf(state.answer.value?.entries)}.yaml`);
-  const [told, setTold] = useState(NO_REFUSAL);
-  const put = async (over) => setTold(await save(name, over));
+  const [refusal, setRefusal] = useState(NO_REFUSAL);
+  const put = async (over) => setRefusal(await save(name, over));
   const submit = (event) => {
     event.preventDefault();
     return put(false);
   };
   const type = ({ target }) => {
     setName(target.value);
-    setTold(NO_REFUSAL);
+    setRefusal(NO_REFUSAL);
   };
   return html`<form onSubmit=${submit}>
     <h2>Save as</h2>
     <label class="choice wide-choice">Name <input value=${name} onInput=${type} onFocus=${({ target }) => target.select()} required autofocus /></label>
     <p class="calm">In ${state.folder.value.folder}</p>
-    <p class="wrong" role="alert">${told.error}</p>
-    <p class="row-of-buttons end">${told.there && html`<${Button} label=${`Replace ${told.there}`} onClick=${() => put(true)} />`}<button type="submit" class="plain strong">Save</button></p>
+    <p class="wrong" role="alert">${refusal.error}</p>
+    <p class="row-of-buttons end">${refusal.existing && html`<${Button} label=${`Replace ${refusal.existing}`} onClick=${() => put(true)} />`}<button type="submit" class="plain strong">Save</button></p>
   </form>`; // prettier-ignore
 }
 

@@ -29,8 +29,8 @@ export async function enterTab() {
 function held(name) {
   return new Promise((resolve, reject) => {
     if (!navigator.locks) return resolve();
-    const taken = () => (resolve(), new Promise(() => {})); // until the page is gone
-    navigator.locks.request(name, { signal: AbortSignal.timeout(PATIENCE) }, taken).catch(reject);
+    const hold = () => (resolve(), new Promise(() => {})); // until the page is gone
+    navigator.locks.request(name, { signal: AbortSignal.timeout(PATIENCE) }, hold).catch(reject);
   });
 }
 

@@ -4,7 +4,6 @@
 
 const AGAIN = 800; // ms until a lost connection is tried again
 const TOKEN = "trunnion studio token";
-const STORES = () => [localStorage, sessionStorage]; // the one for other tabs of this address; the other where that is full
 
 /** What the server knows this page by; it stays that of the server that the page came from. */
 let token = "";
@@ -12,16 +11,17 @@ let token = "";
 /** Take the token that the document came with and keep it, else that which was kept; its address goes out of sight. */
 export function enter() {
   token = /** @type {HTMLMetaElement} */ (document.querySelector("meta[name=token]")).content;
-  if (!token) token = tried((store) => store.getItem(TOKEN)).find(Boolean) ?? "";
-  else if (tried((store) => (store.setItem(TOKEN, token), true)).some(Boolean)) history.replaceState(null, "", location.pathname + location.hash);
+  if (!token) token = inStores((store) => store.getItem(TOKEN)).find(Boolean) ?? "";
+  else if (inStores((store) => (store.setItem(TOKEN, token), true)).some(Boolean)) history.replaceState(null, "", location.pathname + location.hash);
 }
 
-function tried(act) {
-  return [0, 1].map((order) => {
+/** What comes of an act in the storage that all tabs share, and in that of this tab: the first may be full, both may be off. */
+function inStores(act) {
+  return ["localStorage", "sessionStorage"].map((name) => {
     try {
-      return act(STORES()[order]);
+      return act(window[name]);
     } catch {
-      return null; // storage is off or full
+      return null;
     }
   });
 }

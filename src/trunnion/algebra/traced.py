@@ -215,13 +215,26 @@ functions: Any = _Functions()
 
 
 def looped(step: Callable[[list[Any]], list[Any]], start: Sequence[Any], rounds: int) -> list[Any]:
-    """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers."""
-    if rounds < 1:
-        return list(start)
-    if not any(isinstance(one, Traced) for one in start):  # plain numbers; what a round makes of them tells the kind
-        return looped(step, step(list(start)), rounds - 1)
-    kind = next(type(one) for one in start if isinstance(one, Traced))
-    return kind.looped(step, start, rounds)
+    """step(… step(start)), with the step compiled once. start, and what a step makes of it: lists of numbers.
+
+    It ends with the first step that changes nothing.
+    """
+    state = list(start)
+    for done in range(rounds):
+        kind = next((type(number) for number in state if isinstance(number, Traced)), None)
+        if kind is not None:  # where plain numbers start, what a round makes of them tells the kind
+            return kind.looped(step, state, rounds - done)
+        before, state = state, step(state)
+        if all(_same(a, b) for a, b in zip(before, state, strict=True)):
+            break
+    return state
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether plain numbers are equal in value and shape; NaN is NaN. Numbers that are recorded never are."""
+    if isinstance(one, Traced) or isinstance(other, Traced):
+        return False
+    return np.shape(one) == np.shape(other) and np.array_equal(one, other, equal_nan=True)
 
 
 def kept(number: Any) -> Any:

@@ -89,12 +89,11 @@ def _alone(problem: FrictionProblem, own: NDArray[np.bool_], most: float) -> lis
     if len(lane):
         part, mine = every.mapped(lambda number: number[lane]), own[joint].T
 
-        def weights(share: Array, lanes: NDArray[np.intp]) -> Sequence[Array]:
+        def weights(share: Array) -> Sequence[Array]:
             others_, theirs = np.minimum(share, 1.0), np.maximum(share - 1.0, 0.0)
-            return list(np.where(mine[:, lanes], theirs, others_))
+            return list(np.where(mine, theirs, others_))
 
-        start = frictionless(part, np.ones(len(lane), bool))
-        _, reached = continuation.follow(scaled(part, weights), start, 1.0 + most)
+        _, reached = continuation.follow(scaled(part, weights), frictionless(part), 1.0 + most)
         result[doubtful] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
     return list(result)
 

@@ -338,36 +338,30 @@ def _follow(
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
-    found, reached = continuation.follow(scaled(part), frictionless(part, chosen))
+    found, reached = continuation.follow(scaled(part), frictionless(part))
     result = [replaced(force, chosen, value) for force, value in zip(forces, found, strict=True)]
     shares = np.ones(shape)
     shares[chosen] = reached
     return result, shares
 
 
-Weights = Callable[[NDArray[np.float64], NDArray[np.intp]], Sequence[Number]]
+def scaled(
+    problem: FrictionProblem, weights: Callable[[Number], Sequence[Number]] | None = None
+) -> continuation.System:
+    """Residual φ − w(s) law(N(φ)) and its Jacobian. weights: multiple of each contact's friction at a share, or s."""
+    last: list[Any] = [(), (), ()]  # forces, and what follows from them: the next share begins where one ended
 
+    def laws(forces: Sequence[Number]) -> tuple[list[Number], list[list[Number]]]:
+        if problem.compiled or not last[0] or not all(map(np.array_equal, forces, last[0])):
+            state = problem.state(forces)
+            last[:] = forces, problem.target(state.normals), problem.map_derivative(state)
+        return last[1], last[2]
 
-def scaled(problem: FrictionProblem, weights: Weights | None = None) -> continuation.Family:
-    """Residual φ − w(s) law(N(φ)) and its Jacobian; w(s, lanes): multiple of each contact's friction, or s."""
+    def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
+        multiples = [share] * len(problem.contacts) if weights is None else weights(share)
+        return balance(problem, forces, *laws(forces), multiples)
 
-    def family(lanes: NDArray[np.intp]) -> continuation.System:
-        part = problem.mapped(lambda number: number[lanes])
-        last: list[Any] = [(), (), ()]  # forces, and what follows from them: the next share begins where one ended
-
-        def laws(forces: Sequence[NDArray[np.float64]]) -> tuple[list[Number], list[list[Number]]]:
-            if not last[0] or not all(map(np.array_equal, forces, last[0])):
-                state = part.state(forces)
-                last[:] = forces, part.target(state.normals), part.map_derivative(state)
-            return last[1], last[2]
-
-        def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
-            found = [share] * len(part.contacts) if weights is None else weights(share, lanes)
-            return balance(part, forces, *laws(forces), found)
-
-        return system
-
-    return family
+    return system
 
 
 def balance(
@@ -384,11 +378,10 @@ def balance(
     return residual, identity_minus(rows)
 
 
-def frictionless(problem: FrictionProblem, chosen: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
-    """Forces without friction, lane by lane: none but those that push gears apart."""
-    none = [np.zeros(int(np.count_nonzero(chosen))) for _ in problem.contacts]
-    target = problem.target(problem.state(none).normals)
-    return [zero if c.rubs else zero + t for zero, c, t in zip(none, problem.contacts, target, strict=True)]
+def frictionless(problem: FrictionProblem) -> list[Number]:
+    """Forces without friction: none but those that push gears apart."""
+    target = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
+    return [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
 
 
 def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:

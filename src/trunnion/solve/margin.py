@@ -7,8 +7,6 @@ problem, φ = s law(N(R₀ + G φ)), whose G is triangular by modules, and it is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from trunnion.algebra.namespace import Number
@@ -18,7 +16,6 @@ from trunnion.solve.backward import Backward, pass_on, unloaded
 from trunnion.solve.friction import (
     Contact,
     FrictionProblem,
-    balance,
     frictionless,
     primal_of,
     scaled,
@@ -99,7 +96,7 @@ def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: N
     if not np.any(doubtful):
         return margin
     part, chosen = problem.picked(doubtful)
-    _, reached = continuation.follow(scaled(part), frictionless(part, chosen), most)
+    _, reached = continuation.follow(scaled(part), frictionless(part), most)
     margin = np.broadcast_to(margin, chosen.shape).copy()
     margin[chosen] = np.where(reached >= most, np.inf, reached)
     return margin
@@ -108,16 +105,9 @@ def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: N
 def _compiled(problem: FrictionProblem, bound: Number, most: float) -> Number:
     """The same of numbers that are compiled; lanes whose bound is 1 or more are NumPy's."""
 
-    def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
-        state = problem.state(forces)
-        laws = problem.target(state.normals), problem.map_derivative(state)
-        return balance(problem, forces, *laws, [share] * len(problem.contacts))
-
-    none: list[Number] = [0.0] * len(problem.contacts)
     bound = np.where(_loaded(problem), bound, 0.0)
-    target = problem.target(problem.state(none).normals)
-    start = [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
-    reached = continuation.followed(system, start, (bound * most >= 1.0) & (bound < 1.0), most)
+    wanted = (bound * most >= 1.0) & (bound < 1.0)
+    _, reached = continuation.follow(scaled(problem), frictionless(problem), most, wanted)
     return np.where(reached >= most, np.inf, reached)
 
 

@@ -12,10 +12,10 @@ from mechanisms import build, four_bar, slider_crank
 from mechanisms_space import cardan, rssr
 from trunnion import Mechanism
 from trunnion.cycle.near_locking import locks
-from trunnion.solve.compiled_vectors import VectorKernel
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.walk_kernel import WalkKernel
 
 Array = Any
 STEPS, MECHANISMS, ALONE = 24, 20, slice(None, None, 5)
@@ -98,6 +98,6 @@ def test_the_compiled_margin_is_the_same(name: str, seed: int) -> None:
     pytest.importorskip("llvmlite")
     run = prepared(name, seed)
     time = run.cycle.times(STEPS)
-    kernel = VectorKernel(run, {"margin": locking_margin}, method=FrictionMethod(margin_up_to=10.0))
+    kernel = WalkKernel(run, {"margin": locking_margin}, method=FrictionMethod(margin_up_to=10.0))
     compiled = kernel.curves(run.values, time)[0]["margin"][0]
     np.testing.assert_allclose(compiled, margins(run, time), rtol=SAME)

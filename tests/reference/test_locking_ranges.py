@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ from test_locking import CRITICAL, pushed_slider
 import trunnion
 from mechanisms import eccentric_press
 from mechanisms_parts import Data, plunger, revolute
+from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, ranges, report_figures
 from trunnion.cycle.locking_ends import ends
 from trunnion.cycle.locking_states import NO_MARGIN
 from trunnion.results.attributes import attribute, summary_of
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -248,21 +251,75 @@ def test_a_useful_spring_drives_backward_as_a_load_does() -> None:
     np.testing.assert_allclose(found["useful_power"].values, -found["spring_power"].values[0], rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("spring", "said"),
-    [
-        ({"preload": 100.0}, True),
-        ({"stiffness": 1e4, "free_length": 0.1}, True),
-        ({"stiffness": 1e4, "free_length": 0.1, "useful": True}, False),
-        ({"damping": 50.0}, False),  # it stores nothing
-    ],
-)
-def test_springs_that_store_energy_and_are_not_marked_useful_are_told(spring: dict[str, float], said: bool) -> None:
-    found = locking(spring_hoist(**spring), 40)
-    codes = [row["code"] for row in attribute(found, "findings")]
-    assert ("locking.springs_not_useful" in codes) == said
-    if said:
-        assert set(states(found)) == {LockingState.RUNS}
+def test_a_spring_pushes_whether_it_is_useful_or_not() -> None:
+    one, other = (locking(spring_hoist(stiffness=1e4, free_length=0.1, useful=useful), 40) for useful in (True, False))
+    np.testing.assert_array_equal(states(one), states(other))
+    np.testing.assert_array_equal(one["holding_multiple"], other["holding_multiple"])
+    assert {LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING} <= set(states(one))
+    assert np.all(np.isnan(other["efficiency_reverse_instant"]))
+
+
+def lift(by_mass: bool) -> Mechanism:
+    """A slide lifts what weighs on the end of its lever: a mass, or the same force as a load."""
+    data: Data = slide_hoist().model_dump(by_alias=True, exclude_unset=True)
+    data["drivers"]["Z"] = {"speed": 1e-6, "range": [-0.1, 0.01]}
+    if by_mass:
+        data |= {"loads": {}, "gravity": [0, -9.81]}
+        data["links"]["crank"] |= {"mass": 100 / 9.81, "centre": [ARM, 0]}
+    return Mechanism(**data)
+
+
+def swing(by_mass: bool) -> Mechanism:
+    """A crank in space swings a rocker with a weight, a mass or the same force as a load."""
+    data: Data = rssr(start=0.1, friction=0.1).data
+    for name, joint in data["joints"].items():
+        joint["pin"] = {"radius": 0.013, **({"bearing": 0.02} if name in "AD" else {})}
+    for link in data["links"].values():
+        for key in ("mass", "centre", "inertia"):
+            link.pop(key, None)
+    centre = [0.06, 0.001, 0.01]
+    data["drivers"]["A"]["speed"] = 1e-4
+    data["links"]["rocker"]["points"]["W"] = centre
+    data["loads"] = {} if by_mass else {"weight": {"link": "rocker", "at": "W", "force": [0, -147.15, 0]}}
+    data["links"]["rocker"] |= {"mass": 15.0, "centre": centre} if by_mass else {}
+    return Mechanism(**data)
+
+
+@pytest.mark.parametrize("lifted", [lift, swing])
+def test_a_weight_pushes_as_the_same_force_does_stated_as_a_load(lifted: Callable[[bool], Mechanism]) -> None:
+    """By `locking`, at every position and between them, and by `analyse`."""
+    (mass, load), (one, other) = (
+        [look(lifted(by_mass), 60) for by_mass in (True, False)] for look in (locking, trunnion.analyse)
+    )
+    np.testing.assert_array_equal(states(mass), states(load))
+    assert {LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD} <= set(states(mass))
+    assert {LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON} & set(states(mass))
+    np.testing.assert_allclose(mass["holding_multiple"], load["holding_multiple"], rtol=1e-6)
+    for with_mass, with_load in ((mass, load), (one, other)):
+        rows = [attribute(result, "locking_ranges")["rows"] for result in (with_mass, with_load)]
+        assert [row["cells"][:3] for row in rows[0]] == [row["cells"][:3] for row in rows[1]]
+
+
+@pytest.mark.parametrize("lifted", [lift, swing])
+def test_without_useful_work_there_is_no_efficiency_and_it_says_why(lifted: Callable[[bool], Mechanism]) -> None:
+    """NaN, not 0: over the cycle, at each position, backward, over a sweep and as a measure."""
+    mechanism = lifted(True)
+    result = trunnion.analyse(mechanism, 12)
+    assert np.isnan(float(result["efficiency"]))
+    assert np.all(np.isnan(result["efficiency_instant"]))
+    assert np.all(result["useful_power"] == 0)
+    (row,) = [one for one in summary_of(result) if one.name == "efficiency"]
+    assert (row.value, row.note) == (None, f"{NOTHING_USEFUL}: {STATE_USEFUL}")
+    run = prepare(mechanism)
+    (row,) = [one for one in report_figures(run, look(run, 12)) if one.name == "efficiency_reverse"]
+    assert NOTHING_USEFUL in row.subject
+    speed = f"drivers.{next(iter(mechanism.drivers))}.speed"
+    swept = trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12)
+    assert np.all(np.isnan(swept["efficiency"]))
+    (told,) = [one for one in attribute(swept, "findings") if one["code"] == "sweep.no_efficiency"]
+    assert NOTHING_USEFUL in told["what"]
+    with pytest.raises(trunnion.MechanismError, match=NOTHING_USEFUL):
+        trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12, measures=["efficiency:cycle"])
 
 
 @pytest.mark.parametrize(("useful", "said"), [(True, True), (False, False)])
@@ -365,7 +422,7 @@ def test_what_masses_hold_is_no_self_locking() -> None:
     mechanism = trunnion.Mechanism(**data).with_friction("off")
     found = {one.name: one for one in report_figures(prepare(mechanism), trunnion.locking(mechanism, steps=9))}
     assert "holding_multiple" not in found
-    assert found["efficiency_reverse"].note == "held without friction"
+    assert found["efficiency_reverse"].note == "it takes work on the whole; see the ranges of `locking`"
 
 
 @pytest.mark.parametrize("share", [0.0, 0.95, 1.05])
@@ -396,7 +453,7 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     run = prepare(Mechanism(**model))
     found = look(run, 64)
     assert found["drive_effort_reverse"].values[0, -1] == pytest.approx((1 - share) * opens, rel=1e-9)
-    there = {0.0: LockingState.DRIVEN_ON, 0.95: LockingState.SELF_LOCKING_FORWARD, 1.05: LockingState.BACKDRIVABLE}
+    there = {0.0: LockingState.DRIVEN_ON, 0.95: LockingState.SELF_LOCKING, 1.05: LockingState.BACKDRIVABLE}
     assert found["locking_state"].values[-1] == there[share]
     assert np.isfinite(found["holding_multiple"].values[-1]) == (share == 0.95)
     if share:

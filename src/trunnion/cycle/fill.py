@@ -12,7 +12,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
-from trunnion.solve.loads import useful_powers
+from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.system import System, Values
 
 __all__ = [
@@ -152,7 +152,8 @@ def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> Non
     for power in useful_powers(walk.system.mechanism, back.load_powers, back.springs):
         useful = useful - power
     arrays["useful_power"][window] = useful
-    arrays["efficiency_instant"][window] = useful / np.where(np.greater(driven, 0), driven, np.nan)
+    defined = np.greater(driven, 0) & has_useful_work(walk.system.mechanism)
+    arrays["efficiency_instant"][window] = useful / np.where(defined, driven, np.nan)
     arrays["power_residual"][window] = total + driven
     arrays["closure_residual"][window] = _worst(walk.system, walk.poses, "closure")
     arrays["condition"][window] = _worst(walk.system, walk.poses, "condition")

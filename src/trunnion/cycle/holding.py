@@ -1,4 +1,4 @@
-"""Do the useful loads drive it backward: how well over the cycle, and which friction holds them."""
+"""Do the loads drive it backward: how well over the cycle the useful ones do, and which friction holds all of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trunnion.errors import counted
 from trunnion.results.figure import Figure
 from trunnion.results.scales import extreme_place
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.loads import useful_loads, useful_springs
+from trunnion.solve.loads import has_useful_work, useful_loads, useful_springs
 from trunnion.solve.system import Dial, felt, law_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["holding_figures", "holding_multiples", "reverse_figure"]
 
 Array = NDArray[np.float64]
-LITTLE = 1e-3  # of what the useful loads give: what other loads and springs may supply beside it
+LITTLE = 1e-3  # of what the useful loads give: what masses, other loads and springs may supply beside it
 HELD = LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD
 
 
@@ -37,6 +37,8 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
     `LockingState`.
     """
     name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads" + _centred(run)
+    if not has_useful_work(run.system.mechanism):
+        return None
     delivered, given, beside, error = _reversed_means(run, back)
     if np.all(np.isfinite(back.given)) and not given > 0:
         return None
@@ -45,26 +47,16 @@ def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure |
         return Figure(name, subject, None, place=f"at {places}", note="it locks")
     if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
         return Figure(name, subject, None, note="not every position is solved")
-    # over a range what masses and springs have stored comes on top
-    if delivered - given > error or beside > max(error, LITTLE * given):
+    if beside > max(error, LITTLE * given):
         return Figure(name, subject, None, note=_beside(run))
     states = {one for one in PUSHES if one in state}
     value, held = min(delivered / given, 1.0), states <= {LockingState.SELF_LOCKING}
-    if value <= 0 and not _by_friction(run, back):
-        return Figure(name, subject, value, note="held without friction")
     if value <= 0 and held:
         return Figure(name, subject, value, note="self-locking")
     if value <= 0:
         return Figure(name, subject, value, note="it takes work on the whole; see the ranges of `locking`")
     differ = len(states) > 1 and felt(run.system, run.values)
     return Figure(name, subject, value, note="the mean; see the ranges of `locking`" * bool(differ))
-
-
-def _by_friction(run: Run, back: Passage) -> bool:
-    """Whether the loads would drive it backward somewhere without friction."""
-    time = run.cycle.times(len(back.given))
-    bare = reverse(run, run.walk(time), FrictionMethod(multiple=np.zeros(len(time))))
-    return bool(np.any(bare.delivered[pushed(back)] > 0))
 
 
 def _centred(run: Run) -> str:
@@ -86,17 +78,17 @@ def _beside(run: Run) -> str:
 
 
 def _reversed_means(run: Run, back: Passage) -> tuple[float, float, float, float]:
-    """Mean powers, W, delivered, given, and of loads and springs that are not useful, backward, 0 where they cancel,
-    and the error of the difference of the first two; that of the useful loads is known where it locks."""
+    """Mean powers, W, delivered, given by the useful loads, and by all else that acts, backward, 0 where they cancel,
+    and the error of the first two; that of the useful loads is known where it locks."""
     if run.cycle.duration <= 0:
-        delivered, given, beside = (float(part[0]) for part in (back.delivered, back.given, back.beside))
-        return delivered, given, beside, CANCELLED * abs(given)
+        delivered, given, acting = (float(part[0]) for part in (back.delivered, back.given, back.acting))
+        return delivered, given, acting - given, CANCELLED * abs(given)
     if np.any(back.locked):  # then there is no mean to be delivered, and of the other one the sign is asked for
         return float("nan"), float(np.mean(back.given)), 0.0, 0.0
 
     def powers(rows: NDArray[np.intp], time: Array) -> Array:
         there = reverse(run, run.walk(time.ravel()), FrictionMethod())
-        return np.stack([there.delivered, there.given, there.beside]).reshape(3, *time.shape)
+        return np.stack([there.delivered, there.given, there.acting - there.given]).reshape(3, *time.shape)
 
     found = run.once("back", lambda: integrals(powers, [run.edges]))
     value, error = found.value[:, 0], np.maximum(found.error[:, 0], CANCELLED * found.size[:, 0])
@@ -105,15 +97,14 @@ def _reversed_means(run: Run, back: Passage) -> tuple[float, float, float, float
 
 
 def holding_multiples(run: Run, time: Array, ahead: Passage, back: Passage) -> Array:
-    """Multiple of all friction down to which friction holds the useful loads, at each time, s; NaN where it does not.
+    """Multiple of all friction down to which friction holds the loads, at each time, s; NaN where it does not.
 
-    There the power delivered to the drivers, in the direction in which these loads push, rises from 0. 0 where it is
+    There the power delivered to the drivers, in the direction in which the loads push, rises from 0. 0 where it is
     held without the friction that follows loads. ahead, back: the positions passed forward and backward.
     """
     found = np.full(len(time), np.nan)
-    for way, other, turned in ((ahead, back, False), (back, ahead, True)):
-        leaves = ~other.locked & pushed(other._replace(given=other.delivered))  # driven the other way by other loads
-        at = np.flatnonzero(pushed(way) & (way.locked | (way.delivered <= 0)) & ~leaves)
+    for way, turned in ((ahead, False), (back, True)):
+        at = np.flatnonzero(pushed(way) & (way.locked | (way.delivered <= 0)))
         if len(at):
             found[at] = root(_released(run, time[at], turned), np.zeros(len(at)), np.ones(len(at)))
     return found
@@ -126,7 +117,7 @@ def _released(run: Run, time: Array, turned: bool) -> Callable[[Array], Array]:
     @np.errstate(all="ignore")
     def off(multiple: Array) -> Array:
         there = passed(run, walk, FrictionMethod(multiple=multiple))
-        return np.where(there.locked, -np.abs(there.given), there.delivered)
+        return np.where(there.locked, -np.abs(there.acting), there.delivered)
 
     return off
 

@@ -15,12 +15,11 @@ from trunnion.cycle.holding import holding_figures, holding_multiples, reverse_f
 from trunnion.cycle.locking_ends import told
 from trunnion.cycle.locking_states import (
     NEAR,
-    ROUNDING,
     LockingRange,
     LockingState,
     in_order,
-    pushed,
     ranges_of,
+    rounding,
 )
 from trunnion.cycle.near_locking import (
     Passage,
@@ -43,7 +42,7 @@ from trunnion.results.figure import Figure
 from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.loads import useful_springs
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.system import Dial, felt, rubbing
 
@@ -65,12 +64,15 @@ VARIABLES = {
         ("driver", "position"), "effort", "drive effort of the reversed motion; NaN where it locks"
     ),
     "power_delivered_reverse": Variable(("position",), "W", "power delivered to the drivers when backdriven"),
+    "power_acting_reverse": Variable(
+        ("position",), "W", "power supplied by loads, springs, weight and inertia when backdriven"
+    ),
     "power_given_reverse": Variable(("position",), "W", "power supplied by the useful loads when backdriven"),
     "efficiency_reverse_instant": Variable(
         ("position",), "1", "power delivered to the drivers over power supplied by the useful loads, backward"
     ),
     "holding_multiple": Variable(
-        ("position",), "1", "multiple of all friction down to which it holds the useful loads; NaN where it does not"
+        ("position",), "1", "multiple of all friction down to which it holds the loads; NaN where it does not"
     ),
     "locking_state": Variable(("position",), "1", "what friction does forward and backward", np.int8),
 }
@@ -116,6 +118,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
         "other_solutions": more,
         "drive_effort_reverse": np.array(efforts).reshape(len(efforts), len(time)),
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
+        "power_acting_reverse": other.acting,
         "power_given_reverse": other.given,
         "efficiency_reverse_instant": _efficiency_reverse(other),
         "holding_multiple": holding_multiples(run, time, ahead, other),
@@ -123,25 +126,17 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     }
     found = with_variables(result, described(arrays, VARIABLES, member_units(run.system)))
     found["locking_state"].attrs.update(codes("flag", LockingState))
-    said = finding_rows(_notes(run, result))
+    said = finding_rows(_notes(run))
     findings = {"findings": [*attribute(found, "findings"), *said]} if said else {}
     return found.assign_attrs(encoded({"locking_ranges": told(run, found, near), **findings}))
 
 
-def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
-    """What the states leave out: seats of pins, springs that are not marked useful; loads that move them."""
+def _notes(run: Run) -> list[Finding]:
+    """What the states leave out: seats of pins; loads that move them."""
     notes = []
     if run.seats:
         notes.append(finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats]))
     mechanism = run.system.mechanism
-    if rubbing(run.system) and mechanism.drivers and mechanism.springs and not useful_springs(mechanism):
-        power, lost = result["spring_power"].values, result["damping_power"].values  # without what a damper takes
-        taken = -(power + lost)
-        highest = np.nanmax(np.abs([*power, *result["drive_power"].values]), initial=0.0)
-        storing = np.any(taken > ROUNDING * highest, axis=1)
-        names = [str(name) for name, stores in zip(result["spring"].values, storing, strict=True) if stores]
-        if names:
-            notes.append(finding_for("locking.springs_not_useful", "springs", springs=names, count=len(names)))
     beside = beside_the_drive(mechanism) if rubbing(run.system) else []
     if beside:
         notes.append(finding_for("locking.load_beside_drive", "loads", loads=beside, count=len(beside)))
@@ -151,7 +146,7 @@ def _notes(run: Run, result: xr.Dataset) -> list[Finding]:
 def _efficiency_reverse(back: Passage) -> NDArray[np.float64]:
     """Of every position; NaN where the useful loads supply no power backward, or where that motion locks."""
     with np.errstate(all="ignore"):
-        return np.where(pushed(back) & ~back.locked, back.delivered / back.given, np.nan)
+        return np.where((back.given > rounding(back)) & ~back.locked, back.delivered / back.given, np.nan)
 
 
 def ranges(found: xr.Dataset, near: float = NEAR) -> list[LockingRange]:
@@ -176,7 +171,9 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     figures += holding_figures(run, found["holding_multiple"].values, state, dial)
     figures += _reversing(run, found, dial)
     backward = reverse_figure(run, _reverse(found), state)
-    stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
+    why = "the useful loads do no net work backward" if has_useful_work(run.system.mechanism) else NOTHING_USEFUL
+    remedy = "" if has_useful_work(run.system.mechanism) else STATE_USEFUL
+    stays = Figure("efficiency_reverse", f"efficiency when backdriven ({why})", None, note=remedy)
     return scales_of(run).of_figures([*figures, backward or stays])
 
 
@@ -222,5 +219,5 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
 
 def _reverse(found: xr.Dataset) -> Passage:
     """The way back as the Dataset has it."""
-    delivered, given = found["power_delivered_reverse"].values, found["power_given_reverse"].values
-    return Passage({}, np.isnan(delivered) & np.isfinite(given), delivered, given, np.zeros_like(given))
+    delivered, acting, given = (found[f"power_{name}_reverse"].values for name in ("delivered", "acting", "given"))
+    return Passage({}, np.isnan(delivered) & np.isfinite(acting), delivered, acting, given)

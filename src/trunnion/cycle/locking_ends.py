@@ -68,8 +68,9 @@ def _places(run: Run, found: xr.Dataset, of: Sequence[LockingRange], near: float
     behind = behind[(state[behind] != LockingState.UNSOLVED) & (state[behind + 1] != LockingState.UNSOLVED)]
     places: dict[int, float] = {}  # coordinate of the end behind a position
     if len(behind):
-        most = float(np.nanmax(np.abs(found["power_given_reverse"].values), initial=0.0))
-        at = _bisected(run, time[behind], time[behind + 1], state[behind], ROUNDING * most)
+        powers = [found[f"power_{name}_reverse"].values for name in ("acting", "delivered")]
+        least = float(ROUNDING * np.nanmax(np.abs(powers), initial=0.0))
+        at = _bisected(run, time[behind], time[behind + 1], state[behind], least)
         places = dict(zip(behind.tolist(), run.system.dial(run.values, at).values.tolist(), strict=True))
     values, margin = run.system.dial(run.values, time).values, found["locking_margin"].values
     own = [places if one.state is not None else _crossed(values, margin, near) | places for one in of]
@@ -100,7 +101,7 @@ def _state(run: Run, time: Array, least: float) -> NDArray[np.int8]:
     """The codes of `LockingState` at some times."""
     back = run.solve(time, method=FrictionMethod())
     other = reverse(run, back.walk, FrictionMethod())
-    return states(passage(back), other, np.isfinite(other.given), least)
+    return states(passage(back), other, np.isfinite(other.acting), least)
 
 
 def _crossed(values: Array, margin: Array, near: float) -> dict[int, float]:

@@ -28,6 +28,7 @@ __all__ = [
     "in_order",
     "pushed",
     "ranges_of",
+    "rounding",
     "states",
 ]
 
@@ -37,16 +38,19 @@ HEAD = ("state", "from", "to", "smallest margin", "at")  # of the table of range
 
 
 class LockingState(Coded):
-    """What friction does at a position: forward, and when all speeds are reversed."""
+    """What friction does at a position: forward, and when all speeds are reversed.
 
-    RUNS = 0, "runs; the useful loads push it neither backward nor forward"
+    The loads are all that acts: loads and springs, useful or not, weight and inertia.
+    """
+
+    RUNS = 0, "runs; what acts on it pushes it neither backward nor forward"
     BACKDRIVABLE = 1, "can be backdriven: the loads drive it backward, and the drive brakes it"
-    SELF_LOCKING = 2, "self-locking: the useful loads push it backward, but do not overcome friction"
+    SELF_LOCKING = 2, "self-locking: the loads push it backward, but do not overcome friction"
     LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward"
     LOCKED = 4, "locked: no drive effort can move it forward"
     JAMMED = 5, "jammed: locked forward and backward"
     UNSOLVED = 6, "not solved"
-    SELF_LOCKING_FORWARD = 7, "self-locking: the useful loads push it forward, but do not overcome friction"
+    SELF_LOCKING_FORWARD = 7, "self-locking: the loads push it forward, but do not overcome friction"
     DRIVEN_ON = 8, "the loads drive it forward, and the drive brakes it"
 
     @property
@@ -88,34 +92,31 @@ class LockingRange(NamedTuple):
 
 
 def pushed(of: Passage, least: float | None = None) -> NDArray[np.bool_]:
-    """Where the useful loads supply power to a motion, and no rounding of none: more than the least, W."""
-    least = _least(of) if least is None else least
-    found: NDArray[np.bool_] = of.given > least
+    """Where what acts supplies power to a motion, and no rounding of none: more than the least, W."""
+    least = rounding(of) if least is None else least
+    found: NDArray[np.bool_] = of.acting > least
     return found
 
 
-def _least(of: Passage) -> float:
+def rounding(of: Passage) -> float:
     """Power that is none, W."""
-    return float(ROUNDING * np.nanmax(np.abs(of.given), initial=0.0))
+    return float(ROUNDING * np.nanmax(np.abs([of.acting, of.delivered]), initial=0.0))
 
 
 def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
     """The code of `LockingState` of every position. ahead, back: the positions passed forward and backward; known:
     where the forces or the cause of locking are; least: see `pushed`.
-
-    Which way the useful loads push tells where they matter; whether it moves there without the drive, all that acts.
     """
-    least = _least(back) if least is None else least
+    least = rounding(back) if least is None else least
     driven = pushed(back, least) & ~back.locked
     beyond = pushed(ahead, least)
-    runs_back, runs_on = driven & (back.delivered > 0), beyond & (-ahead.delivered <= least)
     cases = [
         (~known, LockingState.UNSOLVED),
         (ahead.locked & back.locked, LockingState.JAMMED),
         (ahead.locked, LockingState.LOCKED),
         (back.locked, LockingState.LOCKED_BACKWARD),
-        (runs_back | (beyond & (back.delivered > least)), LockingState.BACKDRIVABLE),
-        (runs_on | (driven & (ahead.delivered > least)), LockingState.DRIVEN_ON),
+        (driven & (back.delivered > 0), LockingState.BACKDRIVABLE),
+        (beyond & (-ahead.delivered <= least), LockingState.DRIVEN_ON),
         (driven, LockingState.SELF_LOCKING),
         (beyond, LockingState.SELF_LOCKING_FORWARD),
     ]
@@ -132,7 +133,7 @@ def in_order(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: flo
     pushes = PUSHED[found]
     alone = np.zeros(len(found), bool)
     alone[1:-1] = (found[1:-1] == LockingState.RUNS) & pushes[:-2] & pushes[2:]
-    held = -ahead.delivered > (_least(back) if least is None else least)
+    held = -ahead.delivered > (rounding(back) if least is None else least)
     found[alone] = np.where(held, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON)[alone]
     return found
 

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.quadrature import CANCELLED, Effort, integrals
 from trunnion.errors import Status
+from trunnion.model.mechanism import Mechanism
+from trunnion.solve.loads import has_useful_work
 from trunnion.solve.switches import Mechanisms, edges
 
 __all__ = ["AVERAGED", "IDEAL", "MOST_SUPPOSED", "SUPPOSED", "Mean", "Means", "Powers", "means_of", "still", "unknown"]
@@ -53,7 +55,8 @@ class Means:
 
     drive_power: of all drivers; useful_power: that the useful loads take; friction_power: lost in all joints;
     friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N; supposed: share
-    of the power through the drivers by which it differs from that which stands in for it (`SUPPOSED`).
+    of the power through the drivers by which it differs from that which stands in for it (`SUPPOSED`);
+    has_useful_work: whether it is stated what work is useful.
     """
 
     drive_power: Mean
@@ -62,6 +65,7 @@ class Means:
     friction_power_mean: Array
     drive_effort_rms: Array
     supposed: float = 0.0
+    has_useful_work: bool = True
 
     @property
     def drive_power_mean(self) -> float:
@@ -75,9 +79,10 @@ class Means:
 
     @property
     def efficiency(self) -> float:
-        """Useful work over drive work of the cycle [D 1]; NaN where the loads drive or a place has no answer."""
+        """Useful work over drive work of the cycle [D 1]; NaN where the loads drive, a place has no answer, or nothing
+        is useful."""
         work = self.drive_power.net
-        return self.useful_power.net / work if work > 0 else float("nan")
+        return self.useful_power.net / work if work > 0 and self.has_useful_work else float("nan")
 
     @property
     def integration_error(self) -> float:
@@ -120,14 +125,14 @@ def means_of(
 
     between = edges(of) if between is None else between
     found = integrals(functions, between, floor, effort)
-    told = []
+    told, useful_work = [], has_useful_work(of.system.mechanism)
     for k, times in enumerate(between):
         value, error, size = (part[:, k] / (times[-1] - times[0]) for part in (found.value, found.error, found.size))
         rounding = np.maximum(CANCELLED * size, RESIDUALS * value[3])
         rounding[2] = max(rounding[2], CANCELLED * np.max(size[:3]))
         driven, useful, lost = (Mean(*(float(one[i]) for one in (value, error, size, rounding))) for i in range(3))
         efforts, share = np.sqrt(value[4 : 4 + drivers]), float(value[-1] / value[-2]) if value[-2] > 0 else 0.0
-        told.append(Means(driven, useful, lost, value[4 + drivers : -2], efforts, share))
+        told.append(Means(driven, useful, lost, value[4 + drivers : -2], efforts, share, useful_work))
     return told
 
 
@@ -135,10 +140,10 @@ def unknown(means: Means) -> Means:
     """The same means without an answer; what share of them is supposed stays."""
     no = Mean(np.nan, np.nan, np.nan, np.nan)
     lost, efforts = (np.full_like(one, np.nan) for one in (means.friction_power_mean, means.drive_effort_rms))
-    return Means(no, no, no, lost, efforts, means.supposed)
+    return Means(no, no, no, lost, efforts, means.supposed, means.has_useful_work)
 
 
-def still(arrays: Mapping[str, Array]) -> Means:
+def still(arrays: Mapping[str, Array], mechanism: Mechanism) -> Means:
     """The means of a mechanism that stands, in its one position; NaN where positions have no answer."""
     alone = len(arrays["status"]) == 1 and arrays["status"][0] < Status.NOT_CONVERGED
     driven, useful, lost, efforts = (
@@ -150,4 +155,4 @@ def still(arrays: Mapping[str, Array]) -> Means:
         value = float(np.sum(number))
         return Mean(value, 0.0, abs(value), CANCELLED * abs(value))
 
-    return Means(of(driven), of(useful), of(lost), lost, np.abs(efforts))
+    return Means(of(driven), of(useful), of(lost), lost, np.abs(efforts), has_useful_work=has_useful_work(mechanism))

@@ -197,15 +197,15 @@ def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure
 class Passage(NamedTuple):
     """Positions passed forward or backward: effort of every driver, where it locks, and what flows where.
 
-    delivered: power that the drivers take out, W; given: power that the useful loads and springs put in, W; beside:
-    that of the other ones.
+    delivered: power that the drivers take out, W; acting: power that loads, springs, weight and inertia put in, W;
+    given: that of the useful loads and springs alone.
     """
 
     efforts: dict[str, Array]
     locked: NDArray[np.bool_]
     delivered: Array
+    acting: Array
     given: Array
-    beside: Array
 
 
 def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Passage:
@@ -232,9 +232,9 @@ def passage(back: Backward) -> Passage:
     delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
     powers = useful_powers(walk.system.mechanism, back.load_powers, back.springs)
     given = sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape))
-    every = [*back.load_powers.values(), *(spring.power for spring in back.springs.values())]
-    beside = sum((np.broadcast_to(power, shape) for power in every), np.zeros(shape)) - given
-    return Passage(efforts, locks(back), delivered, given, beside)
+    every = [back.body_power, *back.load_powers.values(), *(spring.power for spring in back.springs.values())]
+    acting = sum((np.broadcast_to(power, shape) for power in every), np.zeros(shape))
+    return Passage(efforts, locks(back), delivered, acting, given)
 
 
 # ---- over a cycle ---------------------------------------------------------------------------------------------

@@ -129,15 +129,16 @@ def stretch(
     losses = contact_loss.find(arrays, run, time) if run.seats else []
     fill_of(run.system).unwrap(arrays, run.system, run.values, time)
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
-    meant = still(ideal) if run.erring else None
+    means = still(arrays, run.system.mechanism)
+    meant = still(ideal, run.system.mechanism) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, still(arrays), meant, losses, walked, ideal)
+    return Positions(arrays, labels, time, dial, method, causes, means, meant, losses, walked, ideal)
 
 
 def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
     """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
     if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
-        return still(arrays)
+        return still(arrays, run.system.mechanism)
     return run.once(("means", method, ideal), lambda: _averaged(run, method, ideal))
 
 

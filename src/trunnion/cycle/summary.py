@@ -35,7 +35,7 @@ from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
 from trunnion.results.scales import Scales, extreme_place
 from trunnion.results.sentences import finding_for
-from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
+from trunnion.solve.loads import Stated, stated_walk, useful_loads
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.system import Dial, System, felt, rubbing
 
@@ -415,8 +415,7 @@ def _dial_of(near: near_locking.Locking, run: Run, found: Positions) -> Dial:
 
 def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> dict[str, Any]:
     """Where it holds itself, for the report: the ranges of `locking` with their share of the positions looked at."""
-    mechanism = run.system.mechanism
-    if near is None or not (useful_loads(mechanism) or useful_springs(mechanism)):
+    if near is None or not np.any(np.abs(near.back.acting) > 0):
         return {}
     margin = found.arrays["locking_margin"]
     if len(near.times) != len(found.time):
@@ -433,7 +432,7 @@ def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> di
 
 def _states(found: Positions, near: near_locking.Locking) -> NDArray[np.int8]:
     """The codes of `LockingState` of the positions looked at."""
-    known, status = np.isfinite(near.back.given), found.arrays["status"]
+    known, status = np.isfinite(near.back.acting), found.arrays["status"]
     if len(near.times) == len(found.time):
         known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     return in_order(near.ahead, near.back, known)

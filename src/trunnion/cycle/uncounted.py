@@ -15,7 +15,7 @@ from trunnion.errors import Finding, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.results.sentences import finding_for
-from trunnion.solve.loads import useful_loads, useful_springs
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, useful_loads, useful_springs
 from trunnion.solve.run import Run
 
 __all__ = ["beside_the_drive", "findings", "meaning"]
@@ -28,9 +28,10 @@ ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats 
 def meaning(mechanism: Mechanism, means: Means, status: NDArray[Any]) -> str:
     """What an efficiency of 0, or below it, or none, means. status: of the positions."""
     value = means.efficiency
+    if not means.has_useful_work:
+        return f"{NOTHING_USEFUL}: {STATE_USEFUL}"
     if value == 0:
-        purpose = useful_loads(mechanism) or useful_springs(mechanism)
-        return "the useful loads do no net work" if purpose else "no load or spring is marked useful"
+        return "the useful loads do no net work"
     if np.isfinite(value):
         return "the useful loads supply work" * bool(value < 0)
     if np.any(status >= Status.NOT_CONVERGED):

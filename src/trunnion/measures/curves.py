@@ -20,7 +20,7 @@ from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_method import MARGIN
-from trunnion.solve.loads import SpringState, springs, useful_powers
+from trunnion.solve.loads import SpringState, has_useful_work, springs, useful_powers
 from trunnion.solve.margin import locking_margin as multiple_that_locks
 from trunnion.solve.space.motion import SpatialWalk
 
@@ -171,9 +171,10 @@ def friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...
 
 
 def efficiency(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """Useful and drive power, W; of an instant their ratio, NaN where the drivers put no power in."""
+    """Useful and drive power, W; of an instant their ratio, NaN where nothing is useful or the drivers put no power
+    in."""
     walk = back.walk
-    useful: Number = 0.0
+    useful: Number = 0.0 if has_useful_work(walk.system.mechanism) else np.nan
     driven: Number = 0.0
     for power_in in useful_powers(walk.system.mechanism, back.load_powers, back.springs):
         useful = useful - power_in

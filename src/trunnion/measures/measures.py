@@ -28,6 +28,7 @@ from trunnion.model.names import nearest
 from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import System, Values
 
@@ -214,7 +215,7 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
     `link.point.x`, or KIND:NAME of the entries of MEASURES, as `rotation:joint` or `effort:driver`; of one with a
     component `reaction:joint` or `reaction:joint.x`, in space `angle:link.x`; before any of them a statistic:
     `maximum:effort:A`, `rms:link.point.x`.
-    Raises MechanismError for a name that means nothing.
+    Raises MechanismError for a name that means nothing, or an efficiency where nothing is useful.
     """
     found, findings = [], []
     for name in dict.fromkeys(names):
@@ -224,6 +225,9 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
             findings += [] if stated is None else list(check_measure(mechanism, stated, f"--measure {name}"))
         if stated is None:
             findings.append(Finding(f"'{name}' is no measure", "", _meant(name, mechanism), code="input.measure"))
+        elif stated.kind == "efficiency" and not has_useful_work(mechanism):
+            what = f"the efficiency is undefined: {NOTHING_USEFUL}"
+            findings.append(Finding(what, f"measures.{name}", STATE_USEFUL, code="input.measure"))
         else:
             found.append(_measure(name, stated, values, mechanism))
     if findings:

@@ -21,11 +21,14 @@ from trunnion.solve.forward import Assembly, Forward, Vector, forward, start
 from trunnion.solve.system import System, Values
 
 __all__ = [
+    "NOTHING_USEFUL",
+    "STATE_USEFUL",
     "LoadAction",
     "Share",
     "SpringState",
     "Stated",
     "Switch",
+    "has_useful_work",
     "losses",
     "placed",
     "spring_state",
@@ -38,6 +41,8 @@ __all__ = [
 ]
 
 
+NOTHING_USEFUL = "there is no load, and no spring is marked useful"  # so that an efficiency is undefined
+STATE_USEFUL = "state what it lifts or drives as a load, a weight as a force in place of its mass"
 SPLINED = 3  # of a spline every so many points: it bends at none, but may be anything between two that are far apart
 
 Share = float | NDArray[np.float64]  # of what resists a joint at rest, with the sign of the slip about to begin
@@ -350,6 +355,11 @@ def useful_loads(mechanism: Mechanism) -> list[str]:
 def useful_springs(mechanism: Mechanism) -> list[str]:
     """Springs whose power is the purpose: those marked useful."""
     return [name for name, spring in mechanism.springs.items() if spring.useful]
+
+
+def has_useful_work(mechanism: Mechanism) -> bool:
+    """Whether it is stated what work is useful, without which there is no efficiency."""
+    return bool(useful_loads(mechanism) or useful_springs(mechanism))
 
 
 def useful_powers(

@@ -213,12 +213,6 @@ CYCLE: dict[str, Sentence] = {
         "middle of their play: the other states and their ranges, the motion backward, critical multiples of single "
         "joints",
     ),
-    "locking.springs_not_useful": Sentence(
-        NOTE,
-        "{springs} {count:#stores/store} energy, but {count:#is/are} not among what drives the mechanism backward: "
-        "the states are those of the useful loads alone",
-        "mark a spring that stands for the work, such as an elastic workpiece, with useful: true",
-    ),
     "locking.load_beside_drive": Sentence(
         NOTE,
         "{loads} {count:#acts/act} on a driven link beside the drive and {count:#is/are} not useful: backward "

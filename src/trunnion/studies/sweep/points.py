@@ -235,8 +235,10 @@ class Points:
         found: list[Reduced | None] = []
         for i in range(len(points)):
             own = {name: array[..., i, :] for name, array in arrays.items()}
-            like = (likes.get(i) or still(own)) if errs[i] else None
-            found.append(self._reduced(own, means.get(i) or still(own), like, sides.get(i)) if ours[i] else None)
+            like = (likes.get(i) or still(own, self.mechanism)) if errs[i] else None
+            found.append(
+                self._reduced(own, means.get(i) or still(own, self.mechanism), like, sides.get(i)) if ours[i] else None
+            )
         return found
 
     def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:

@@ -28,6 +28,7 @@ from trunnion.results.dataset import MemberUnits, Variable, dataset_of, describe
 from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.run import Run
 from trunnion.studies.sweep.figures import FIGURES
 from trunnion.studies.sweep.grid import MOST_POINTS, Over, Swept, grid, say
@@ -157,16 +158,18 @@ def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iter
 
 
 def _no_efficiency(points: Points, arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:
-    """A note for every reason for which points with an answer have no efficiency, if there are loads at all."""
+    """A note for every reason for which points with an answer have no efficiency."""
     work, undefined = arrays["drive_power_mean"], (arrays["without_answer"] == 0) & np.isnan(arrays["efficiency"])
     reasons = {
         "the driver does no net work": work == 0,
         "the loads drive, the driver absorbs work": work < 0,
         "the mean powers are not known": np.isnan(work),
     }
+    if not has_useful_work(points.mechanism):
+        reasons = {f"{NOTHING_USEFUL}: {STATE_USEFUL}": np.ones(work.shape, bool)}
     for why, so in reasons.items():
         where = np.argwhere(undefined & so)
-        if len(where) and points.mechanism.loads:
+        if len(where):
             at, phrases = say(points.swept, tuple(int(i) for i in where[0])), {"why": why}
             yield finding_for(
                 "sweep.no_efficiency", "efficiency", points=len(where), of=work.size, at=at, phrases=phrases

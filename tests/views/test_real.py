@@ -114,7 +114,7 @@ def test_a_joint_that_bears_nothing_has_no_reaction_from_rounding():
     result = analyse(ram, 24)
     assert 0 < float(np.abs(result["reaction_force"].sel(joint="Z")).max()) < 1e-9
     (figure,) = [one for one in summary_of(result) if one.name == "Z.reaction_max"]
-    assert (figure.value, figure.place) == (0.0, "")
+    assert (figure.value, figure.place) == (0.0, "everywhere")
     shown = {joint["name"]: joint["reaction"] for joint in scene(result)["joints"]}
     assert not np.any([shown["Z"]["x"], shown["Z"]["y"]])
     np.testing.assert_allclose(shown["G"]["x"], result["reaction_force"].sel(joint="G", axis="x"), rtol=1e-6)

@@ -115,7 +115,7 @@ def without_noise(result: xr.Dataset) -> xr.Dataset:
     """A result as views show it: 0 where its numbers are rounding, but for those that tell of the solution."""
     scales, cleared = scales_in(result), {}
     for name, one in result.data_vars.items():
-        if one.dtype.kind != "f" or name in OF_SOLUTION:
+        if one.dtype.kind != "f" or name in OF_SOLUTION or "units" not in one.attrs:
             continue
         floors = scales.floor(unit_of(one))
         each = result.coords.get(one.attrs.get(UNITS_OF_EACH))

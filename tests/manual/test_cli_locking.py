@@ -107,3 +107,28 @@ def test_friction_is_set_as_a_file_states_it(program: Run) -> None:
     assert "joint_defaults.friction" in several.err
     assert "O.friction" in several.err
     assert program("analyse", PRESS, "--steps", 12, "--set", "O.friction=0.2").code == 0
+
+
+def test_a_weight_that_is_a_mass_has_the_ranges_of_the_same_load(program: Run, tmp_path: Path) -> None:
+    """And no efficiency, with what to write; it was 0."""
+    joint = {"type": "revolute", "links": ["ground", "lever"], "pin": {"radius": 0.012}, "friction": 0.5}
+    told = {}
+    for name in ("mass", "load"):
+        heavy = {"mass": 10.0, "centre": [0.02, 0]} if name == "mass" else {}
+        weight = {"weight": {"link": "lever", "at": "P", "force": [0, -98.1]}} if name == "load" else {}
+        model = {
+            "trunnion": 1,
+            "gravity": [0, -9.81],
+            "links": {"ground": {"points": {"A": [0, 0]}}, "lever": {"points": {"A": [0, 0], "P": [0.02, 0]}, **heavy}},
+            "joints": {"A": joint},
+            "drivers": {"A": {"speed": 1e-4, "range": [0.0, 2.5]}},
+            "loads": weight,
+        }
+        (tmp_path / f"{name}.json").write_text(json.dumps(model))
+        locked = program("locking", f"{name}.json", "--steps", 41)
+        assert locked.code == 0
+        told[name] = locked.out.partition("ranges of A")[2]
+        for out in (locked.out, program("analyse", f"{name}.json", "--steps", 41).out):
+            assert ("undefined" in out and "state what it lifts" in out) == (name == "mass")
+    assert told["mass"] == told["load"]
+    assert "self-locking │  72.54°" in told["mass"]

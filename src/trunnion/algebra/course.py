@@ -39,10 +39,11 @@ ON_GAUSS = chebyshev.chebvander(GAUSS, ORDER - 1).T
 ENDS = np.array([(-1.0) ** np.arange(ORDER), np.ones(ORDER)]).T
 INTEGRAL = ON_GAUSS @ GAUSS_WEIGHTS  # of every Chebyshev polynomial over a panel
 CHECKED, TORN = 5, 1e3  # times that edges are looked at; of what is small: a row that changes by more at one jumps
-HALVED, PARTS = 3, 6  # rounds in which a panel is halved; then it is parted into so many
+HALVED = 2  # rounds in which a panel is halved; then it is parted about the place where a row bends most
 NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
 ALIKE = 1e-9  # of the size of a course: tops that are one, of which the first counts
 FLAT = 1e-9  # of its size: a course that changes less is constant
+BESIDE = 1e-8  # of the whole: an extreme is at a break if it is no farther from it
 ONE = 1e-7  # of the whole: passages that are one, as where a row touches a level
 REAL = 1e-7  # imaginary part of a root that counts as real: of a double root it is the square root of rounding
 
@@ -50,7 +51,7 @@ REAL = 1e-7  # imaginary part of a root that counts as real: of a double root it
 class Accuracy(NamedTuple):
     """How well panels are resolved.
 
-    tolerance: last coefficients of a row, of its size; floor: of the largest row of its kind, below which is rounding;
+    tolerance: last coefficients of a row, of its size; floor: of what is like the row, below which is rounding;
     widest, shortest: panel at first, and about a break that is located, of the whole; rounds; most: panels that may be
     parted in one round, beyond which the tolerance is loosened, for what is rough everywhere is noise.
     """
@@ -78,7 +79,7 @@ class Courses:
 
     edges: of the panels, rising, s, (edge,); coefficients: of Chebyshev polynomials, (panel, row, coefficient), NaN
     where a row has no value; states: what every panel was said to be by who solved it; breaks: edges at which rows may
-    jump or bend; sizes: of every row the largest magnitude of its kind; asked: how many times were solved.
+    jump or bend; sizes: the largest magnitude of what is like each row; asked: how many times were solved.
     """
 
     edges: Array
@@ -93,7 +94,7 @@ class Courses:
         cls,
         solve: Callable[[Array], tuple[Array, NDArray[np.integer]]],
         breaks: Array,
-        kinds: Sequence[object] = (),
+        like: Callable[[Array], Array] | None = None,
         accuracy: Accuracy | None = None,
     ) -> Courses:
         """The rows of one mechanism, (row, time) at times (time,), with the state of each time; see `many`."""
@@ -102,11 +103,15 @@ class Courses:
             rows, states = solve(time.ravel())
             return rows.reshape(len(rows), *time.shape), states.reshape(time.shape)
 
-        return cls.many(lanes, [breaks], kinds, accuracy)[0]
+        return cls.many(lanes, [breaks], like, accuracy)[0]
 
     @classmethod
     def many(
-        cls, solve: Solve, breaks: Sequence[Array], kinds: Sequence[object] = (), accuracy: Accuracy | None = None
+        cls,
+        solve: Solve,
+        breaks: Sequence[Array],
+        like: Callable[[Array], Array] | None = None,
+        accuracy: Accuracy | None = None,
     ) -> list[Courses]:
         """The rows of some mechanisms, each from the first of its breaks to the last.
 
@@ -117,12 +122,13 @@ class Courses:
             where it changes, or a row ceases to have a value, is a break.
         breaks
             Of every mechanism, rising, s.
-        kinds
-            Of every row: rows of one kind, as all powers, are rounded alike; each its own if not given.
+        like
+            From the largest magnitudes of the rows to those of what is like them, (row,): that a row is much smaller
+            than a number of its kind is rounding. Each row is by itself if not given.
         accuracy
             See `Accuracy`.
         """
-        return _Resolving(solve, breaks, kinds, accuracy or Accuracy()).courses()
+        return _Resolving(solve, breaks, like, accuracy or Accuracy()).courses()
 
     @cached_property
     def half(self) -> Array:
@@ -214,8 +220,10 @@ class Courses:
             top, best = np.where(better, spots[rows, most], top), np.where(better, values[rows, most], best)
         k = int(np.argmax(best >= np.max(best) - ALIKE * size))
         time = float(self.edges[chosen[k]] + self.half[chosen[k]] * (top[k] + 1.0))
-        at_break = bool(np.min(np.abs(self.breaks - time)) <= 1e-9 * self.span)
-        return Place(sign * float(np.max(best)), time, at_break)
+        nearest = float(self.breaks[np.argmin(np.abs(self.breaks - time))])
+        if abs(nearest - time) <= BESIDE * self.span:
+            return Place(sign * float(np.max(best)), nearest, at_break=True)
+        return Place(sign * float(np.max(best)), time)
 
     def _signed(self, of: Callable[[Array], Array], sign: float, panels: Labels, spots: Array) -> Array:
         """A number at places of some panels, (panel, place), −∞ where it has no value."""
@@ -247,8 +255,13 @@ class Courses:
 
     def sides(self, row: int) -> tuple[Array, Array]:
         """The values before and after every inner edge; they differ where the row jumps."""
+        last, first = self.ends(row)
+        return last[:-1], first[1:]
+
+    def ends(self, row: int) -> tuple[Array, Array]:
+        """The values at the end and at the begin of every panel."""
         ends = self.coefficients[:, row] @ ENDS
-        return ends[:-1, 1], ends[1:, 0]
+        return ends[:, 1], ends[:, 0]
 
     def derivative(self) -> Courses:
         """The courses of the rates of all rows."""
@@ -276,8 +289,10 @@ class _Panels(NamedTuple):
 class _Resolving:
     """How the panels of some mechanisms are found."""
 
-    def __init__(self, solve: Solve, breaks: Sequence[Array], kinds: Sequence[object], accuracy: Accuracy) -> None:
-        self._solve, self._kinds, self._accuracy = solve, kinds, accuracy
+    def __init__(
+        self, solve: Solve, breaks: Sequence[Array], like: Callable[[Array], Array] | None, accuracy: Accuracy
+    ) -> None:
+        self._solve, self._like, self._accuracy = solve, like, accuracy
         self._breaks = [np.array(own, float) for own in breaks]
         self._span = np.array([own[-1] - own[0] for own in breaks])
         self._asked = np.zeros(len(breaks), np.intp)
@@ -313,7 +328,8 @@ class _Resolving:
             mixed = np.any(labels != labels[:, :1], axis=1)
             if not len(self._rows):
                 self._scale(mechanism, values, labels)
-            unresolved = mixed | self._rough(mechanism, values, coefficients)
+            rough, worst = self._rough(mechanism, values, coefficients)
+            unresolved = mixed | rough
             tiny = high - low <= self._accuracy.shortest * self._span[mechanism]
             self._break(mechanism[unresolved & tiny], high[unresolved & tiny])
             done = ~unresolved if round_ < self._accuracy.rounds else ~mixed
@@ -322,27 +338,27 @@ class _Resolving:
             left = np.flatnonzero(unresolved & ~tiny)
             if not len(left):
                 break
-            parts = 2 if round_ < HALVED else PARTS
-            edges = [
-                _where_it_changes(low[k], high[k], time[k], labels[k])
-                if mixed[k]
-                else np.linspace(low[k], high[k], parts + 1)
-                for k in left
-            ]
+            edges = []
+            for k in left:
+                if mixed[k]:
+                    inner = _changing(time[k], labels[k])
+                elif round_ < HALVED:
+                    inner = time[k, :1] * 0.0 + (low[k] + high[k]) / 2
+                else:
+                    inner = _bending(time[k], values[k, worst[k]])
+                edges.append(np.concatenate([low[k : k + 1], inner, high[k : k + 1]]))
             mechanism, low, high = _between(edges, mechanism[left])
 
     def _scale(self, mechanism: Labels, values: Array, labels: Labels) -> None:
-        """How large every row is, and the largest of its kind, (row, mechanism): in the least state that there is."""
+        """How large every row is, and what is like it, (row, mechanism): in the least state that there is."""
         sizes = np.zeros((values.shape[1], len(self._asked)))
         for k in range(len(self._asked)):
             lanes = mechanism == k
             numbers = np.abs(np.moveaxis(values[lanes], 1, 0).reshape(values.shape[1], -1))
             counted = labels[lanes].ravel() == np.min(labels[lanes])
             sizes[:, k] = np.max(np.where(np.isfinite(numbers) & counted, numbers, 0.0), axis=1, initial=0.0)
-        self._rows, self._sizes = sizes, sizes.copy()
-        for kind in set(self._kinds):
-            alike = np.array([one == kind for one in self._kinds])
-            self._sizes[alike] = np.max(sizes[alike], axis=0)
+        self._rows = sizes
+        self._sizes = sizes if self._like is None else np.array([self._like(column) for column in sizes.T]).T
 
     def _limits(self, mechanism: Labels, largest: Array) -> Array:
         """What is small of every row on panels where these are its largest values, (lane, row)."""
@@ -350,20 +366,21 @@ class _Resolving:
         limits = np.maximum(self._accuracy.tolerance * size, self._accuracy.floor * self._sizes.T[mechanism])
         return np.asarray(np.where(limits > 0, limits, np.inf))
 
-    def _rough(self, mechanism: Labels, values: Array, coefficients: Array) -> NDArray[np.bool_]:
-        """Whether a row is not yet resolved on a panel, (lane,)."""
+    def _rough(self, mechanism: Labels, values: Array, coefficients: Array) -> tuple[NDArray[np.bool_], Labels]:
+        """Whether a row is not yet resolved on a panel, (lane,), and which is it the least."""
         tails = np.max(np.abs(coefficients[..., -2:]), axis=-1)
         limits = self._limits(mechanism, np.max(np.abs(values), axis=-1))
-        excess = np.max(np.nan_to_num(tails / limits), axis=1, initial=0.0)
+        excesses = np.nan_to_num(tails / limits)
+        excess = np.max(excesses, axis=1, initial=0.0)
         for k in np.flatnonzero(np.bincount(mechanism[excess > self._loosened[mechanism]]) > self._accuracy.most):
             self._loosened[k] = np.sort(excess[mechanism == k])[-(self._accuracy.most // 4)]
-        return np.asarray(excess > self._loosened[mechanism])
+        return excess > self._loosened[mechanism], np.argmax(excesses, axis=1)
 
     def _together(self) -> _Panels:
         """All resolved panels, those of each mechanism in the order of time."""
         mechanism, low, high, coefficients, labels = zip(*self._done, strict=True)
-        numbers = (np.concatenate(part) for part in (low, high, coefficients))
-        panels = _Panels(np.concatenate(mechanism), *numbers, labels=np.concatenate(labels))
+        numbers = [np.concatenate(part) for part in (low, high, coefficients)]
+        panels = _Panels(np.concatenate(mechanism), numbers[0], numbers[1], numbers[2], np.concatenate(labels))
         return panels.picked(np.lexsort((panels.low, panels.mechanism)))
 
     def _torn(self) -> tuple[Labels, Array, Array]:
@@ -410,10 +427,17 @@ def _between(edges: Sequence[Array], mechanism: Labels) -> tuple[Labels, Array, 
     return np.repeat(mechanism, [len(own) - 1 for own in edges]), low, high
 
 
-def _where_it_changes(low: float, high: float, time: Array, labels: Labels) -> Array:
-    """Edges that part a panel between two of its times that have different labels."""
+def _changing(time: Array, labels: Labels) -> Array:
+    """The times of a panel on both sides of each change of its labels."""
     after = np.flatnonzero(labels[1:] != labels[:-1])
-    return np.unique(np.concatenate([[low], time[after], time[after + 1], [high]]))
+    return time[np.unique(np.concatenate([after, after + 1]))]
+
+
+def _bending(time: Array, values: Array) -> Array:
+    """The times of a panel about the one at which its row bends most: it may have a corner there, or jump."""
+    slopes = np.diff(values) / np.diff(time)
+    k = int(np.argmax(np.nan_to_num(np.abs(np.diff(slopes) / (time[2:] - time[:-2])))))
+    return time[[k, k + 2]]
 
 
 def _labelled(states: NDArray[np.integer], values: Array) -> Labels:

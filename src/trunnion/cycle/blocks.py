@@ -70,7 +70,7 @@ def written(
             some = range(low, min(low + BLOCK, steps))
             time = run.cycle.times(steps, some)
             block = stretch(run, time, first.method, engine, kept.variables, tails[0], among=steps)
-            block = replace(block, means=first.means, ideal=first.ideal)
+            block = replace(block, means=first.means, ideal=first.ideal, course=first.course)
             values = values_at(run, measured.measures, time, first.method, tails[1], first.compiled)
             own = replace(measured, values=values, valid=np.ones(len(time), bool))
             powers = {name: np.maximum(row, peak(block.arrays[name])) for name, row in powers.items()}

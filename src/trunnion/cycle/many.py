@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.cycle.compiled import CycleKernel, compiles
+from trunnion.cycle.course import COMPARED_ROWS, FOLLOWED, CycleCourse, accuracy_of, breaks_of, like, stacked
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.positions import IDEAL
 from trunnion.cycle.unanswered import blank
@@ -21,6 +24,7 @@ from trunnion.solve.compiled_vectors import literals
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
+from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import System, Values
 
 __all__ = ["Many"]
@@ -93,6 +97,28 @@ class Many:
             some = {path: lanes_of(value, row) for path, value in values.items()}
             fill_lanes(arrays, self.run.solve(times, some, method), times, (row, column))
         return arrays
+
+    def courses(self, of: Mechanisms, ideal: Values | None, method: FrictionMethod) -> list[CycleCourse]:
+        """The courses of some mechanisms over their cycles. ideal: their numbers without errors, if any has some."""
+        names = [*FOLLOWED, *(COMPARED_ROWS if ideal is not None else ())]
+        shapes: dict[str, tuple[int, ...]] = {}
+        without = None if ideal is None else replace(of, values=ideal)
+
+        def look(mechanism: NDArray[np.intp], time: NDArray[np.float64]) -> tuple[Any, Any]:
+            shape = (1, time.size) if len(of.cycles) == 1 else time.shape
+            meant = None if without is None else without.picked(mechanism)
+            found = self.filled(of.picked(mechanism), meant, of.lanes(time), shape, names, method, method)[0]
+            arrays = {name: array.reshape(*array.shape[:-2], *time.shape) for name, array in found.items()}
+            again, rows = stacked(arrays, names, 2)
+            shapes.update(again)
+            return rows, arrays["status"]
+
+        every = [bends(one) for one in (of, without) if one is not None]
+        breaks = [breaks_of(cycle, np.concatenate(own)) for cycle, *own in zip(of.cycles, *every, strict=True)]
+        accuracy = accuracy_of(self.run.cycle, Accuracy())
+        with np.errstate(all="ignore"):
+            found = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
+        return [CycleCourse(self.run, shapes, one) for one in found]
 
     def _kernel(
         self, arrays: Arrays, values: Values, time: NDArray[np.float64], method: FrictionMethod, key: object

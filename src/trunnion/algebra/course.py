@@ -430,14 +430,14 @@ def _between(edges: Sequence[Array], mechanism: Labels) -> tuple[Labels, Array, 
 def _changing(time: Array, labels: Labels) -> Array:
     """The times of a panel on both sides of each change of its labels."""
     after = np.flatnonzero(labels[1:] != labels[:-1])
-    return time[np.unique(np.concatenate([after, after + 1]))]
+    return np.asarray(time[np.unique(np.concatenate([after, after + 1]))])
 
 
 def _bending(time: Array, values: Array) -> Array:
     """The times of a panel about the one at which its row bends most: it may have a corner there, or jump."""
     slopes = np.diff(values) / np.diff(time)
     k = int(np.argmax(np.nan_to_num(np.abs(np.diff(slopes) / (time[2:] - time[:-2])))))
-    return time[[k, k + 2]]
+    return np.asarray(time[[k, k + 2]])
 
 
 def _labelled(states: NDArray[np.integer], values: Array) -> Labels:

@@ -29,14 +29,16 @@ from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import around
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
+from trunnion.solve.status import status_of
 from trunnion.solve.switches import MOST_EDGES, PANELS, Mechanisms, stated_bends
 from trunnion.solve.system import Cycle
 
 __all__ = [
     "COMPARED_ROWS", "FOLLOWED", "CycleCourse", "Rows", "Top", "accuracy_of", "breaks_of", "course_of", "like",
-    "stacked",
+    "margin_of", "stacked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -46,6 +48,7 @@ FORCES = ("drive_effort", "reaction_force", "reaction_moment", "drive_effort_cha
 FOLLOWED = ("drive_effort", *POWERS, "reaction_force", "reaction_moment", "joint_slide")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
 SEATED = Accuracy(1e-5, 1e-7, shortest=1e-7, rounds=16)  # pins settle in their seats to 1e-6 of their clearance
+MARGINS = Accuracy(1e-4, 1e-6, shortest=1e-5, rounds=8)  # a margin is followed, which takes long
 HELD = 16  # beside the status of panels in which accelerations leave out the travel of seats
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther
 CLOSE = 1e-10  # of the cycle: breaks that are one
@@ -202,6 +205,24 @@ def _course(run: Run, method: FrictionMethod, ideal: bool) -> CycleCourse:
     return CycleCourse(run, looking.shapes, courses)
 
 
+def margin_of(run: Run, method: FrictionMethod) -> CycleCourse:
+    """The course of the locking margin, NaN where it is beyond what the method looks for, found once."""
+    return run.once(("margin", method), lambda: _margin(run, method))
+
+
+@np.errstate(all="ignore")
+def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
+    looking = _Looking(run, method, ideal=False)
+
+    def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+        back, status = looking.walked(time)
+        margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
+        return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
+
+    courses = Courses.of(look, looking.breaks(), None, accuracy_of(run.cycle, MARGINS))
+    return CycleCourse(run, {"locking_margin": ()}, courses)
+
+
 class _Looking:
     """The variables of a run as rows, at any times.
 
@@ -240,6 +261,16 @@ class _Looking:
             self._compare(arrays, time)
         self.shapes, rows = stacked(arrays, (*self._names, SUPPOSED), 1)
         return rows, arrays["status"].astype(np.intp)
+
+    def walked(self, time: Array) -> tuple[Backward, NDArray[np.integer]]:
+        """The mechanism at times, s, and its statuses."""
+        time = time if self.run.cycle.duration > 0 else 0.0 * time
+        if not self.seats:
+            back = self.run.solve(time, method=self.method)
+            return back, status_of(back, time.shape)
+        seated = settle(self.run, around(time, self.run.cycle), self.method)
+        status, valid = status_of(seated.back, time.shape), contact_loss.valid(seated, self.run, self._gaps, time)
+        return seated.back, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST))
 
     def _filled(self, back: Backward, time: Array) -> Arrays:
         """The variables of a walk at times, s."""

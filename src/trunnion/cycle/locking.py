@@ -170,7 +170,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     state = found["locking_state"].values
     figures += holding_figures(run, found["holding_multiple"].values, state, dial)
     figures += _reversing(run, found, dial)
-    backward = reverse_figure(run, _reverse(found), state)
+    backward = reverse_figure(run)
     stays = Figure("efficiency_reverse", "efficiency when backdriven (the useful loads do no net work backward)", None)
     return [*figures, backward or stays]
 
@@ -211,9 +211,3 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
     if own.name != least.name:
         return [least, own]
     return [own] if multiple[at] == 0 else [least]
-
-
-def _reverse(found: xr.Dataset) -> Passage:
-    """The way back as the Dataset has it."""
-    delivered, given = found["power_delivered_reverse"].values, found["power_given_reverse"].values
-    return Passage({}, np.isnan(delivered) & np.isfinite(given), delivered, given, np.zeros_like(given))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Place
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss, diagnosis, moved_jumps, near_locking, uncounted
-from trunnion.cycle.course import CycleCourse, Rows
+from trunnion.cycle.course import CycleCourse, Rows, margin_of
 from trunnion.cycle.holding import reverse_figure
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
@@ -29,10 +29,11 @@ from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import KEPT, cited, encoded, figure_rows, finding_rows, origin
 from trunnion.results.dataset import driven
-from trunnion.results.figure import Figure
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
 from trunnion.results.sentences import finding_for
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.system import Dial, System, felt, rubbing
@@ -285,7 +286,7 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
     with np.errstate(all="ignore"):
         if found.course is not None:
             yield from _cycle_figures(run, found, near, found.course)
-        if near and (back := reverse_figure(run, near.back, _states(found, near))):
+        if near and (back := reverse_figure(run)):
             yield back
         residual = balance(arrays) if np.any(counted) else None
         yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
@@ -331,11 +332,9 @@ def _friction_figures(
     run: Run, found: Positions, near: near_locking.Locking | None, course: CycleCourse
 ) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
-    valid = found.arrays["status"] != Status.CONTACT_LOST
     if found.method.margin_up_to:
-        margin = np.where(valid, found.arrays["locking_margin"], np.nan)
-        yield near_locking.least_margin("locking_margin", "locking margin", margin, found.dial, TIMES)
-    yield from near.figures(run, found.dial) if near else ()
+        yield _least_margin(run, found.method)
+    yield from near.figures(run) if near else ()
     means = course.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
     if means.supposed > 0:
@@ -344,6 +343,17 @@ def _friction_figures(
     lost = course.top(lambda rows: np.sum(rows["friction_power"], axis=0), like="friction_power")
     if lost is not None:
         yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
+
+
+def _least_margin(run: Run, method: FrictionMethod) -> Figure:
+    """The least multiple of all friction at which it locks; `margin_up_to` is as far as that is looked for."""
+    name, subject, margins = "locking_margin", "locking margin", margin_of(run, method)
+    least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
+    if least is not None:
+        return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=TIMES)
+    if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
+        return Figure(name, subject, method.margin_up_to, aspect=MORE_THAN, note=TIMES)
+    return Figure(name, subject, None, note=TIMES)
 
 
 def _reaction_figures(system: System, course: CycleCourse) -> Iterator[Figure]:
@@ -417,7 +427,12 @@ def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
     if not rubbing(run.system) or not run.system.mechanism.drivers:
         return None
     with np.errstate(all="ignore"):
-        return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked)
+        worst = None
+        if at.course is not None and at.method.margin_up_to:
+            margins = margin_of(run, at.method)
+            least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
+            worst = None if least is None else 0.0 if least.everywhere else least.time
+        return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked, worst)
 
 
 def _dial_of(near: near_locking.Locking, run: Run, found: Positions) -> Dial:

@@ -72,7 +72,7 @@ def written(
             block = stretch(run, time, first.method, engine, kept.variables, tails[0], among=steps)
             block = replace(block, means=first.means, ideal=first.ideal, course=first.course)
             values = values_at(run, measured.measures, time, first.method, tails[1], first.compiled)
-            own = replace(measured, values=values, valid=np.ones(len(time), bool))
+            own = replace(measured, values=values)
             powers = {name: np.maximum(row, peak(block.arrays[name])) for name, row in powers.items()}
             count += np.bincount(block.arrays["status"].astype(np.intp), minlength=len(count))
             for figure in (*figures(run, block), *own.summary()):

@@ -33,11 +33,10 @@ from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import status_of
-from trunnion.solve.switches import MOST_EDGES, PANELS, Mechanisms, stated_bends
-from trunnion.solve.system import Cycle
+from trunnion.solve.switches import MARGINS, SEATED, Mechanisms, accuracy_of, breaks_between, stated_bends
 
 __all__ = [
-    "COMPARED_ROWS", "FOLLOWED", "CycleCourse", "Rows", "Top", "accuracy_of", "breaks_of", "course_of", "like",
+    "COMPARED_ROWS", "FOLLOWED", "CycleCourse", "Rows", "Top", "course_of", "like",
     "margin_of", "stacked",
 ]  # fmt: skip
 
@@ -47,8 +46,6 @@ POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
 FORCES = ("drive_effort", "reaction_force", "reaction_moment", "drive_effort_change")
 FOLLOWED = ("drive_effort", *POWERS, "reaction_force", "reaction_moment", "joint_slide")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
-SEATED = Accuracy(1e-5, 1e-7, shortest=1e-7, rounds=16)  # pins settle in their seats to 1e-6 of their clearance
-MARGINS = Accuracy(1e-4, 1e-6, shortest=1e-5, rounds=8)  # a margin is followed, which takes long
 HELD = 16  # beside the status of panels in which accelerations leave out the travel of seats
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther
 CLOSE = 1e-10  # of the cycle: breaks that are one
@@ -246,7 +243,7 @@ class _Looking:
         if run.erring:
             without = Mechanisms(run.system, run.chosen.assembly, run.ideal_values, [run.cycle])
             bends += [bend.time for bend in stated_bends(without)]
-        return breaks_of(run.cycle, np.concatenate([bends, self._gaps.ravel()]))
+        return breaks_between(run.cycle, np.concatenate([bends, self._gaps.ravel()]))
 
     def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
         """Rows and statuses at times, s."""
@@ -307,20 +304,6 @@ def stacked(arrays: Arrays, names: Sequence[str], places: int) -> tuple[dict[str
     """Shapes and rows of some variables, those of each after one another. places: how many of the last dims are."""
     shapes = {name: arrays[name].shape[:-places] for name in names if name in arrays}
     return shapes, np.concatenate([arrays[name].reshape(-1, *arrays[name].shape[-places:]) for name in shapes])
-
-
-def breaks_of(cycle: Cycle, bends: Array) -> Array:
-    """Both ends of a cycle and the bends between them, s, those that are one taken once."""
-    duration, times = cycle.duration, np.unique(bends)
-    inner = times[(times > CLOSE * duration) & (times < (1 - CLOSE) * duration)]
-    inner = inner[np.append(np.diff(inner) > CLOSE * duration, True)] if len(inner) else inner
-    return np.concatenate([[0.0], inner, [duration]])
-
-
-def accuracy_of(cycle: Cycle, accuracy: Accuracy) -> Accuracy:
-    """The same with panels no wider than a part of a turn."""
-    turns = max(1.0, np.ceil(cycle.turns - 1e-9))
-    return accuracy._replace(widest=1.0 / min(PANELS * turns, MOST_EDGES))
 
 
 def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array:

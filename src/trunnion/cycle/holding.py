@@ -12,12 +12,12 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import CANCELLED
 from trunnion.algebra.roots import root
-from trunnion.cycle.course import accuracy_of, breaks_of
 from trunnion.cycle.locking_states import PUSHES, ROUNDING, LockingState, pushed, states
 from trunnion.cycle.near_locking import Passage, passage, passed, reverse
 from trunnion.results.figure import Figure
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import useful_loads, useful_springs
+from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import Dial, felt, law_of
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _reversed(run: Run) -> Courses:
         powers = np.stack([other.delivered, other.given, other.beside])
         return powers, states(ahead, other, known, least)
 
-    breaks = breaks_of(run.cycle, run.edges) if run.cycle.duration > 0 else np.array([0.0, 1.0])
+    breaks = breaks_between(run.cycle, run.edges) if run.cycle.duration > 0 else np.array([0.0, 1.0])
     return Courses.of(look, breaks, lambda sizes: 0.0 * sizes + np.max(sizes), accuracy_of(run.cycle, Accuracy()))
 
 

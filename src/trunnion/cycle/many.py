@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.cycle.compiled import CycleKernel, compiles
-from trunnion.cycle.course import COMPARED_ROWS, FOLLOWED, CycleCourse, accuracy_of, breaks_of, like, stacked
+from trunnion.cycle.course import COMPARED_ROWS, FOLLOWED, CycleCourse, like, stacked
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.positions import IDEAL
 from trunnion.cycle.unanswered import blank
@@ -24,7 +24,7 @@ from trunnion.solve.compiled_vectors import literals
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.switches import Mechanisms, bends
+from trunnion.solve.switches import Mechanisms, accuracy_of, bends, breaks_between
 from trunnion.solve.system import System, Values
 
 __all__ = ["Many"]
@@ -114,7 +114,7 @@ class Many:
             return rows, arrays["status"]
 
         every = [bends(one) for one in (of, without) if one is not None]
-        breaks = [breaks_of(cycle, np.concatenate(own)) for cycle, *own in zip(of.cycles, *every, strict=True)]
+        breaks = [breaks_between(cycle, np.concatenate(own)) for cycle, *own in zip(of.cycles, *every, strict=True)]
         accuracy = accuracy_of(self.run.cycle, Accuracy())
         with np.errstate(all="ignore"):
             found = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)

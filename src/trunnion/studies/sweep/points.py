@@ -28,7 +28,7 @@ from trunnion.cycle.summary import model_notes
 from trunnion.cycle.written import CONDITIONS
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.measures.evaluation import figures_of
+from trunnion.measures.over_cycle import figures_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
@@ -133,7 +133,7 @@ class Points:
             found = measures_of(run, names)
             timed = courses_in_time(run, found, run.values, (1,))
             of_cycle = [one for one in found if not one.in_time]
-            figures = figures_of(run, of_cycle, self.steps, self.method) if of_cycle else {}
+            figures = figures_of(run, of_cycle, self.method) if of_cycle else {}
             return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
 
     def _reduced(self, arrays: Mapping[str, Array], course: CycleCourse | None, ideal: Means | None) -> Reduced:

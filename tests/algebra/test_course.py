@@ -115,6 +115,17 @@ def test_noise_takes_bounded_work() -> None:
     assert top(found).value == pytest.approx(1.0, abs=1e-6)
 
 
+def test_states_that_toss_take_bounded_work() -> None:
+    noise = np.random.default_rng(1)
+
+    def state(t: Any) -> Any:
+        return np.where((t > 1.0) & (t < 1.1) & (noise.uniform(size=np.shape(t)) < 0.5), 5, 0)
+
+    found = course(lambda t: np.cos(t), state=state)
+    assert found.asked < 50_000
+    assert top(found, panels=found.states == 0).value == pytest.approx(1.0)
+
+
 def test_of_equal_tops_the_first_counts() -> None:
     found = course(lambda t: np.cos(2 * t - 1))
     assert top(found).time == pytest.approx(0.5, abs=1e-6)

@@ -33,12 +33,13 @@ POINTS = -np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
 FIT = np.linalg.inv(chebyshev.chebvander(POINTS, ORDER - 1))
 GRID = np.linspace(-1.0, 1.0, 49)  # places of a panel among which extremes are looked for first
 ON_GRID = chebyshev.chebvander(GRID, ORDER - 1).T
-NARROWED = 5  # rounds of that search, each of them about the best place of the one before
+NARROWED = 4  # rounds of that search, each of them about the best place of the one before
 GAUSS, GAUSS_WEIGHTS = legendre.leggauss(ORDER)
 ON_GAUSS = chebyshev.chebvander(GAUSS, ORDER - 1).T
 ENDS = np.array([(-1.0) ** np.arange(ORDER), np.ones(ORDER)]).T
 INTEGRAL = ON_GAUSS @ GAUSS_WEIGHTS  # of every Chebyshev polynomial over a panel
 CHECKED, TORN = 5, 1e3  # times that edges are looked at; of what is small: a row that changes by more at one jumps
+TOSSED = 1e-3  # of the whole: width of panels whose state may be the gravest that they have
 HALVED = 2  # rounds in which a panel is halved; then it is parted about the place where a row bends most
 NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
 ALIKE = 1e-9  # of the size of a course: tops that are one, of which the first counts
@@ -56,10 +57,10 @@ class Accuracy(NamedTuple):
     parted in one round, beyond which the tolerance is loosened, for what is rough everywhere is noise.
     """
 
-    tolerance: float = 1e-9
+    tolerance: float = 1e-8
     floor: float = 1e-12
     widest: float = 1 / 6
-    shortest: float = 1e-11
+    shortest: float = 1e-10
     rounds: int = 24
     most: int = 64
 
@@ -201,7 +202,8 @@ class Courses:
             The first of several; None where no panel has a value.
         """
         chosen = np.arange(len(self.half)) if panels is None else np.flatnonzero(panels)
-        values = self._signed(of, sign, chosen, np.broadcast_to(GRID, (len(chosen), len(GRID))))
+        values = sign * of(self._on_grid[:, chosen])
+        values = np.where(np.isfinite(values), values, -np.inf)
         if not np.any(np.isfinite(values)):
             return None
         high, low = float(np.max(values)), float(np.min(values[np.isfinite(values)]))
@@ -224,6 +226,11 @@ class Courses:
         if abs(nearest - time) <= BESIDE * self.span:
             return Place(sign * float(np.max(best)), nearest, at_break=True)
         return Place(sign * float(np.max(best)), time)
+
+    @cached_property
+    def _on_grid(self) -> Array:
+        """Every row at the places of the grid of every panel, (row, panel, place)."""
+        return np.moveaxis(self.coefficients @ ON_GRID, 1, 0)
 
     def _signed(self, of: Callable[[Array], Array], sign: float, panels: Labels, spots: Array) -> Array:
         """A number at places of some panels, (panel, place), −∞ where it has no value."""
@@ -326,6 +333,10 @@ class _Resolving:
             values = np.moveaxis(rows, 0, 1)  # (lane, row, node)
             coefficients, labels = values @ FIT.T, _labelled(states, values)
             mixed = np.any(labels != labels[:, :1], axis=1)
+            tossed = self._tossed(mechanism, mixed, high - low)
+            labels[tossed] = np.max(labels[tossed], axis=1, keepdims=True, initial=0)
+            coefficients[tossed] = np.nan
+            mixed &= ~tossed
             if not len(self._rows):
                 self._scale(mechanism, values, labels)
             rough, worst = self._rough(mechanism, values, coefficients)
@@ -338,16 +349,18 @@ class _Resolving:
             left = np.flatnonzero(unresolved & ~tiny)
             if not len(left):
                 break
-            edges = []
-            for k in left:
-                if mixed[k]:
-                    inner = _changing(time[k], labels[k])
-                elif round_ < HALVED:
-                    inner = time[k, :1] * 0.0 + (low[k] + high[k]) / 2
-                else:
-                    inner = _bending(time[k], values[k, worst[k]])
-                edges.append(np.concatenate([low[k : k + 1], inner, high[k : k + 1]]))
+            even = left[~mixed[left]]
+            middle = _middle(low, high, even) if round_ < HALVED else _bending(time[even], values[even, worst[even]])
+            edges = [*np.column_stack([low[even], middle, high[even]])]
+            changing = left[mixed[left]]
+            edges += [np.concatenate([[low[k]], _changing(time[k], labels[k]), [high[k]]]) for k in changing]
+            left = np.concatenate([even, changing])
             mechanism, low, high = _between(edges, mechanism[left])
+
+    def _tossed(self, mechanism: Labels, mixed: NDArray[np.bool_], width: Array) -> NDArray[np.bool_]:
+        """Narrow panels of mechanisms with many of mixed states: these toss as rounding will, and have no breaks."""
+        many = np.bincount(mechanism[mixed], minlength=len(self._asked)) > self._accuracy.most
+        return mixed & many[mechanism] & (width < TOSSED * self._span[mechanism])
 
     def _scale(self, mechanism: Labels, values: Array, labels: Labels) -> None:
         """How large every row is, and what is like it, (row, mechanism): in the least state that there is."""
@@ -433,11 +446,17 @@ def _changing(time: Array, labels: Labels) -> Array:
     return np.asarray(time[np.unique(np.concatenate([after, after + 1]))])
 
 
+def _middle(low: Array, high: Array, panels: Labels) -> Array:
+    return np.asarray((low[panels] + high[panels]) / 2)[:, None]
+
+
 def _bending(time: Array, values: Array) -> Array:
-    """The times of a panel about the one at which its row bends most: it may have a corner there, or jump."""
+    """The times of panels about the one at which a row bends most, (lane, 2): it may have a corner there, or jump."""
     slopes = np.diff(values) / np.diff(time)
-    k = int(np.argmax(np.nan_to_num(np.abs(np.diff(slopes) / (time[2:] - time[:-2])))))
-    return np.asarray(time[[k, k + 2]])
+    bends = np.nan_to_num(np.abs(np.diff(slopes) / (time[:, 2:] - time[:, :-2])))
+    k = np.argmax(bends, axis=1)
+    lanes = np.arange(len(time))
+    return np.column_stack([time[lanes, k], time[lanes, k + 2]])
 
 
 def _labelled(states: NDArray[np.integer], values: Array) -> Labels:

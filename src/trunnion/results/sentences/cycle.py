@@ -120,8 +120,8 @@ CYCLE: dict[str, Sentence] = {
     ),
     "cycle.in_blocks": Sentence(
         NOTE,
-        "the files have all {steps:,} positions; extremes and counts in the summary are of all, findings, strokes, "
-        "what decides of locking and the backdriven efficiency of {looked:,} positions of the same cycle",
+        "the files have all {steps:,} positions, and counts in the summary are of all; findings are of {looked:,} "
+        "positions of the same cycle",
     ),
     "cycle.unseen": Sentence(
         ERROR,

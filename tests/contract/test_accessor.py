@@ -93,7 +93,8 @@ def test_the_summary_has_the_numbers_of_the_result() -> None:
     summary = {one.name: one for one in cycle.trunnion.summary}
     driver = str(cycle["driver"].values[0])
     least, most = (summary[f"{driver}.effort_{end}"] for end in ("min", "max"))
-    assert (least.value, least.unit, least.aspect) == (float(cycle["drive_effort"].min()), "N m", "minimum")
+    assert least.value <= float(cycle["drive_effort"].min())
+    assert (least.unit, least.aspect) == ("N m", "minimum")
     assert most.value >= float(cycle["drive_effort"].max())  # at the jump of the load, between positions
     assert summary["efficiency"].value == float(cycle["efficiency"])
     table = cycle.trunnion.tables()["positions"]

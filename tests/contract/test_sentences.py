@@ -35,10 +35,10 @@ def test_a_code_has_a_sentence(code: str) -> None:
 
 
 def test_a_finding_is_told_by_its_figures() -> None:
-    one = finding_for("effort.peak_missed", "drivers.A", rms=2.0, largest=1.5, unit="N m")
-    assert (one.code, one.where, one.severity) == ("effort.peak_missed", "drivers.A", Severity.WARNING)
-    assert one.figures == {"rms": 2.0, "largest": 1.5, "unit": "N m"}
-    assert "2 N m, exceeds the largest value at any position, 1.5 N m" in one.what
+    one = finding_for("load.not_counted", "loads.F", drive=2.0, work=1.5)
+    assert (one.code, one.where, one.severity) == ("load.not_counted", "loads.F", Severity.NOTE)
+    assert one.figures == {"drive": 2.0, "work": 1.5}
+    assert "which supplies 2 J, this load supplies 1.5 J" in one.what
 
 
 def test_lists_counts_and_the_infinite_are_told_in_words() -> None:

@@ -106,9 +106,9 @@ def test_a_finding_has_its_quantities_in_a_unit_that_fits(value: float, unit: st
     from trunnion.results.quantities import readable
 
     assert readable(value, unit).startswith(text)
-    one = finding_for("effort.peak_missed", "drivers.A", rms=value, largest=value, unit=unit)
+    one = finding_for("errors.jump_moved", "drivers.A", at="3°", built="at 2°", meant="at 4°", rest=value, unit=unit)
     assert text in one.what
-    assert one.figures["rms"] == value
+    assert one.figures["rest"] == value
 
 
 def test_two_ends_are_told_apart_in_one_unit() -> None:

@@ -218,8 +218,9 @@ def test_the_models_measures_in_the_result_of_a_cycle(tmp_path: Path) -> None:
     rotation = result["joint_rotation"].sel(joint="D")
     np.testing.assert_allclose(result["measure_value"].sel(measure="rest"), rotation, rtol=1e-12)
     measures = named(mechanism, ["mu", "swing", "rest"], prepare(mechanism).values)
-    expected = figures(prepare(mechanism), measures, 36)
-    np.testing.assert_allclose(result["measure_figure"].values[1:], list(expected.values()), rtol=1e-12)
+    # of polynomials through so many positions
+    expected = figures(prepare(mechanism), measures, 1440)
+    np.testing.assert_allclose(result["measure_figure"].values[1:], list(expected.values()), rtol=1e-9)
     labels = [row["label"] for row in json.loads(result.attrs["summary"])]
     assert [one for one in labels if "speed" in one and "measure" in one] == [
         "measure speed, minimum",

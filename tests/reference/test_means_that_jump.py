@@ -13,9 +13,10 @@ import pytest
 from numpy.typing import NDArray
 
 import trunnion
-from trunnion.measures.evaluation import NumpyKernel, at_corner, figures_of, sharpened
+from trunnion.measures.evaluation import NumpyKernel, at_corner, sharpened
 from trunnion.measures.figures import reference
 from trunnion.measures.measures import named
+from trunnion.measures.over_cycle import figures_of
 from trunnion.measures.positions import plan
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
@@ -101,7 +102,7 @@ def test_figures_of_many_are_those_of_each_alone_and_of_the_closed_form(start: f
     np.testing.assert_allclose(found["within"], -FORCE * pressed / (TIME / 6), rtol=1e-9, atol=1e-9)
     for k in range(len(touch)):
         alone = prepare(of(start, touch=float(touch[k])))
-        exact = figures_of(alone, named(alone.system.mechanism, FIGURES, alone.values), 24, FrictionMethod())
+        exact = figures_of(alone, named(alone.system.mechanism, FIGURES, alone.values), FrictionMethod())
         for name in FIGURES:
             assert found[name][k] == pytest.approx(exact[name], rel=2e-7, abs=1e-9), (name, k)
 
@@ -130,10 +131,10 @@ def test_pins_in_seats_move_the_place_at_which_the_load_begins(xi: float) -> Non
     pin["joints"]["A"]["seat"] = {"xi": f"{xi} deg"}
     seated = prepare(trunnion.Mechanism(**pin))
     measures = named(seated.system.mechanism, FIGURES, seated.values)
-    found = figures_of(seated, measures, 24, FrictionMethod())
+    found = figures_of(seated, measures, FrictionMethod())
     length = ROD - play * np.cos(np.radians(xi))
     bare = prepare(of(rod=length))
-    expected = figures_of(bare, named(bare.system.mechanism, FIGURES, bare.values), 24, FrictionMethod())
+    expected = figures_of(bare, named(bare.system.mechanism, FIGURES, bare.values), FrictionMethod())
     assert found["power"] == pytest.approx(-FORCE * (R + length - TOUCH) / TIME, rel=1e-6)
     for name in FIGURES:
         assert found[name] == pytest.approx(expected[name], rel=1e-6), name

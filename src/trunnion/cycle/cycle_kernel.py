@@ -12,7 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.namespace import Number
+from trunnion.cycle.course import COMPARED_ROWS, FOLLOWED, CycleCourse, like, stacked
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.diagnosis import Causes
 from trunnion.cycle.means import IDEAL
@@ -27,6 +29,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
+from trunnion.solve.switches import Mechanisms, accuracy_of, bends, breaks_between
 from trunnion.solve.system import System, Values
 from trunnion.solve.walk_kernel import Figure, WalkKernel
 
@@ -36,7 +39,7 @@ Cell = tuple[str, tuple[int, ...]]  # variable, and place in its array but for t
 
 ENGINES = ("auto", "numpy", "compiled")
 WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
-FOLLOWED = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
+MARGIN_WEIGHT = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
 PROBED = 64  # positions at which it is seen whether margins are followed
 # variables that may have no finite value in a solved position
 UNDEFINED = ("efficiency_instant", "locking_margin", "contact_position")
@@ -150,7 +153,7 @@ def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | Non
     if run.seats:
         return False
     weight = 1.0
-    if method is not None and positions * FOLLOWED >= WORTH_COMPILING:
+    if method is not None and positions * MARGIN_WEIGHT >= WORTH_COMPILING:
         weight = _weight(run, method)
     return positions * weight >= WORTH_COMPILING
 
@@ -168,7 +171,7 @@ def _weight(run: Run, method: FrictionMethod) -> float:
             shares = [np.mean(np.asarray(one.bound()) * method.margin_up_to >= 1.0) for one in problems]
         return float(max(shares, default=0.0))
 
-    return 1.0 + FOLLOWED * run.once(("margins followed", method), share)
+    return 1.0 + MARGIN_WEIGHT * run.once(("margins followed", method), share)
 
 
 @dataclass
@@ -230,6 +233,28 @@ class Many:
             return arrays
         kernel.fill(arrays, values, time)
         return arrays
+
+    def courses(self, of: Mechanisms, ideal: Values | None, method: FrictionMethod) -> list[CycleCourse]:
+        """The courses of some mechanisms over their cycles. ideal: their numbers without errors, if any has some."""
+        names = [*FOLLOWED, *(COMPARED_ROWS if ideal is not None else ())]
+        shapes: dict[str, tuple[int, ...]] = {}
+        without = None if ideal is None else replace(of, values=ideal)
+
+        def look(mechanism: NDArray[np.intp], time: NDArray[np.float64]) -> tuple[Any, Any]:
+            shape = (1, time.size) if len(of.cycles) == 1 else time.shape
+            meant = None if without is None else without.picked(mechanism)
+            found = self.filled(of.picked(mechanism), meant, of.lanes(time), shape, names, method, method)[0]
+            arrays = {name: array.reshape(*array.shape[:-2], *time.shape) for name, array in found.items()}
+            again, rows = stacked(arrays, names, 2)
+            shapes.update(again)
+            return rows, arrays["status"]
+
+        every = [bends(one) for one in (of, without) if one is not None]
+        breaks = [breaks_between(cycle, np.concatenate(own)) for cycle, *own in zip(of.cycles, *every, strict=True)]
+        accuracy = accuracy_of(self.run.cycle, Accuracy())
+        with np.errstate(all="ignore"):
+            found = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
+        return [CycleCourse(self.run, shapes, one) for one in found]
 
     def _kernel(
         self, arrays: Arrays, values: Values, time: NDArray[np.float64], method: FrictionMethod, key: object

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +12,13 @@ from trunnion.algebra.plane import point
 from trunnion.algebra.space import point_of
 from trunnion.cycle.fill import Into
 from trunnion.joints.clearance import describing
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
-from trunnion.results.figure import Figure
-from trunnion.results.scales import Scales, extreme_place
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.seating import loads_of
 from trunnion.solve.seats import GivenSeat, seats
 
-if TYPE_CHECKING:
-    from trunnion.solve.run import Run
-    from trunnion.solve.system import Dial
-
-__all__ = ["COMPARED", "error_figures", "fill_errors", "fill_seats"]
+__all__ = ["COMPARED", "fill_errors", "fill_seats"]
 
 Arrays = dict[str, NDArray[np.float64]]
 Vector = Sequence[Number]
@@ -145,35 +137,3 @@ def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> 
     size = np.sqrt(np.sum(vector**2, axis=0))
     share = np.where(size > 0, 2 * np.arctan2(size, sign * scalar) / np.where(size > 0, size, 1.0), 2.0)
     return np.asarray(sign * share * vector)
-
-
-def error_figures(
-    run: Run, arrays: Mapping[str, NDArray[np.float64]], dial: Dial, valid: NDArray[np.bool_], scales: Scales
-) -> Iterator[Figure]:
-    """What the errors do, in the figures one looks at first; of valid positions. scales: beside which they may
-    be rounding."""
-    sizes = [np.where(valid, np.sqrt(np.sum(one**2, axis=0)), np.nan) for one in arrays["point_error"]]
-    if any(np.any(np.isfinite(size)) for size in sizes):
-        top = int(np.argmax([np.nanmax(size, initial=-1.0) for size in sizes]))
-        at, most = int(np.nanargmax(sizes[top])), f"largest: {'.'.join(run.system.points[top])}"
-        place = extreme_place(sizes[top], f"at {dial.at(at)}", scales.floor("m"))
-        yield Figure("point_error_max", "position error", sizes[top][at], "m", most, place)
-    for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
-        if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
-            continue
-        for what, unit in (("rotation", "rad"), ("slide", "m")):
-            error = np.where(valid, np.abs(arrays[f"joint_{what}_error"][i]), np.nan)
-            if (what == "rotation") == (not PAIRS[kind].guided) and np.any(np.isfinite(error)):
-                at, name = int(np.nanargmax(error)), f"{joint}.{what}_error_max"
-                place = extreme_place(error, f"at {dial.at(at)}", scales.floor(unit))
-                yield Figure(name, f"transmission error of {joint}", error[at], unit, "largest magnitude", place)
-    for i, joint in enumerate(run.system.mechanism.drivers):
-        change = np.where(valid, arrays["drive_effort_change"][i], np.nan)
-        if np.any(np.isfinite(change)):
-            at, name = int(np.nanargmax(np.abs(change))), f"{joint}.effort_change_max"
-            kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
-            subject = f"change of the drive {kind} of {joint} by the errors"
-            place = extreme_place(change, f"at {dial.at(at)}", scales.floor(unit))
-            yield Figure(name, subject, change[at], unit, "largest magnitude", place)
-    if run.seats:
-        yield Figure("seat_rounds", "seat iterations", np.max(arrays["seat_rounds"]), aspect="maximum")

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
-from trunnion.algebra.quadrature import CANCELLED, integrals
+from trunnion.algebra.quadrature import CANCELLED
 from trunnion.algebra.roots import root
-from trunnion.cycle.locking_states import PUSHES, LockingState, pushed
-from trunnion.cycle.near_locking import Passage, passed, reverse
-from trunnion.errors import counted
+from trunnion.cycle.locking_states import PUSHES, ROUNDING, LockingState, pushed, states
+from trunnion.cycle.near_locking import Passage, passage, passed, reverse
 from trunnion.results.figure import Figure
 from trunnion.results.scales import extreme_place
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work, useful_loads, useful_springs
+from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import Dial, felt, law_of
 
 if TYPE_CHECKING:
@@ -27,36 +28,73 @@ __all__ = ["holding_figures", "holding_multiples", "reverse_figure"]
 
 Array = NDArray[np.float64]
 LITTLE = 1e-3  # of what the useful loads give: what masses, other loads and springs may supply beside it
+SCANNED = 360  # positions at which it is looked how much the loads give
+BACK_LOCKED = LockingState.LOCKED_BACKWARD, LockingState.JAMMED
 HELD = LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD
 
 
-def reverse_figure(run: Run, back: Passage, state: NDArray[np.int8]) -> Figure | None:
+def reverse_figure(run: Run) -> Figure | None:
     """Power that reaches the drivers over that of the useful loads and springs, backward; None if these do not drive.
 
-    A mean, so it is called self-locking only if friction holds the loads wherever they push. state: codes of
-    `LockingState`.
+    A mean over the cycle, so it is called self-locking only if friction holds the loads wherever they push.
     """
     name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads" + _centred(run)
     if not has_useful_work(run.system.mechanism):
         return None
-    delivered, given, beside, error = _reversed_means(run, back)
-    if np.all(np.isfinite(back.given)) and not given > 0:
+    courses = run.once("back", lambda: _reversed(run))
+    delivered, given, beside = courses.mean()
+    error = np.maximum(courses.error(), CANCELLED * courses.mean(np.abs))
+    delivered, given, beside = np.where(np.abs([delivered, given, beside]) <= error, 0.0, [delivered, given, beside])
+    if np.isfinite(given) and not given > 0:
         return None
-    if np.any(back.locked):
-        places = counted(int(np.count_nonzero(back.locked)), "position")
-        return Figure(name, subject, None, place=f"at {places}", note="it locks")
-    if not np.isfinite(delivered + given) or not np.all(np.isfinite(back.given + back.delivered)):
+    found = {state for state in LockingState if int(state) in courses.states}
+    locked = courses.share(np.isin(courses.states, BACK_LOCKED))
+    if locked > 0:
+        return Figure(name, subject, None, place=f"in {locked:.2%} of the cycle", note="it locks")
+    if LockingState.UNSOLVED in found or not np.isfinite(delivered + given):
         return Figure(name, subject, None, note="not every position is solved")
-    if beside > max(error, LITTLE * given):
+    if beside > max(np.sum(error[:2]), LITTLE * given):
         return Figure(name, subject, None, note=_beside(run))
-    states = {one for one in PUSHES if one in state}
-    value, held = min(delivered / given, 1.0), states <= {LockingState.SELF_LOCKING}
+    states = found & set(PUSHES)
+    value, held = min(float(delivered / given), 1.0), states <= {LockingState.SELF_LOCKING}
+    if value <= 0 and not _by_friction(run):
+        return Figure(name, subject, value, note="held without friction")
     if value <= 0 and held:
         return Figure(name, subject, value, note="self-locking")
     if value <= 0:
         return Figure(name, subject, value, note="it takes work on the whole; see the ranges of `locking`")
     differ = len(states) > 1 and felt(run.system, run.values)
     return Figure(name, subject, value, note="the mean; see the ranges of `locking`" * bool(differ))
+
+
+@np.errstate(all="ignore")
+def _reversed(run: Run) -> Courses:
+    """Powers, W, delivered to the drivers, given by the useful loads and by others, backward over the cycle; the states
+    of its panels are codes of `LockingState`."""
+
+    def both(time: Array) -> tuple[Passage, Passage]:
+        back = run.solve(time if run.cycle.duration > 0 else 0.0 * time, method=FrictionMethod())
+        return passage(back), reverse(run, back.walk, FrictionMethod())
+
+    scan = both(run.cycle.times(SCANNED if run.cycle.duration > 0 else 1))[1]
+    least = ROUNDING * float(np.nanmax(np.abs(scan.acting), initial=0.0))
+
+    def look(time: Array) -> tuple[Array, NDArray[np.int8]]:
+        ahead, other = both(time)
+        known = np.isfinite(other.acting)
+        powers = np.stack([other.delivered, other.given, other.acting - other.given])
+        return powers, states(ahead, other, known, least)
+
+    breaks = breaks_between(run.cycle, run.edges) if run.cycle.duration > 0 else np.array([0.0, 1.0])
+    return Courses.of(look, breaks, lambda sizes: 0.0 * sizes + np.max(sizes), accuracy_of(run.cycle, Accuracy()))
+
+
+def _by_friction(run: Run) -> bool:
+    """Whether the loads would drive it backward somewhere without friction."""
+    time = run.cycle.times(SCANNED if run.cycle.duration > 0 else 1)
+    back = reverse(run, run.walk(time), FrictionMethod())
+    bare = reverse(run, run.walk(time), FrictionMethod(multiple=np.zeros(len(time))))
+    return bool(np.any(bare.delivered[pushed(back)] > 0))
 
 
 def _centred(run: Run) -> str:
@@ -75,25 +113,6 @@ def _beside(run: Run) -> str:
     }
     others = [source for source, there in sources.items() if there]
     return f"{', '.join(others)} supply work too" if others else "more than 1: not solved accurately enough"
-
-
-def _reversed_means(run: Run, back: Passage) -> tuple[float, float, float, float]:
-    """Mean powers, W, delivered, given by the useful loads, and by all else that acts, backward, 0 where they cancel,
-    and the error of the first two; that of the useful loads is known where it locks."""
-    if run.cycle.duration <= 0:
-        delivered, given, acting = (float(part[0]) for part in (back.delivered, back.given, back.acting))
-        return delivered, given, acting - given, CANCELLED * abs(given)
-    if np.any(back.locked):  # then there is no mean to be delivered, and of the other one the sign is asked for
-        return float("nan"), float(np.mean(back.given)), 0.0, 0.0
-
-    def powers(rows: NDArray[np.intp], time: Array) -> Array:
-        there = reverse(run, run.walk(time.ravel()), FrictionMethod())
-        return np.stack([there.delivered, there.given, there.acting - there.given]).reshape(3, *time.shape)
-
-    found = run.once("back", lambda: integrals(powers, [run.edges]))
-    value, error = found.value[:, 0], np.maximum(found.error[:, 0], CANCELLED * found.size[:, 0])
-    delivered, given, beside = (np.where(np.abs(value) <= error, 0.0, value) / run.cycle.duration).tolist()
-    return delivered, given, beside, float(np.sum(error[:2])) / run.cycle.duration
 
 
 def holding_multiples(run: Run, time: Array, ahead: Passage, back: Passage) -> Array:

@@ -170,7 +170,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     state = found["locking_state"].values
     figures += holding_figures(run, found["holding_multiple"].values, state, dial)
     figures += _reversing(run, found, dial)
-    backward = reverse_figure(run, _reverse(found), state)
+    backward = reverse_figure(run)
     why = "the useful loads do no net work backward" if has_useful_work(run.system.mechanism) else NOTHING_USEFUL
     remedy = "" if has_useful_work(run.system.mechanism) else STATE_USEFUL
     stays = Figure("efficiency_reverse", f"efficiency when backdriven ({why})", None, note=remedy)
@@ -215,9 +215,3 @@ def _of_joint(run: Run, joint: str, multiple: NDArray[np.float64], dial: Dial) -
     if own.name != least.name:
         return [least, own]
     return [own] if multiple[at] == 0 else [least]
-
-
-def _reverse(found: xr.Dataset) -> Passage:
-    """The way back as the Dataset has it."""
-    delivered, acting, given = (found[f"power_{name}_reverse"].values for name in ("delivered", "acting", "given"))
-    return Passage({}, np.isnan(delivered) & np.isfinite(acting), delivered, acting, given)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
+from trunnion.cycle import contact_loss
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.measures.evaluation import courses_of, figures_of
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
+from trunnion.measures.over_cycle import figures_of
 from trunnion.measures.positions import plan
 from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
 from trunnion.results.figure import Figure
@@ -24,7 +26,7 @@ from trunnion.solve.run import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "Watched", "positions_told", "watched"]
+__all__ = ["VARIABLES", "Watched", "watched"]
 
 Array = NDArray[np.float64]
 VARIABLES = {
@@ -51,7 +53,8 @@ TAKEN = ("time", "drive", "power_in", "power_useful", "seat_rounds", "status")  
 class Watched:
     """values: (measure, position), figures: (measure,), SI; findings: which measures of the model are left out, why.
 
-    valid: the positions where no pin loses contact; notes: what that does to a figure, by the measure's name.
+    notes: what a pin that loses contact does to a figure, by the measure's name; extremes: least and largest value over
+    the cycle of one that states no figure, where no pin does.
     """
 
     run: Run
@@ -59,8 +62,8 @@ class Watched:
     values: Array
     figures: Array
     findings: Sequence[Finding]
-    valid: NDArray[np.bool_]
     notes: Mapping[str, str]
+    extremes: Mapping[str, tuple[float, float]]
 
     def joined(self, result: xr.Dataset) -> xr.Dataset:
         """A result with them."""
@@ -76,22 +79,17 @@ class Watched:
         return with_variables(labelled, described(arrays, VARIABLES, units))
 
     def summary(self) -> Iterator[Figure]:
-        """The figure of each; of one that states none its extremes over the positions."""
-        for measure, values, figure in zip(self.measures, self.values, self.figures, strict=True):
+        """The figure of each; of one that states none its extremes over the cycle."""
+        for measure, figure in zip(self.measures, self.figures, strict=True):
             name, subject, unit = measure.name, f"measure {measure.name}", measure.unit(self.run.system)
             if measure.rule != "deviation":
                 own = measure.figure_unit(self.run.system, self.run.values)
                 aspect = measure.statistic.replace("-", " ")
                 yield Figure(name, subject, figure, own, aspect, note=self.notes.get(name, ""))
-            elif np.any(np.isfinite(values[self.valid])):
-                note, own = positions_told(self.valid), values[self.valid]
-                yield Figure(f"{name}.min", subject, np.nanmin(own), unit, "minimum", note=note)
-                yield Figure(f"{name}.max", subject, np.nanmax(own), unit, "maximum", note=note)
-
-
-def positions_told(valid: NDArray[np.bool_]) -> str:
-    """Of how many positions a figure is, where a pin loses contact at others; empty where it does at none."""
-    return "" if np.all(valid) else f"of {np.count_nonzero(valid)} of {len(valid)} positions"
+            elif name in self.extremes:
+                least, most = self.extremes[name]
+                yield Figure(f"{name}.min", subject, least, unit, "minimum")
+                yield Figure(f"{name}.max", subject, most, unit, "maximum")
 
 
 def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] | None = None) -> Watched:
@@ -109,7 +107,8 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
     values = _values_at(run, measures, time, method)
     stated = [one for one in measures if one.rule != "deviation"]
     with np.errstate(all="ignore"):
-        of_cycle = figures_of(run, stated, steps, method) if stated else {}
+        of_cycle = figures_of(run, stated, method) if stated else {}
+        extremes = _extremes(run, [one for one in measures if one.rule == "deviation"], method)
     figures = np.array([of_cycle.get(one.name, np.nan) for one in measures], float)
     valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
     notes: dict[str, str] = {}
@@ -121,7 +120,7 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
         elif measure.rule == "time ratio" and not np.isfinite(figure):
             notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
     if np.all(valid):
-        return Watched(run, measures, values, figures, findings, valid, notes)
+        return Watched(run, measures, values, figures, findings, notes, extremes)
     dial = run.system.dial(run.values, time)
     for i, measure in enumerate(measures):
         if measure.rule == "deviation":
@@ -136,7 +135,20 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
             findings.append(finding_for("measure.contact_lost", where, at=at, phrases={"why": why}))
         elif np.any(lost):
             notes[measure.name] = f"a pin loses contact at {np.count_nonzero(lost)} of its {len(lost)} positions"
-    return Watched(run, measures, values, figures, findings, valid, notes)
+    return Watched(run, measures, values, figures, findings, notes, extremes)
+
+
+def _extremes(run: Run, measures: Sequence[Measure], method: FrictionMethod) -> dict[str, tuple[float, float]]:
+    """Least and largest value of measures over the cycle, where no pin loses contact; of those of one number alone."""
+    single = [one for one in measures if one.single(run.system)]
+    if not single:
+        return {}
+    gaps = contact_loss.gaps(run) if run.seats and run.cycle.duration > 0 else None
+    ends = [
+        figures_of(run, [replace(one, statistic=statistic) for one in single], method, gaps)
+        for statistic in ("minimum", "maximum")
+    ]
+    return {one.name: (ends[0][one.name], ends[1][one.name]) for one in single}
 
 
 def _beside_switch(run: Run, time: Array, places: NDArray[np.intp]) -> bool:

@@ -244,14 +244,14 @@ def passage(back: Backward) -> Passage:
 class Locking:
     """What one cycle shows, looked at some times (s).
 
-    ahead, back: the positions passed forward and backward; first: number of the analysed position with the least
-    margin, None if all are beyond what was looked for; critical: for each joint, the multiple of its own friction at
+    ahead, back: the positions passed forward and backward; first: time, s, of the least margin, None if all are beyond
+    what was looked for; critical: for each joint, the multiple of its own friction at
     which it locks there; others: solutions at full friction beside the one that grows from none.
     """
 
     times: Array
     ahead: Passage
-    first: int | None
+    first: float | None
     critical: dict[str, float]
     others: Array
     back: Passage
@@ -269,19 +269,27 @@ class Locking:
         joint = min(sound, key=sound.__getitem__, default="")
         return (joint, sound[joint]) if joint else None
 
-    def figures(self, run: Run, dial: Dial, margin: Array) -> list[Figure]:
-        """The joint that decides. dial: names the position of `first`; margin: of every position."""
+    def figures(self, run: Run) -> list[Figure]:
+        """The joint that decides, at the least margin."""
         decides = self.responsible()
         if decides is None or self.first is None:
             return []
-        return [critical_figure(run, *decides, extreme_place(margin, f"at {dial.at(self.first)}"))]
+        dial = run.system.dial(run.values, np.array([self.first, run.cycle.duration]))
+        return [critical_figure(run, *decides, f"at {dial.at(0)}")]
 
 
-def look(run: Run, time: Array, margin: Array, method: FrictionMethod, walked: Backward | None = None) -> Locking:
+def look(
+    run: Run,
+    time: Array,
+    margin: Array,
+    method: FrictionMethod,
+    walked: Backward | None = None,
+    worst: float | None = None,
+) -> Locking:
     """Look at no more than LOOKED times of a cycle.
 
     margin: of every position analysed, NaN where unknown; walked: the walk through all of them by the method, if it is
-    there, which is not taken again.
+    there, which is not taken again; worst: time, s, of the least margin, that of the position with it if not given.
     """
     times = run.cycle.times(min(len(time), LOOKED))
     plain = replace(method, name="newton", margin_up_to=0.0)
@@ -296,13 +304,13 @@ def look(run: Run, time: Array, margin: Array, method: FrictionMethod, walked: B
         known = walked if same else None
         key = "both ways", len(times), plain
         ahead, more, behind = run.once(key, lambda: _both_ways(run, times, plain, known))
-    first = int(np.nanargmin(margin)) if np.any(np.isfinite(margin)) else None
+    if worst is None and np.any(np.isfinite(margin)):
+        worst = float(time[int(np.nanargmin(margin))])
     critical: dict[str, float] = {}
-    if first is not None:
-        worst, most = time[[first]], method.margin_up_to
-        there = "critical", float(worst[0]), plain, most
-        critical = run.once(there, lambda: _critical(run, worst, plain, most))
-    return Locking(times, ahead, first, critical, more, behind)
+    if worst is not None:
+        place, most = worst, method.margin_up_to
+        critical = run.once(("critical", place, plain, most), lambda: _critical(run, np.array([place]), plain, most))
+    return Locking(times, ahead, worst, critical, more, behind)
 
 
 def _critical(run: Run, time: Array, method: FrictionMethod, most: float) -> dict[str, float]:

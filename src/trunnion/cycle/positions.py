@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.quadrature import Effort
 from trunnion.cycle import contact_loss, diagnosis, resting_joints
+from trunnion.cycle.course import CycleCourse, course_of
 from trunnion.cycle.cycle_kernel import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.kept import needed
-from trunnion.cycle.means import AVERAGED, IDEAL, MOST_SUPPOSED, SUPPOSED, Means, means_of, still, unknown
+from trunnion.cycle.means import IDEAL, Means, still
 from trunnion.cycle.near_locking import LOOKED
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
@@ -21,20 +21,17 @@ from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import Lanes, around, lanes
+from trunnion.solve.eccentricity_rate import Lanes, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.seating import Seated, settle
-from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Dial, Values
 
 __all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
 
 
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
-SEATED = Effort(1e-6, 2)  # for means with pins in seats, which themselves settle to 1e-6 of their clearance
-COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks for more, as a jump does that seats move
 
 
 def check_steps(steps: int) -> None:
@@ -48,8 +45,8 @@ class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
     means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
-    one walk that they all came of, where it was one and pins lie in no seats; ideal_arrays: what the means of the ideal
-    mechanism are made of.
+    one walk that they all came of, where it was one and pins lie in no seats; course: that of the cycle, which does not
+    depend on the positions, if it was looked for.
     """
 
     arrays: Arrays
@@ -62,7 +59,7 @@ class Positions:
     ideal: Means | None
     losses: list[contact_loss.Loss]
     walked: Backward | None = None
-    ideal_arrays: Arrays = field(default_factory=dict)
+    course: CycleCourse | None = None
 
 
 def positions(
@@ -89,11 +86,9 @@ def positions(
     if not averaged:
         return found
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
-    return replace(
-        found,
-        means=_means(run, found.arrays, quick),
-        ideal=_means(run, found.ideal_arrays, quick, ideal=True) if run.erring else None,
-    )
+    course = course_of(run, quick)
+    ideal = course_of(run, quick, ideal=True).means if run.erring else None
+    return replace(found, course=course, means=course.means, ideal=ideal)
 
 
 def stretch(
@@ -132,53 +127,7 @@ def stretch(
     means = still(arrays, run.system.mechanism)
     meant = still(ideal, run.system.mechanism) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, means, meant, losses, walked, ideal)
-
-
-def _means(run: Run, arrays: Arrays, method: FrictionMethod, ideal: bool = False) -> Means:
-    """Means over the cycle; NaN where a position has no answer. ideal: of the mechanism without errors."""
-    if run.cycle.duration <= 0 or np.any(arrays["status"] >= Status.NOT_CONVERGED):
-        return still(arrays, run.system.mechanism)
-    return run.once(("means", method, ideal), lambda: _averaged(run, method, ideal))
-
-
-def _averaged(run: Run, method: FrictionMethod, ideal: bool) -> Means:
-    """Means over the cycle, which do not depend on the positions that are asked for."""
-    of = Mechanisms(run.system, run.chosen.assembly, run.ideal_values if ideal else run.values, [run.cycle])
-    if ideal or not run.seats:
-        look = run.ideal if ideal else run.solve
-        between = None if ideal else [run.edges]
-        return means_of(of, lambda rows, time: _powers(look(time.ravel(), method=method), time), between)[0]
-    gaps = contact_loss.gaps(run)
-
-    def seated(rows: NDArray[np.intp], time: NDArray[np.float64]) -> Arrays:
-        seen = around(time.ravel(), run.cycle)
-        found = settle(run, seen, method)
-        valid = contact_loss.valid(found, run, gaps, time.ravel()).reshape(time.shape)
-        powers = _powers(found.back, time)
-        if np.all(valid):
-            return powers
-        # a gap left out would weigh the rest of the cycle otherwise: play changes little of what flows in a short one
-        meant = _powers(run.ideal(time.ravel(), method=method), time)
-        driven, supposed = (np.sum(one["drive_power"], axis=0) for one in (powers, meant))
-        apart = np.where(np.isfinite(driven), np.abs(supposed - driven), np.abs(supposed))
-        powers = {name: np.where(valid, array, meant[name]) for name, array in powers.items()}
-        return {**powers, SUPPOSED: np.where(valid, 0.0, apart)}
-
-    between = [np.unique(np.concatenate([run.edges, np.clip(gaps.ravel(), 0.0, run.cycle.duration)]))]
-    means = means_of(of, seated, between, SEATED)[0]
-    if means.supposed > MOST_SUPPOSED:
-        return unknown(means)
-    return means_of(of, seated, between, FINER)[0] if means.integration_error > COARSE else means
-
-
-def _powers(back: Backward, time: NDArray[np.float64]) -> Arrays:
-    """What means are made of, (…, lane, node), from a walk at all these times in a row."""
-    system = back.walk.system
-    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-    arrays = results.allocate(labels, time.size, absent, wanted={*AVERAGED, "status"})
-    fill_chunk(arrays, back, time.ravel(), slice(None))
-    return {name: arrays[name].reshape(*arrays[name].shape[:-1], *time.shape) for name in AVERAGED}
+    return Positions(arrays, labels, time, dial, method, causes, means, meant, losses, walked)
 
 
 def _refuse_seats(run: Run) -> None:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Place
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis, jumps, near_locking, uncounted
-from trunnion.cycle.deviations import error_figures
+from trunnion.cycle import contact_loss, diagnosis, moved_jumps, near_locking, uncounted
+from trunnion.cycle.course import CycleCourse, Rows, margin_of
 from trunnion.cycle.holding import reverse_figure
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_states import cells, in_order, ranges_of
-from trunnion.cycle.model_measures import Watched, positions_told, watched
+from trunnion.cycle.model_measures import Watched, watched
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.scene import COURSE, DRAWN, courses
@@ -30,11 +31,12 @@ from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, driven
-from trunnion.results.figure import Figure
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
-from trunnion.results.scales import Scales, extreme_place
+from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated, stated_walk, useful_loads
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.system import Dial, System, felt, rubbing
@@ -52,7 +54,6 @@ __all__ = [
     "references",
     "result_of",
     "scene_of",
-    "sound_positions",
 ]
 
 
@@ -128,9 +129,8 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *run.once("far hints", lambda: list(_far_hints(run))),
         *(run.determinacy.findings() if run.determinacy else []),
         *_over_the_cycle(run, at, near),
-        *_missed_peaks(run.system, at, scales),
-        *jumps.findings(run, at.time, at.arrays, units),
-        *jumps.moved(run, at, units),
+        *_beside_gaps(run.system, at.course),
+        *(moved_jumps.findings(at.course, units) if at.course and run.erring else ()),
         *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
     ], near
@@ -229,15 +229,13 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
     return [*found, *_loads_over_the_cycle(run, at)]
 
 
-def _missed_peaks(system: System, at: Positions, scales: Scales) -> Iterator[Finding]:
-    """An effort whose mean square says that it is larger between the positions than at any of them."""
-    sound = sound_positions(at.arrays["status"])
-    if not len(sound):
-        return
-    for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
-        largest, rms = float(np.max(np.abs(at.arrays["drive_effort"][i][sound]))), float(at.means.drive_effort_rms[i])
-        if rms > (1 + 1e-6) * largest + scales.floor(unit):
-            yield finding_for("effort.peak_missed", f"drivers.{name}", rms=rms, largest=largest, unit=unit)
+def _beside_gaps(system: System, course: CycleCourse | None) -> Iterator[Finding]:
+    """Efforts that are largest next to where pins cross their play, and nearer to it are not known."""
+    for i, name in enumerate(system.mechanism.drivers if course else ()):
+        assert course is not None
+        largest = course.extreme(lambda rows, i=i: np.abs(rows["drive_effort"][i]))  # type: ignore[misc]
+        if largest is not None and course.beside(largest, Status.CONTACT_LOST):
+            yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))
 
 
 def _loads_over_the_cycle(run: Run, at: Positions) -> Iterator[Finding]:
@@ -296,27 +294,18 @@ def references(mechanism: Mechanism) -> list[str]:
 
 
 def figures(run: Run, found: Positions, near: near_locking.Locking | None = None) -> Iterator[Figure]:
-    """The figures one looks at first."""
-    arrays, status, means = found.arrays, found.arrays["status"], found.means
-    dial, counted = found.dial, status < Status.NOT_CONVERGED
-    # extremes are of positions that can be relied on: beside a dead centre they depend on the sampling
-    sound = sound_positions(status)
+    """The figures one looks at first. Those of the cycle are read of its course, whatever the positions are."""
+    arrays, status = found.arrays, found.arrays["status"]
+    counted = status < Status.NOT_CONVERGED
     with np.errstate(all="ignore"):
-        top = _Tops(found, sound, jumps.sides(run, found), scales_of(run))
-        yield from _effort_figures(run.system, found, top)
-        yield from _reaction_figures(run.system, arrays, top)
-        if rubbing(run.system):
-            yield from _friction_figures(run, found, near, top)
-        note = uncounted.meaning(run.system.mechanism, means, status)
-        yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=note)
-        yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
-        if found.ideal is not None:
-            yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
-            yield from error_figures(run, arrays, dial, status != Status.CONTACT_LOST, top.scales)
-        if near and (back := reverse_figure(run, near.back, _states(found, near))):
+        if found.course is not None:
+            yield from _cycle_figures(run, found, near, found.course)
+        if near and (back := reverse_figure(run)):
             yield back
-        residual = balance(arrays, top.scales.floor("W")) if np.any(counted) else None
+        residual = balance(arrays, scales_of(run).floor("W")) if np.any(counted) else None
         yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
+    if run.seats:
+        yield Figure("seat_rounds", "seat iterations", np.max(arrays["seat_rounds"]), aspect="maximum")
     rounds = int(np.max(arrays["friction_iterations"]))
     yield Figure("friction_iterations", "friction iterations", rounds, aspect="maximum")
     lost = int(np.count_nonzero(status == Status.CONTACT_LOST))
@@ -326,78 +315,124 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
         yield Figure("positions_lost", "positions not valid (a pin loses contact or bears no load)", lost)
 
 
-class _Tops(NamedTuple):
-    """Where extremes are looked for: at sound positions, and beside jumps where they are larger there."""
-
-    found: Positions
-    sound: NDArray[np.intp]
-    sides: Positions | None
-    scales: Scales
-
-    def of(self, course: Callable[[Arrays], NDArray[np.float64]], unit: str) -> tuple[float, str]:
-        """The largest of a course, (position,), in a unit, and its place."""
-        own = course(self.found.arrays)
-        k = int(self.sound[np.argmax(own[self.sound])])
-        if self.sides is not None:
-            solved = self.sides.arrays["status"] == Status.SOLVED
-            beside = np.where(solved, course(self.sides.arrays), -np.inf)
-            if np.max(beside) > own[k]:
-                return float(np.max(beside)), f"at {self.sides.dial.at(int(np.argmax(beside)))}"
-        return float(own[k]), extreme_place(own[self.sound], f"at {self.found.dial.at(k)}", self.scales.floor(unit))
+def _cycle_figures(
+    run: Run, found: Positions, near: near_locking.Locking | None, course: CycleCourse
+) -> Iterator[Figure]:
+    """Efforts, reactions, friction and efficiency over the cycle, and what errors change."""
+    yield from _effort_figures(run.system, course)
+    yield from _reaction_figures(run.system, course, scales_of(run))
+    if rubbing(run.system):
+        yield from _friction_figures(run, found, near, course)
+    means = course.means
+    note = uncounted.meaning(run.system.mechanism, means, course.status)
+    yield Figure("efficiency", "efficiency of the cycle", means.efficiency, note=note)
+    yield Figure("efficiency_error", "efficiency, numerical error", means.efficiency_error)
+    if found.ideal is not None:
+        yield Figure("efficiency_ideal", "efficiency of the cycle without errors", found.ideal.efficiency)
+        yield from _error_figures(run, course)
 
 
-def _effort_figures(system: System, found: Positions, top: _Tops) -> Iterator[Figure]:
+def _effort_figures(system: System, course: CycleCourse) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
-        for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)) if len(top.sound) else ():
-            value, at = top.of(lambda arrays, i=i, sign=sign: sign * arrays["drive_effort"][i], unit)  # type: ignore[misc]
-            yield Figure(f"{name}.effort_{end}", subject, sign * value, unit, aspect, at)
-        yield Figure(f"{name}.effort_rms", subject, found.means.drive_effort_rms[i], unit, "RMS")
+        for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)):
+            top = course.top(lambda rows, i=i: rows["drive_effort"][i], sign, "drive_effort")  # type: ignore[misc]
+            if top is not None:
+                yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, top.place)
+        yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
 
 
-def _friction_figures(run: Run, found: Positions, near: near_locking.Locking | None, top: _Tops) -> Iterator[Figure]:
+def _friction_figures(
+    run: Run, found: Positions, near: near_locking.Locking | None, course: CycleCourse
+) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
-    valid = found.arrays["status"] != Status.CONTACT_LOST
     if found.method.margin_up_to:
-        margin = np.where(valid, found.arrays["locking_margin"], np.nan)
-        yield near_locking.least_margin("locking_margin", "locking margin", margin, found.dial, TIMES)
-    yield from near.figures(run, found.dial, found.arrays["locking_margin"]) if near else ()
-    means = found.means
+        yield _least_margin(run, found.method)
+    yield from near.figures(run) if near else ()
+    means = course.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
     if means.supposed > 0:
         off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
-    if len(top.sound):
-        lost, at = top.of(lambda arrays: np.sum(arrays["friction_power"], axis=0), "W")
-        yield Figure("friction_power_max", "friction power", lost, "W", "maximum", at)
+    lost = course.top(lambda rows: np.sum(rows["friction_power"], axis=0), like="friction_power")
+    if lost is not None:
+        yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
 
 
-def sound_positions(status: NDArray[Any]) -> NDArray[np.intp]:
-    """Positions whose figures can be relied on: solved; those with a zero speed only if there are no others.
+def _least_margin(run: Run, method: FrictionMethod) -> Figure:
+    """The least multiple of all friction at which it locks; `margin_up_to` is as far as that is looked for."""
+    name, subject, margins = "locking_margin", "locking margin", margin_of(run, method)
+    least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
+    if least is not None:
+        return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=TIMES)
+    if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
+        return Figure(name, subject, method.margin_up_to, aspect=MORE_THAN, note=TIMES)
+    return Figure(name, subject, None, note=TIMES)
 
-    Where a pin loses contact it is taken to stay in a seat that would jump: forces there are no answer.
-    """
-    best = np.flatnonzero(status == Status.SOLVED)
-    return best if len(best) else np.flatnonzero(status == Status.ZERO_SLIP)
 
-
-def _reaction_figures(system: System, arrays: Arrays, top: _Tops) -> Iterator[Figure]:
+def _reaction_figures(system: System, course: CycleCourse, scales: Scales) -> Iterator[Figure]:
     """Largest reaction of every joint, in space its moment too; stroke of every slide."""
     loads = [("reaction", "reaction_force", "N")]
     if system.mechanism.space == "spatial":
         loads.append(("reaction moment", "reaction_moment", "N m"))
+    planar = system.mechanism.space == "planar"
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
-        for what, variable, unit in loads if len(top.sound) else ():
-            size, at = top.of(lambda arrays, of=variable, i=i: np.sqrt(np.sum(arrays[of][i] ** 2, axis=0)), unit)  # type: ignore[misc]
-            if size > top.scales.floor(unit) or system.mechanism.space == "planar":
-                yield Figure(f"{name}.{what.replace(' ', '_')}_max", f"{what} of {name}", size, unit, "maximum", at)
-        if not PAIRS[kind].guided:
+        for what, variable, unit in loads:
+            top = course.top(
+                lambda rows, of=variable, i=i: np.sqrt(np.sum(rows[of][i] ** 2, axis=0)),  # type: ignore[misc]
+                like=variable,
+            )
+            if top is None:
+                continue
+            key = f"{name}.{what.replace(' ', '_')}_max"
+            if top.value > scales.floor(unit):
+                yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", top.place)
+            elif planar:  # rounding has no place
+                yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
+        if PAIRS[kind].guided:
+            ends = [
+                course.extreme(lambda rows, i=i: rows["joint_slide"][i], sign, course.valid)  # type: ignore[misc]
+                for sign in (1.0, -1.0)
+            ]
+            if ends[0] is not None and ends[1] is not None:
+                stroke, note = ends[0].value - ends[1].value, course.note
+                yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
+
+
+def _error_figures(run: Run, course: CycleCourse) -> Iterator[Figure]:
+    """What the errors do, in the figures one looks at first; where no pin loses contact."""
+
+    def top(of: Callable[[Rows], NDArray[np.float64]]) -> Place | None:
+        return course.extreme(of, 1.0, course.valid)
+
+    points = [
+        (found.value, k, found)
+        for k in range(len(run.system.points))
+        if (found := top(lambda rows, k=k: np.sqrt(np.sum(rows["point_error"][k] ** 2, axis=0)))) is not None  # type: ignore[misc]
+    ]
+    if points:
+        size, k, found = max(points)
+        most = f"largest: {'.'.join(run.system.points[k])}"
+        yield Figure("point_error_max", "position error", size, "m", most, course.told(found))
+    for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
+        if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
-        valid = arrays["status"] != Status.CONTACT_LOST
-        slide = arrays["joint_slide"][i][valid]
-        if np.any(np.isfinite(slide)):
-            stroke, note = np.nanmax(slide) - np.nanmin(slide), positions_told(valid)
-            yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
+        what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
+        error = top(lambda rows, of=f"joint_{what}_error", i=i: np.abs(rows[of][i]))  # type: ignore[misc]
+        if error is not None:
+            name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
+            yield Figure(name, subject, error.value, unit, "largest magnitude", course.told(error))
+    for i, joint in enumerate(run.system.mechanism.drivers):
+        kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
+        subject, name = f"change of the drive {kind} of {joint} by the errors", f"{joint}.effort_change_max"
+        ends = [
+            found
+            for sign in (1.0, -1.0)
+            if (found := course.extreme(lambda rows, i=i: rows["drive_effort_change"][i], sign, course.valid))  # type: ignore[misc]
+        ]
+        if ends:
+            change = max(ends, key=lambda one: abs(one.value))
+            yield Figure(name, subject, change.value, unit, "largest magnitude", course.told(change))
 
 
 def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
@@ -405,7 +440,12 @@ def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
     if not rubbing(run.system) or not run.system.mechanism.drivers:
         return None
     with np.errstate(all="ignore"):
-        return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked)
+        worst = None
+        if at.course is not None and at.method.margin_up_to:
+            margins = margin_of(run, at.method)
+            least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
+            worst = None if least is None else 0.0 if least.everywhere else least.time
+        return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked, worst)
 
 
 def _dial_of(near: near_locking.Locking, run: Run, found: Positions) -> Dial:

@@ -25,12 +25,11 @@ if TYPE_CHECKING:
     from trunnion.measures.positions import PositionPlan
     from trunnion.solve.system import Values
 
-__all__ = ["LookAtParts", "averaged", "own_edges", "settled", "with_jumps"]
+__all__ = ["LookAtParts", "averaged", "own_edges", "with_jumps"]
 
 Array = NDArray[np.float64]
 LookAtParts = Callable[[Array], Sequence[Array]]  # from times, s, to the parts of a course there, all (row, place)
 JUMP = 1e-6  # of the size of a course: what is less is none
-ROUNDS, PARTS, SMALL = 7, 8, 1e-9  # so often a panel is parted, into how many, from which share of the mean it errs
 AT_ONCE = 64  # mechanisms whose bends are looked for at a time
 MOST = 32  # bends beside jumps that are followed too, as to points of a table
 
@@ -64,23 +63,6 @@ def with_jumps(known: Reference, look: LookAtParts, plan: PositionPlan, values: 
 
 def _with_figure(known: Reference, look: LookAtParts, of: Mechanisms, plan: PositionPlan) -> Reference:
     return replace(known, figure=float(averaged(known, look, own_edges(known, of, plan))[0]))
-
-
-def settled(known: Reference, look: LookAtParts) -> Reference:
-    """The same mechanism, its mean by panels that are parted where the rule errs: pins in seats move the jumps."""
-    edges = known.window.edges
-    assert edges is not None
-    for _ in range(ROUNDS):
-        rule = nodes(edges)
-        parts = np.array(look(rule.at[None])).reshape(len(known.parts), len(edges) - 1, -1)
-        inside, whole = (one.reshape(len(edges) - 1, -1) for one in (rule.inside, rule.weights))
-        off = np.abs(np.sum(parts * (whole - inside), axis=-1))
-        wide = np.any(off > SMALL * np.sum(np.abs(parts) * whole, axis=(1, 2))[:, None], axis=0)
-        if not np.any(wide):
-            break
-        new = np.linspace(edges[:-1][wide], edges[1:][wide], PARTS + 1)[1:-1]
-        edges = np.sort(np.concatenate([edges, new.ravel()]))
-    return replace(known, figure=float(averaged(known, look, edges[None])[0]))
 
 
 def averaged(known: Reference, look: LookAtParts, edges: Array) -> Array:

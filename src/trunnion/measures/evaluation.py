@@ -14,11 +14,11 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.quadrature import NODES
 from trunnion.errors import Status
-from trunnion.measures.averages import LookAtParts, averaged, own_edges, settled, with_jumps
+from trunnion.measures.averages import averaged, own_edges, with_jumps
 from trunnion.measures.corners import extreme, raised, sides_of, with_corner
-from trunnion.measures.figures import Reference, known, reference
+from trunnion.measures.figures import Reference, known
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan, plan
+from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, forward, posed
@@ -35,7 +35,6 @@ __all__ = [
     "NumpyKernel",
     "at_corner",
     "courses_of",
-    "figures_of",
     "looking",
     "sharpened",
     "where_known",
@@ -114,33 +113,6 @@ def courses_of(
             for measure in measures
         }
     return found, status
-
-
-def figures_of(run: Run, measures: Sequence[Measure], steps: int, method: FrictionMethod) -> dict[str, float]:
-    """The figures of measures of one mechanism, SI, by name; NaN where a position that one needs has no answer."""
-    places = plan(run, measures, steps)
-    courses, system = courses_of(run, measures, places.times, method)[0], run.system
-    walk = forward(system, run.values, run.chosen.assembly, places.times)
-    found = {}
-    for measure in measures:
-        rate = measure.coordinate(system).rate(walk) if measure.turning(system) else None
-        window = places.windows[measure.name]
-        one = reference(measure, courses[measure.name], window, system, rate)
-
-        def parts(time: NDArray[np.float64], measure: Measure = measure) -> list[NDArray[np.float64]]:
-            at = (time % run.cycle.duration if run.cycle.periodic else time).ravel()
-            course = [
-                np.asarray(primal(part), float) for part in courses_of(run, [measure], at, method)[0][measure.name]
-            ]
-            return [np.broadcast_to(part.reshape(-1), time.size).reshape(time.shape) for part in course]
-
-        def look(time: NDArray[np.float64], parts: LookAtParts = parts) -> NDArray[np.float64]:
-            return parts(time)[0]
-
-        averages = window.edges is not None and run.seats and not one.against
-        sharp = settled(one, parts) if averages else with_corner(one, look, run)
-        found[measure.name] = sharp.figure
-    return found
 
 
 def at_corner(

@@ -36,8 +36,8 @@ from trunnion.solve.switches import Bend
 from trunnion.solve.system import System
 
 __all__ = [
-    "RULES", "Curve", "Reference", "course_of", "figure", "judged", "kept", "known", "moment", "reference",
-    "shown", "span",
+    "RULES", "SHORTEST", "Curve", "Reference", "course_of", "figure", "follow", "judged", "kept",
+    "known", "moment", "reference", "shown", "span",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -402,14 +402,14 @@ def _followed(angle: Array, window: Window, rate: Array | None) -> tuple[Array, 
     else:
         # rates for a step of 1: the step of a window is another at its ends
         ahead = np.append(rate, rate[0]) if periodic else rate
-        _follow(angles, ahead, time)
+        follow(angles, ahead, time)
     if not periodic:
         return angles, 0.0
     gained = angles[-1] - angles[0]
     return angles[:-1], float(TURN * np.rint(gained / TURN)) if np.isfinite(gained) else 0.0
 
 
-def _follow(angles: Array, rate: Array, time: Array) -> None:
+def follow(angles: Array, rate: Array, time: Array) -> None:
     """Whole turns in place so that every angle follows the rates from the one before."""
     steps = np.diff(time)
     if len(steps) and np.allclose(steps, steps[0], rtol=1e-9, atol=0):

@@ -26,7 +26,7 @@ from trunnion.solve.system import System, Values
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["PositionPlan", "Window", "place_of", "plan"]
+__all__ = ["PositionPlan", "Window", "ends_of", "gain_of", "path_of", "place_of", "plan"]
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     ends: dict[str, tuple[float, ...]] = {}
     for measure in measures:
         try:
-            ends[measure.name] = _ends(run, measure)
+            ends[measure.name] = ends_of(run, measure)
         except MechanismError as error:
             findings += error.findings
     if findings:
@@ -138,7 +138,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     extra = [np.array(found) for name, found in ends.items() if name not in averaged]
     extra = [_within(run, at) for at in (*extra, *(rule.at for rule in rules.values()))]
     times = np.unique(np.concatenate([grid, *extra]))
-    known = _path(run, times), _gain(run)
+    known = path_of(run, times), gain_of(run)
     windows = {name: _window(run, found, times, grid, known) for name, found in ends.items() if name not in averaged}
     windows |= {name: _of_rule(run, ends[name], edges, rules[name], times, known) for name, edges in averaged.items()}
     return _with_dead_centres(PositionPlan(run, times, windows), measures)
@@ -190,7 +190,7 @@ def _with_dead_centres(plan: PositionPlan, measures: Sequence[Measure]) -> Posit
         windows = {name: replace(one, index=now[one.index]) for name, one in windows.items()}
         time = np.concatenate([window.time, more])
         index = np.concatenate([windows[measure.name].index, np.searchsorted(times, within)])
-        coordinate = np.concatenate([window.coordinate, _path(run, within) + laps * _gain(run)])
+        coordinate = np.concatenate([window.coordinate, path_of(run, within) + laps * gain_of(run)])
         order = np.argsort(time)
         windows[measure.name] = replace(window, index=index[order], time=time[order], coordinate=coordinate[order])
         plan = replace(plan, times=times, windows=windows)
@@ -248,7 +248,7 @@ def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known:
 # ---- places and windows as they are stated --------------------------------------------------------------------
 
 
-def _ends(run: Run, measure: Measure) -> tuple[float, ...]:
+def ends_of(run: Run, measure: Measure) -> tuple[float, ...]:
     """Times, s, of the place or of both ends of the window of a measure; none if it is of the whole cycle."""
     where = f"measures.{measure.name}"
     name = next(iter(run.system.mechanism.drivers))
@@ -266,7 +266,7 @@ def _ends(run: Run, measure: Measure) -> tuple[float, ...]:
     if run.cycle.periodic:
         first, last = (first, last) if _forward(run, measure) else (last, first)
         stated = abs(measure.over[1] - measure.over[0])
-        whole = duration if measure.timed else abs(_gain(run))
+        whole = duration if measure.timed else abs(gain_of(run))
         if abs(stated - whole) <= 1e-9 * whole:
             return ()
         if stated > whole:
@@ -288,7 +288,7 @@ def _forward(run: Run, measure: Measure) -> bool:
     """
     if measure.timed or measure.over is None:
         return True
-    return bool(_gain(run) > 0) or measure.over[1] < measure.over[0]
+    return bool(gain_of(run) > 0) or measure.over[1] < measure.over[0]
 
 
 def _time(run: Run, measure: Measure, place: float, where: str) -> float:
@@ -360,13 +360,13 @@ def _reached(system: System, values: Values, name: str, target: Number, guess: N
     return np.asarray(time)
 
 
-def _gain(run: Run) -> float:
-    """What `_path` gains over the cycle."""
-    ends = _path(run, np.array([0.0, run.cycle.duration]))
+def gain_of(run: Run) -> float:
+    """What `path_of` gains over the cycle."""
+    ends = path_of(run, np.array([0.0, run.cycle.duration]))
     return float(ends[1] - ends[0])
 
 
-def _path(run: Run, times: Array) -> Array:
+def path_of(run: Run, times: Array) -> Array:
     """Coordinate of the first driver if it runs one way, else the time."""
     name = next(iter(run.system.mechanism.drivers), "")
     if not name or not run.system.span(run.values, name).one_way:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.model.parts import Spring
@@ -28,7 +29,10 @@ from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
-__all__ = ["Bend", "Mechanisms", "bends", "edges", "nearly_passed", "parted", "stated_bends", "tracked"]
+__all__ = [
+    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "nearly_passed",
+    "parted", "stated_bends", "tracked",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -41,6 +45,8 @@ PANELS = 6  # of a turn: the widest that is integrated in one go
 MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
 NEARLY = 0.1  # of the range of what decides where a load begins
 TRACKED = 72  # of a turn: how far to either side a bend of one mechanism is looked for in others
+SEATED = Accuracy(1e-5, 1e-7, shortest=1e-7, rounds=16)  # pins settle in their seats to 1e-6 of their clearance
+MARGINS = Accuracy(1e-4, 1e-6, shortest=1e-5, rounds=8)  # a margin is followed, which takes long
 ROUNDS = 60
 SETTLED = 1e-11  # of the cycle
 CLOSE = 1e-10  # of the cycle: edges that are one
@@ -200,6 +206,26 @@ def parted(times: Array, cycle: Cycle) -> Array:
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     parts = within * np.repeat(np.diff(kept) / counts, counts) + np.repeat(kept[:-1], counts)
     return np.append(parts, kept[-1])
+
+
+def breaks_between(cycle: Cycle, times: Array, start: float = 0.0, end: float | None = None) -> Array:
+    """Two times of a cycle, s, its own ends if not given, and the bends between them, those that are one taken once.
+
+    end: may be beyond that of a cycle that comes again.
+    """
+    duration, end = cycle.duration, cycle.duration if end is None else end
+    laps = np.arange(start // duration, end // duration + 1) if cycle.periodic else np.zeros(1)
+    again = (times[:, None] + laps * duration).ravel()
+    inner = np.unique(np.concatenate([again, duration * laps if end > duration else []]))
+    inner = inner[(inner > start + CLOSE * duration) & (inner < end - CLOSE * duration)]
+    inner = inner[np.append(np.diff(inner) > CLOSE * duration, True)] if len(inner) else inner
+    return np.concatenate([[start], inner, [end]])
+
+
+def accuracy_of(cycle: Cycle, accuracy: Accuracy) -> Accuracy:
+    """The same with panels no wider than a part of a turn."""
+    turns = max(1.0, np.ceil(cycle.turns - 1e-9))
+    return accuracy._replace(widest=1.0 / min(PANELS * turns, MOST_EDGES))
 
 
 def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from trunnion.algebra.quadrature import CANCELLED, integrals, nodes
 from trunnion.cycle.means import Mean
 from trunnion.measures.corners import BESIDE
-from trunnion.measures.evaluation import courses_of, figures_of
+from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure
+from trunnion.measures.over_cycle import figures_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 
@@ -41,7 +42,7 @@ def motor(run: Run, driver: str, steps: int) -> Motor:
     """Figures of a driver. steps: equally spaced positions between which the largest power is located."""
     method, power, effort = FrictionMethod(), Measure("power", "power", driver), Measure("effort", "effort", driver)
     largest = Measure("largest", "power", driver, statistic="largest")
-    peak = figures_of(run, [largest], steps, method)["largest"]
+    peak = figures_of(run, [largest], method)["largest"]
     if run.cycle.duration <= 0:
         rest = courses_of(run, [effort], np.zeros(1), method)[0]["effort"][0]
         return Motor(float(np.abs(np.ravel(rest)[0])), peak, 0.0, 0.0)

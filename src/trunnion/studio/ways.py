@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.measures.evaluation import figures_of
 from trunnion.measures.measures import Measure, coordinate_unit, outputs
+from trunnion.measures.over_cycle import figures_of
 from trunnion.results.quantities import number, quantity
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -53,7 +53,7 @@ def ways(run: Run, steps: int) -> Iterator[Way]:
         for one in sliding or found
         for kind, statistic in kinds.items()
     ]
-    figures = figures_of(run, measures, steps, FrictionMethod()) if measures else {}
+    figures = figures_of(run, measures, FrictionMethod()) if measures else {}
     for one in sliding or found:
         ratio, stroke, *ends = (figures[f"{kind}:{one.subject}"] for kind in kinds)
         if np.isfinite(ratio) or (sliding and stroke > 0):

@@ -107,27 +107,16 @@ CYCLE: dict[str, Sentence] = {
         "the {whom} have no common period; the cycle is the longest period, {duration:g} s",
         "means and efficiency are over that time; choose speeds with a common period, or ranges",
     ),
-    "effort.beside_jump": Sentence(
-        NOTE,
-        "the largest effort, at {at}, is beside a jump; at the jump it may be larger by up to about {more:~{unit}}",
-        "use more --steps",
-    ),
     "effort.beside_gap": Sentence(
         NOTE,
-        "the largest effort, at {at}, is beside positions at which pins cross their play; nearer to them it may be "
-        "larger",
-        "use more --steps; a measure, {{effort: {driver}, as: maximum}}, lies between positions",
+        "the largest effort, at {at}, is where pins begin or end to cross their play; while they cross it is not known",
+        "see `trunnion simulate` for the forces of pins that cross their play",
     ),
     "errors.jump_moved": Sentence(
         NOTE,
         "the change by the errors at {at} is that of a jump whose place they move: with them it is {built}, "
         "without them {meant}; elsewhere the effort changes by at most {rest:~{unit}}",
         "compare the extremes with and without errors, not single positions beside the jump",
-    ),
-    "effort.peak_missed": Sentence(
-        WARNING,
-        "the RMS over the cycle, {rms:~{unit}}, exceeds the largest value at any position, {largest:~{unit}}",
-        "use more --steps: a peak between two positions is in the means, but not in the extremes",
     ),
     "load.drives": Sentence(
         WARNING, "this resistance is negative {at}: it drives the joint", "use max(0 N, …), or a load with a sign"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.course import CycleCourse, Rows
 from trunnion.cycle.means import Means
-from trunnion.cycle.summary import sound_positions
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.dataset import Variable
@@ -53,13 +53,12 @@ FIGURES: dict[str, Variable] = {
 Reduced = dict[str, Any]
 
 
-def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System, sides: Arrays | None = None) -> Reduced:
+def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, system: System) -> Reduced:
     """The figures of FIGURES of one cycle; numbers, or rows over drivers or joints.
 
-    arrays: over positions, by the names of `results.VARIABLES`: status, drive_effort, reaction_force, and
-    locking_margin if it was looked for; means: over the cycle; ideal: those of the mechanism without errors, None if it
-    has none, else arrays also have joint_rotation_error and joint_slide_error. sides: effort, reaction and status on
-    both sides of jumps, which count in their extremes.
+    arrays: over positions, by the names of `results.VARIABLES`: status, and locking_margin if it was looked for;
+    course: over the cycle, None where a position has no answer; ideal: means of the mechanism without errors, None if
+    it has none.
     """
     status = arrays["status"]
     missing = int(np.count_nonzero(status >= Status.NOT_CONVERGED))
@@ -70,32 +69,40 @@ def reduced(arrays: Arrays, means: Means, ideal: Means | None, system: System, s
         told["locking_margin"] = float(np.min(arrays["locking_margin"][valid], initial=np.inf))
     if ideal:
         told["efficiency_ideal"] = ideal.efficiency
-    if missing:
+    if missing or course is None or not np.any(course.sound):  # contact is lost everywhere
         return told
-    sound = sound_positions(status)
-    kept = sound if len(sound) else np.flatnonzero(status < Status.CONTACT_LOST)
-    if not len(kept):  # contact is lost everywhere
-        return told
-    effort, force = arrays["drive_effort"][:, kept], arrays["reaction_force"][..., kept]
-    if sides is not None:
-        solved = sides["status"] == Status.SOLVED
-        effort = np.concatenate([effort, sides["drive_effort"][:, solved]], axis=-1)
-        force = np.concatenate([force, sides["reaction_force"][..., solved]], axis=-1)
-    size = np.sqrt(np.sum(force**2, axis=1))
+    means = course.means
+    joints, drivers = range(len(system.joints)), range(len(system.mechanism.drivers))
     if ideal:
-        turned, slid = (np.abs(arrays[f"joint_{what}_error"][:, kept]) for what in ("rotation", "slide"))
-        slides = np.array([PAIRS[kind].guided for kind, _ in system.joints.values()])
-        told["transmission_error_max"] = np.where(slides, np.max(slid, axis=1), np.max(turned, axis=1))
+        slides = [PAIRS[kind].guided for kind, _ in system.joints.values()]
+        names = [f"joint_{'slide' if slide else 'rotation'}_error" for slide in slides]
+        told["transmission_error_max"] = [
+            _value(course, lambda rows, of=name, i=i: np.abs(rows[of][i]))  # type: ignore[misc]
+            for i, name in enumerate(names)
+        ]
     else:  # beside points with errors
         told |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}
+    ends = [
+        [_value(course, lambda rows, i=i: rows["drive_effort"][i], sign) for i in drivers]  # type: ignore[misc]
+        for sign in (-1.0, 1.0)
+    ]
     return told | {
         "efficiency": means.efficiency,
         "efficiency_error": means.efficiency_error,
-        "drive_effort_min": np.min(effort, axis=1),
-        "drive_effort_max": np.max(effort, axis=1),
+        "drive_effort_min": ends[0],
+        "drive_effort_max": ends[1],
         "drive_effort_rms": means.drive_effort_rms,
         "drive_power_mean": means.drive_power_mean,
         "useful_power_mean": means.useful_power_mean,
         "friction_power_mean": means.friction_power.net,
-        "reaction_max": np.max(size, axis=1),
+        "reaction_max": [
+            _value(course, lambda rows, i=i: np.sqrt(np.sum(rows["reaction_force"][i] ** 2, axis=0)))  # type: ignore[misc]
+            for i in joints
+        ],
     }
+
+
+def _value(course: CycleCourse, of: Callable[[Rows], NDArray[np.float64]], sign: float = 1.0) -> float:
+    """An extreme; NaN where there is none."""
+    found = course.extreme(of, sign)
+    return float("nan") if found is None else found.value

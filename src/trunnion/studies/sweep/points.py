@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.cycle import jumps
+from trunnion.cycle.course import CycleCourse
 from trunnion.cycle.cycle_kernel import Many
-from trunnion.cycle.means import AVERAGED, Means, means_of, still
+from trunnion.cycle.means import Means
 from trunnion.cycle.positions import check_steps, positions
-from trunnion.cycle.summary import effort_units, model_notes
+from trunnion.cycle.summary import model_notes
 from trunnion.cycle.written import CONDITIONS
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.measures.evaluation import figures_of
+from trunnion.measures.over_cycle import figures_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
@@ -37,7 +37,7 @@ from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.hints import distance, hints, named_way
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.switches import Mechanisms, edges
+from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Cycle, System, law_of, rubbing
 from trunnion.studies.sweep.figures import Reduced, reduced
 from trunnion.studies.sweep.grid import Swept, named
@@ -53,7 +53,7 @@ FEWEST = 24  # positions on which a change point between them shows
 PROBES = 24  # values of a name at which a mechanism of its own is looked at
 PROBES_FOLLOWED = 5  # the same with groups that are followed, which takes long
 SAME = 1e-6  # of a figure: what two ways to the same assembly may differ by
-WANTED = ("drive_effort", "reaction_force", "locking_margin", "joint_rotation_error", "joint_slide_error")
+WANTED = ("locking_margin",)
 Array = NDArray[np.float64]
 Index = tuple[int, ...]
 
@@ -63,8 +63,7 @@ class Points:
     """The points of a grid and how their cycles are run.
 
     looked: points that were prepared by themselves; said: what they have to say, by place and text and then by point;
-    erring: whether any point has errors; run: of the first point; jumps: beside which efforts of points with pins in
-    seats are largest.
+    erring: whether any point has errors; run: of the first point.
     """
 
     mechanism: Mechanism
@@ -79,7 +78,6 @@ class Points:
         self.said: dict[tuple[str, str], dict[Index, Finding]] = {}
         self.looked: set[Index] = set()
         self.erring = False
-        self.jumps: list[Finding] = []
         self.run = self._prepared(tuple(0 for _ in self.swept))
         each = (self.steps + OF_MEANS) * (OF_MARGIN if self.margin else 1)
         self._many = Many(self.run, self.engine, int(np.prod(self.shape)) * each)
@@ -126,9 +124,7 @@ class Points:
         run = run or (self._prepared(index) if any(index) else self.run)
         with named(self.swept, index):
             found = positions(run, self.steps, self.method, margin=self.margin)
-        self.jumps += jumps.findings(run, found.time, found.arrays, effort_units(run.system))
-        sides = jumps.sides(run, found)
-        return self._reduced(found.arrays, found.means, found.ideal, None if sides is None else sides.arrays)
+        return self._reduced(found.arrays, found.course, found.ideal)
 
     def measured(self, index: Index, names: Sequence[str]) -> dict[str, float]:
         """Figures of measures at a point."""
@@ -137,14 +133,12 @@ class Points:
             found = measures_of(run, names)
             timed = courses_in_time(run, found, run.values, (1,))
             of_cycle = [one for one in found if not one.in_time]
-            figures = figures_of(run, of_cycle, self.steps, self.method) if of_cycle else {}
+            figures = figures_of(run, of_cycle, self.method) if of_cycle else {}
             return figures | {name: float(np.ravel(parts[0])[0]) for name, parts in timed.items()}
 
-    def _reduced(
-        self, arrays: Mapping[str, Array], means: Means, ideal: Means | None, sides: Mapping[str, Array] | None
-    ) -> Reduced:
+    def _reduced(self, arrays: Mapping[str, Array], course: CycleCourse | None, ideal: Means | None) -> Reduced:
         wanted = arrays if self.margin else {key: one for key, one in arrays.items() if key != "locking_margin"}
-        return reduced(wanted, means, ideal, self.run.system, sides)
+        return reduced(wanted, course, ideal, self.run.system)
 
     # ---- in one pass ------------------------------------------------------------------------------------------
 
@@ -228,17 +222,13 @@ class Points:
             if self._followed:
                 ours &= np.all(arrays["status"] != Status.NOT_ASSEMBLED, axis=1)
             whole = ours & _answered(arrays)
-            between = self._edges(values, cycles, whole)
-            means = self._means(values, cycles, whole, between)
-            sides = self._sides(values, cycles, arrays, between)
-            likes = self._means(ideal_values, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
+            courses = self._courses(values, meant, cycles, whole)
+            likes = self._courses(ideal_values, None, cycles, ours & errs & _answered(ideal)) if errs.any() else {}
         found: list[Reduced | None] = []
         for i in range(len(points)):
             own = {name: array[..., i, :] for name, array in arrays.items()}
-            like = (likes.get(i) or still(own, self.mechanism)) if errs[i] else None
-            found.append(
-                self._reduced(own, means.get(i) or still(own, self.mechanism), like, sides.get(i)) if ours[i] else None
-            )
+            meant_means = likes[i].means if i in likes else None
+            found.append(self._reduced(own, courses.get(i), meant_means) if ours[i] else None)
         return found
 
     def _some(self, values: Mapping[str, Number], cycles: Sequence[Cycle], rows: NDArray[np.intp]) -> Mechanisms:
@@ -247,63 +237,20 @@ class Points:
         everyone = Mechanisms(run.system, run.chosen.assembly, values, cycles)
         return replace(everyone, values=everyone.picked(rows), cycles=[cycles[int(row)] for row in rows])
 
-    def _edges(
-        self, values: Mapping[str, Number], cycles: Sequence[Cycle], wanted: NDArray[np.bool_]
-    ) -> dict[int, Array]:
-        """Times, s, between which the forces of those mechanisms of a batch are smooth that are wanted, by number."""
-        rows = np.flatnonzero(wanted)
-        return dict(zip(rows.tolist(), edges(self._some(values, cycles, rows)), strict=True)) if len(rows) else {}
-
-    def _sides(
+    def _courses(
         self,
         values: Mapping[str, Number],
-        cycles: Sequence[Cycle],
-        arrays: Mapping[str, Array],
-        between: Mapping[int, Array],
-    ) -> dict[int, Mapping[str, Array]]:
-        """The variables on both sides of jumps beside which forces have their extremes, by number of mechanism."""
-        gaps = jumps.dropping(jumps.courses(arrays), arrays["status"], self.run.cycle.periodic)
-        times = {
-            row: jumps.beside(gaps[row], cycles[row].times(self.steps), own, cycles[row])
-            for row, own in between.items()
-            if np.any(gaps[row])
-        }
-        times = {row: own for row, own in times.items() if len(own)}
-        if not times:
-            return {}
-        most, of = max(map(len, times.values())), self._some(values, cycles, np.array(list(times), np.intp))
-        time = np.array([np.pad(own, (0, most - len(own)), mode="edge") for own in times.values()])
-        shape = (1, time.size) if len(times) == 1 else time.shape
-        rows = np.arange(len(times))
-        found = self._many.arrays(of.picked(rows), of.lanes(time), shape, WANTED, self.method)
-        return {
-            row: {
-                name: found[name][..., k if len(times) > 1 else 0, :] for name in (*WANTED, "status") if name in found
-            }
-            for k, row in enumerate(times)
-        }
-
-    def _means(
-        self,
-        values: Mapping[str, Number],
+        ideal: Mapping[str, Number] | None,
         cycles: Sequence[Cycle],
         wanted: NDArray[np.bool_],
-        between: Mapping[int, Array] | None = None,
-    ) -> dict[int, Means]:
-        """Means over the cycles of those mechanisms of a batch that are wanted, by their number; between: its edges."""
+    ) -> dict[int, CycleCourse]:
+        """The courses of those mechanisms of a batch that are wanted, by their number. ideal: see `Many.courses`."""
         rows = np.flatnonzero(wanted)
         if not len(rows):
             return {}
-        of = self._some(values, cycles, rows)
-
-        def powers(lanes: NDArray[np.intp], time: Array) -> dict[str, Array]:
-            with np.errstate(all="ignore"):
-                shape = (1, time.size) if len(rows) == 1 else time.shape
-                arrays = self._many.arrays(of.picked(lanes), of.lanes(time), shape, AVERAGED, self.method)
-            return {name: arrays[name].reshape(*arrays[name].shape[:-2], *time.shape) for name in AVERAGED}
-
-        parts = None if between is None else list(between.values())
-        return dict(zip(rows.tolist(), means_of(of, powers, parts), strict=True))
+        without = None if ideal is None else self._some(ideal, cycles, rows).values
+        found = self._many.courses(self._some(values, cycles, rows), without, self.method)
+        return dict(zip(rows.tolist(), found, strict=True))
 
     def _check(self, points: Sequence[Index], values: Mapping[str, Number]) -> None:
         """MechanismError where the numbers of a point are none that a mechanism can have."""

@@ -90,7 +90,6 @@ def sweep(
         if progress:
             progress(done)
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
-    found += _beside_jumps(points)
     found = _with_bare(mechanism, points.swept, found)
     found += [*_no_efficiency(points, arrays), *_not_steady(points, watched.values(), arrays)]
     found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
@@ -131,15 +130,6 @@ def _shared(points: Points) -> Iterator[Finding]:
             yield one
         elif one.severity is not Severity.NOTE:
             yield replace(one, what=f"{one.what} (at {count:,} of {whole})")
-
-
-def _beside_jumps(points: Points) -> Iterator[Finding]:
-    """Of every driver what the point says whose effort may be larger by most beside a jump, and how many points do."""
-    for where in dict.fromkeys(one.where for one in points.jumps):
-        own = [one for one in points.jumps if one.where == where]
-        count = f"(at {len(own):,} of {counted(int(np.prod(points.shape)), 'point')}; this is the most)"
-        most = max(own, key=lambda one: float(one.figures["more"]))
-        yield replace(most, what=f"{most.what} {count}", remedy="use more --steps, or state a measure of the effort")
 
 
 def _answers(swept: Sequence[Swept], arrays: Mapping[str, NDArray[Any]]) -> Iterator[Finding]:

@@ -1,0 +1,326 @@
+"""The course of a mechanism over its cycle: efforts, reactions, powers, strokes as `Courses`, and what is read of them.
+
+It is found once for a run and does not depend on which positions are asked for. Breaks are those that the model states
+(`switches`); what it does not state, as a guide that tilts over or the end of what can be assembled, is located by the
+courses themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.dual import primal
+from trunnion.algebra.quadrature import CANCELLED
+from trunnion.cycle import contact_loss
+from trunnion.cycle.deviations import COMPARED, fill_errors
+from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
+from trunnion.cycle.unanswered import blank
+from trunnion.cycle.variables import fill_of
+from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
+from trunnion.errors import Status
+from trunnion.results import variables as results
+from trunnion.solve.backward import Backward
+from trunnion.solve.eccentricity_rate import around
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.loads import has_useful_work
+from trunnion.solve.margin import locking_margin
+from trunnion.solve.run import Run
+from trunnion.solve.seating import settle
+from trunnion.solve.status import status_of
+from trunnion.solve.switches import MARGINS, SEATED, Mechanisms, accuracy_of, breaks_between, stated_bends
+
+__all__ = [
+    "COMPARED_ROWS", "FOLLOWED", "CycleCourse", "Rows", "Top", "course_of", "like",
+    "margin_of", "stacked",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+Rows = Mapping[str, Array]  # the numbers of each variable, (…, panel, place)
+POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
+FORCES = ("drive_effort", "reaction_force", "reaction_moment", "drive_effort_change")
+FOLLOWED = ("drive_effort", *POWERS, "reaction_force", "reaction_moment", "joint_slide")
+COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
+HELD = 16  # beside the status of panels in which accelerations leave out the travel of seats
+NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther
+CLOSE = 1e-10  # of the cycle: breaks that are one
+
+
+class Top(NamedTuple):
+    """An extreme with its place in words."""
+
+    value: float
+    place: str
+
+
+@dataclass(frozen=True)
+class CycleCourse:
+    """The courses of a run's variables.
+
+    shapes: of each variable, whose rows follow one another; courses: of them all.
+    """
+
+    run: Run
+    shapes: Mapping[str, tuple[int, ...]]
+    courses: Courses
+
+    @cached_property
+    def _places(self) -> dict[str, slice]:
+        ends = np.cumsum([0, *(int(np.prod(shape)) for shape in self.shapes.values())])
+        return {name: slice(*ends[k : k + 2]) for k, name in enumerate(self.shapes)}
+
+    def _named(self, of: Callable[[Rows], Array]) -> Callable[[Array], Array]:
+        """A function of the variables as one of the rows."""
+
+        def from_rows(rows: Array) -> Array:
+            return of(
+                {name: rows[self._places[name]].reshape(*shape, *rows.shape[1:]) for name, shape in self.shapes.items()}
+            )
+
+        return from_rows
+
+    @cached_property
+    def status(self) -> NDArray[np.intp]:
+        """Of every panel."""
+        return np.asarray(self.courses.states % HELD)
+
+    @cached_property
+    def sound(self) -> NDArray[np.bool_]:
+        """Panels whose figures can be relied on: solved; those in which a joint rests only if there are no others.
+
+        Where a pin loses contact it is taken to stay in a seat that would jump: forces there are no answer.
+        """
+        solved = self.status == Status.SOLVED
+        return np.asarray(solved if np.any(solved) else self.status == Status.ZERO_SLIP)
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """Panels where no pin loses contact."""
+        return np.asarray(self.status != Status.CONTACT_LOST)
+
+    @property
+    def note(self) -> str:
+        """Of how much of the cycle a figure is, where a pin loses contact in the rest; empty where it does nowhere."""
+        return "" if np.all(self.valid) else f"without {self.courses.share(~self.valid):.2g} of the cycle"
+
+    def size(self, name: str) -> float:
+        """The largest magnitude of what is like a variable."""
+        return float(np.max(self.courses.sizes[self._places[name]], initial=0.0)) if name in self.shapes else 0.0
+
+    @cached_property
+    def _largest(self) -> Array:
+        """The largest magnitude of every row in sound panels."""
+        size: Array = np.max(np.sum(np.abs(self.courses.coefficients[self.sound]), axis=-1), axis=0, initial=0.0)
+        return size
+
+    def largest(self, name: str) -> float:
+        """The largest magnitude of a variable in sound panels, or a little more."""
+        return float(np.max(self._largest[self._places[name]], initial=0.0)) if name in self.shapes else 0.0
+
+    def jumps(self, name: str, *which: int) -> Array:
+        """By how much a number of a variable changes at the end of every panel; to the first one in a period."""
+        row = self._places[name].start + int(np.ravel_multi_index(which, self.shapes[name]))
+        before, after = self.courses.ends(row)
+        after = np.roll(after, -1)
+        if not self.run.cycle.periodic:
+            after[-1] = before[-1]
+        return np.nan_to_num(after - before)
+
+    def beside(self, place: Place, status: Status) -> bool:
+        """Whether an extreme is at the edge of panels of a status."""
+        away = np.minimum(np.abs(self.courses.edges[:-1] - place.time), np.abs(self.courses.edges[1:] - place.time))
+        return bool(np.any((away <= NEXT * self.courses.span) & (self.status == status)))
+
+    def extreme(
+        self,
+        of: Callable[[Rows], Array],
+        sign: float = 1.0,
+        panels: NDArray[np.bool_] | None = None,
+        like: str = "",
+    ) -> Place | None:
+        """The largest or least value of a number made of the variables, in sound panels if no others are given.
+
+        like: a variable of its kind, so that rounding is told from change.
+        """
+        chosen = self.sound if panels is None else panels
+        return self.courses.extreme(self._named(of), sign, chosen, self.size(like) if like else 0.0)
+
+    def top(self, of: Callable[[Rows], Array], sign: float = 1.0, like: str = "") -> Top | None:
+        """The same with its place in words."""
+        found = self.extreme(of, sign, None, like)
+        return None if found is None else Top(found.value, self.told(found))
+
+    def told(self, place: Place) -> str:
+        """Where an extreme is, in words."""
+        cycle, time = self.run.cycle, place.time
+        if place.everywhere and cycle.duration > 0:
+            return "everywhere"
+        time = 0.0 if place.everywhere else time
+        if cycle.periodic and cycle.duration - time <= CLOSE * cycle.duration:
+            time = 0.0
+        return f"at {self.run.system.dial(self.run.values, np.array([time, cycle.duration])).at(0)}"
+
+    @cached_property
+    def means(self) -> Means:
+        """Means over the cycle; NaN where a part of it has no answer."""
+
+        def powers(rows: Rows) -> Array:
+            driven, lost = np.sum(rows["drive_power"], axis=0), np.sum(rows["friction_power"], axis=0)
+            return np.stack([driven, rows["useful_power"], lost])
+
+        with np.errstate(all="ignore"):
+            errors = self.courses.error()
+            values = self.courses.mean(self._named(powers))
+            sizes = self.courses.mean(self._named(lambda rows: np.abs(powers(rows))))
+            residual = self.courses.mean(self._named(lambda rows: np.abs(rows["power_residual"])))
+            squares = self.courses.mean(self._named(lambda rows: rows["drive_effort"] ** 2))
+        each = [np.sum(errors[self._places[name]]) for name in ("drive_power", "useful_power", "friction_power")]
+        rounding = np.maximum(CANCELLED * sizes, RESIDUALS * residual)
+        rounding[2] = max(rounding[2], CANCELLED * np.max(sizes))
+        driven, useful, rubbed = (Mean(*(float(part[k]) for part in (values, each, sizes, rounding))) for k in range(3))
+        lost = self.courses.mean()[self._places["friction_power"]]
+        supposed = float(self.courses.mean()[self._places[SUPPOSED]][0] / sizes[0]) if SUPPOSED in self.shapes else 0.0
+        useful_work = has_useful_work(self.run.system.mechanism)
+        means = Means(driven, useful, rubbed, lost, np.sqrt(squares), supposed, useful_work)
+        return unknown(means) if supposed > MOST_SUPPOSED else means
+
+
+def course_of(run: Run, method: FrictionMethod, ideal: bool = False) -> CycleCourse:
+    """The course of a run over its cycle, found once. ideal: of the mechanism without errors."""
+    return run.once(("course", method, ideal), lambda: _course(run, method, ideal))
+
+
+def _course(run: Run, method: FrictionMethod, ideal: bool) -> CycleCourse:
+    looking = _Looking(run, method, ideal)
+    accuracy = accuracy_of(run.cycle, SEATED if looking.seats else Accuracy())
+    with np.errstate(all="ignore"):
+        courses = Courses.of(looking, looking.breaks(), lambda sizes: like(run, looking.shapes, sizes), accuracy)
+    return CycleCourse(run, looking.shapes, courses)
+
+
+def margin_of(run: Run, method: FrictionMethod) -> CycleCourse:
+    """The course of the locking margin, NaN where it is beyond what the method looks for, found once."""
+    return run.once(("margin", method), lambda: _margin(run, method))
+
+
+@np.errstate(all="ignore")
+def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
+    looking = _Looking(run, method, ideal=False)
+
+    def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+        back, status = looking.walked(time)
+        margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
+        return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
+
+    courses = Courses.of(look, looking.breaks(), None, accuracy_of(run.cycle, MARGINS))
+    return CycleCourse(run, {"locking_margin": ()}, courses)
+
+
+class _Looking:
+    """The variables of a run as rows, at any times.
+
+    shapes: of each variable, known from the first look on.
+    """
+
+    def __init__(self, run: Run, method: FrictionMethod, ideal: bool) -> None:
+        self.run, self.method, self.ideal = run, method, ideal
+        self.seats = bool(run.seats) and not ideal
+        self.errs = run.erring and not ideal
+        self.shapes: dict[str, tuple[int, ...]] = {}
+        self._gaps = contact_loss.gaps(run) if self.seats else np.zeros((2, 0))
+        self._names = [*FOLLOWED, *(COMPARED_ROWS if self.errs else ())]
+
+    def breaks(self) -> Array:
+        """Both ends of the cycle and the breaks between them, s, those that are one taken once."""
+        run = self.run
+        if run.cycle.duration <= 0:  # it stands, as if for a second
+            return np.array([0.0, 1.0])
+        bends = [] if self.ideal else [bend.time for bend in run.bends]
+        if run.erring:
+            without = Mechanisms(run.system, run.chosen.assembly, run.ideal_values, [run.cycle])
+            bends += [bend.time for bend in stated_bends(without)]
+        return breaks_between(run.cycle, np.concatenate([bends, self._gaps.ravel()]))
+
+    def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
+        """Rows and statuses at times, s."""
+        run, time = self.run, time if self.run.cycle.duration > 0 else 0.0 * time
+        if self.seats:
+            seated = settle(run, around(time, run.cycle), self.method)
+            arrays = self._filled(seated.back, time)
+            self._stand_in(arrays, contact_loss.valid(seated, run, self._gaps, time), time)
+            arrays["status"] = arrays["status"] + np.where(seated.told, 0, HELD)
+        else:
+            arrays = self._filled((run.ideal if self.ideal else run.solve)(time, method=self.method), time)
+            self._compare(arrays, time)
+        self.shapes, rows = stacked(arrays, (*self._names, SUPPOSED), 1)
+        return rows, arrays["status"].astype(np.intp)
+
+    def walked(self, time: Array) -> tuple[Backward, NDArray[np.integer]]:
+        """The mechanism at times, s, and its statuses."""
+        time = time if self.run.cycle.duration > 0 else 0.0 * time
+        if not self.seats:
+            back = self.run.solve(time, method=self.method)
+            return back, status_of(back, time.shape)
+        seated = settle(self.run, around(time, self.run.cycle), self.method)
+        status, valid = status_of(seated.back, time.shape), contact_loss.valid(seated, self.run, self._gaps, time)
+        return seated.back, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST))
+
+    def _filled(self, back: Backward, time: Array) -> Arrays:
+        """The variables of a walk at times, s."""
+        system, fill = self.run.system, fill_of(self.run.system)
+        labels, absent = fill.labels(system), fill.absent(system)
+        wanted = {*self._names, "status", *(COMPARED if self.errs else ())}
+        arrays = results.allocate(labels, len(time), absent, ["errors"] if self.errs else [], wanted)
+        fill_chunk(arrays, back, time, slice(None))
+        return arrays
+
+    def _compare(self, arrays: Arrays, time: Array) -> Arrays:
+        """Write what errors change into the variables; those of the mechanism without errors."""
+        if not self.errs:
+            return arrays
+        meant = self._filled(self.run.ideal(time, self.method), time)
+        fill_errors(arrays, meant, link_numbers(self.run.system), slice(None))
+        blank(arrays, arrays["status"].astype(np.int8), slice(None))
+        return meant
+
+    def _stand_in(self, arrays: Arrays, valid: NDArray[np.bool_], time: Array) -> None:
+        """Where a pin loses contact the mechanism without errors stands in for it, with what that may change."""
+        meant = self._compare(arrays, time)
+        powers = [np.sum(one["drive_power"], axis=0) for one in (arrays, meant)]
+        apart = np.abs(powers[1] - np.where(np.isfinite(powers[0]), powers[0], 0.0))
+        lost = ~valid & (arrays["status"] < Status.NOT_CONVERGED)
+        for name in FOLLOWED:
+            if name in arrays:
+                arrays[name] = np.where(valid, arrays[name], meant[name])
+        arrays[SUPPOSED] = np.where(valid, 0.0, apart)
+        arrays["status"] = np.where(lost, np.maximum(arrays["status"], Status.CONTACT_LOST), arrays["status"])
+
+
+def stacked(arrays: Arrays, names: Sequence[str], places: int) -> tuple[dict[str, tuple[int, ...]], Array]:
+    """Shapes and rows of some variables, those of each after one another. places: how many of the last dims are."""
+    shapes = {name: arrays[name].shape[:-places] for name in names if name in arrays}
+    return shapes, np.concatenate([arrays[name].reshape(-1, *arrays[name].shape[-places:]) for name in shapes])
+
+
+def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array:
+    """The largest magnitude of what is like each row: what is far below it is rounding.
+
+    Forces, and moments by the size of the mechanism, come of one another; so do powers; lengths are like its size.
+    """
+    length = float(np.ravel(primal(run.system.size(run.values)))[0])
+    names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
+    units, turning = np.ones(len(names)), [run.system.turns(name) for name in run.system.mechanism.drivers]
+    units[names == "reaction_moment"] = length
+    for name in ("drive_effort", "drive_effort_change"):
+        units[names == name] = np.where(turning, length, 1.0)[: np.count_nonzero(names == name)]
+    forces, powers = np.isin(names, FORCES), np.isin(names, (*POWERS, SUPPOSED))
+    found = np.where(names == "joint_rotation_error", 1.0, length)
+    found[forces] = units[forces] * np.max(sizes[forces] / units[forces], initial=0.0)
+    found[powers] = np.max(sizes[powers], initial=0.0)
+    return found

@@ -191,5 +191,5 @@ def test_rounding_is_shown_as_zero() -> None:
     result["worst_case"][0, 0] = 0.9e-9 * result["worst_case_total"].min()
     result["worst_case"][0, 1] = 1.1e-9 * result["worst_case_total"].max()
     shown = [row[2] for row in tables(result)[0].rows]
-    assert shown[0] == "0\u00a0µm"
+    assert shown[0] == "0\u00a0m"
     assert not shown[1].startswith("0\u00a0")

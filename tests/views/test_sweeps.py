@@ -339,6 +339,7 @@ def test_tables_follow_the_figure_and_take_several_measures():
 def test_a_table_has_the_ends_of_an_effort_that_lie_beyond_zero(least, most, shown):
     """Such as the push and the pull of a hand; what rounding leaves is none. A point without an answer has none."""
     result = swept({"friction": FRICTION}, margin=False)
+    result.attrs.update(scale_of_length=1.0, scale_of_rate=1.0, scale_of_force=1.0)
     for end, value in (("min", least), ("max", most)):
         given = result[f"drive_effort_{end}"]
         result[f"drive_effort_{end}"] = xr.full_like(given, value).where(result["friction"] > 0.05)

@@ -55,8 +55,10 @@ class Scales(NamedTuple):
         float
             In that unit; NaN, which nothing is below, of what is no unit of mechanics.
         """
+        if unit in ("", "1"):
+            return ROUNDING
         try:
-            factor, (length, mass, time, _) = unit_named("deg" if unit == "°" else unit or "1")
+            factor, (length, mass, time, _) = unit_named("deg" if unit == "°" else unit)
         except UnitError:
             return float("nan")
         # a mass is a force over an acceleration, length times rate²

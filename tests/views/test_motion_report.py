@@ -53,7 +53,7 @@ def stays() -> xr.Dataset:
 @cache
 def swing() -> xr.Dataset:
     """Without friction and motor: rounding is all that the effort is."""
-    return simulate(three_posts(), 1.0, 50)
+    return simulate(three_posts(), 1.0, 50, pass_change_points=True)
 
 
 @cache
@@ -65,7 +65,8 @@ CASES: dict[str, Callable[[], xr.Dataset]] = {
     "start": start, "run-down": run_down, "stays": stays, "swing": swing, "ends early": ends_early,
 }  # fmt: skip
 EVENTS = {
-    "start": [("starts", "forward")], "run-down": [("rests", "")], "stays": [("rests", "")], "swing": [],
+    "start": [("starts", "forward")], "run-down": [("rests", "")], "stays": [("rests", "")],
+    "swing": [("change point", "")],
     "ends early": [("starts", "forward"), ("ends", "")],
 }  # fmt: skip
 

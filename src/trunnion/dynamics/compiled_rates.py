@@ -128,6 +128,11 @@ class CompiledRates:
         told = self.walks(at)
         return self.layout.row(row[n : 2 * n], told) if told.sound else np.full(len(row), np.nan)
 
+    def margins(self, at: Moment) -> Array:
+        """See `FreeMotion.margins`, (module, lane)."""
+        found = self._program("margins", at).run(at)
+        return self.walks.margins(at) if np.any(found[-1]) else found[:-1]
+
     def look(self, at: Moment) -> Seen:
         """See `rates.Seeing`."""
         found = self._program("look", at).run(at)
@@ -146,8 +151,10 @@ class CompiledRates:
         return self._programs[key]
 
     def figures(self, what: str, kinds: Kinds) -> Figures:
-        """What a program computes: the rates, or how the contacts are."""
-        return functools.partial(_rates_of, unit=self.motion.trial.tolist()) if what == "rates" else _seen
+        """What a program computes: the rates, how near assemblies are to each other, or how the contacts are."""
+        if what == "rates":
+            return functools.partial(_rates_of, unit=self.motion.trial.tolist())
+        return _margins if what == "margins" else _seen
 
 
 class Program:
@@ -315,6 +322,12 @@ def _seen(motion: FreeMotion, at: Moment) -> list[Number]:
     found = motion.contacts.pushes(motion.walk(at, nothing), at.onsets)
     parts = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
     return [*(one[i] for i in range(len(Seen._fields)) for one in parts), 0.0]
+
+
+def _margins(motion: FreeMotion, at: Moment) -> list[Number]:
+    """What `FreeMotion.margins` has."""
+    nothing: Any = [0.0] * len(motion.names)
+    return [*motion.margins(motion.walk(at, nothing)), 0.0]
 
 
 def eliminated(matrix: list[list[Number]], right: list[Number]) -> tuple[list[Number], list[Number]]:

@@ -114,7 +114,6 @@ class ContactMotion(Integration):
             times = before + (after - before) * np.arange(1, LOOKS + 1) / LOOKS
             crossing = self._first(dense, before, times)
             end = after if crossing is None else crossing.time
-            self._measured(dense, before, end)
             self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets, self.senses))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
             self._follow(end, found, sense, now)
@@ -132,7 +131,9 @@ class ContactMotion(Integration):
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            found: Array = derivative(moment, numbers, self.onsets, now, self.senses)
+            inside = numbers.copy()
+            inside[: len(self.motion.names)] = self._in_range(numbers[: len(self.motion.names)])
+            found: Array = derivative(moment, inside, self.onsets, now, self.senses)
             return found
 
         return rate
@@ -199,11 +200,12 @@ class ContactMotion(Integration):
 
     # ---- what a contact comes to ------------------------------------------------------------------------------
 
-    def _measured(self, dense: Dense, begin: float, end: float) -> None:
+    def _measured(self, stretch: Stretch) -> None:
         """Peaks, impulse, wear and loss of the contacts that last, of a step: by Gauss and Legendre's rule on its dense
         output, between places where a slip turns round."""
         if not self._open:
             return
+        dense, begin, end = stretch.state, stretch.begin, stretch.end
         times, weights = step_nodes(begin, end)
         seen = self._look(dense, times)
         for k, one in self._open.items():

@@ -1,9 +1,9 @@
-"""The assembly by momentum: through poses where two assemblies meet, links go on as they move.
+"""The assembly by momentum: where a motion is to pass poses in which two assemblies meet, links go on as they move.
 
-A closed-form group keeps its branch as long as nothing brings it to where its two branches meet. A free motion may pass
-such a pose (rods in line), and the links then go on with the velocity they have, which is that of one branch only. So
-both branches are worked out, and that one is taken whose places and velocities are nearest to what the links would do
-with their last accelerations. A general group is solved by Newton's method from its last pose.
+A closed-form group keeps its branch as long as nothing brings it to where its two branches meet. A motion that passes
+such a pose (rods in line) goes on with the velocity that the links have, which is that of one branch only. So both
+branches are worked out, and that one is taken whose places and velocities are nearest to what the links would do with
+their last accelerations. A general group is solved by Newton's method from its last pose.
 """
 
 from __future__ import annotations
@@ -74,16 +74,16 @@ class Followed:
         return missed
 
 
-def follows(run: Run, several: bool) -> tuple[Any, ...]:
+def follows(run: Run, several: bool, passing: bool) -> tuple[Any, ...]:
     """The assembly of every module, followed where free drivers may lead it past a pose in which two meet.
 
-    several: whether there is more than one free driver, so that the nominal cycle is not the way it goes.
+    several: whether there is more than one free driver, so that the nominal cycle is not the way it goes; passing:
+    whether the motion goes on there.
     """
-    meets = any(finding.code == "assembly.change_point" for finding in run.chosen.findings)
     pace = float(np.ravel(primal(run.system.pace(run.values)))[0])
     found: list[Any] = []
     for number, chosen in enumerate(run.chosen.assembly):
         closed = chosen is not None and len(run.system.groups[number].BRANCHES) == 2
-        follow = (closed and (several or meets)) or (isinstance(chosen, Track) and several)
+        follow = (closed and (several or passing)) or (isinstance(chosen, Track) and several)
         found.append(Followed(number, chosen, pace) if follow else chosen)
     return tuple(found)

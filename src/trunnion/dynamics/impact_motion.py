@@ -21,6 +21,7 @@ from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContac
 from trunnion.dynamics.impact_law import OPEN, Struck
 from trunnion.dynamics.impact_steps import SteppedMotion
 from trunnion.dynamics.rates import Seen
+from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import Accelerated
 from trunnion.dynamics.touching import Closed, Onset
 
@@ -86,12 +87,13 @@ class ImpactMotion(SteppedMotion):
                 found[self.count + k] = onset.sense * seen.slip[k] if onset.sense else left
         return found
 
-    def _measured(self, dense: Dense, begin: float, end: float) -> None:
-        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step."""
-        if not self._open:
+    def _measured(self, stretch: Stretch) -> None:
+        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step; where
+        it is stepped they are those of the impulses."""
+        if not self._open or self.solution.stepped:
             return
-        times, weights = step_nodes(begin, end)
-        seen = self._touches(dense, times)
+        times, weights = step_nodes(stretch.begin, stretch.end)
+        seen = self._touches(stretch.state, times)
         for k, one in self._open.items():
             one.force = np.fmax(one.force, float(np.max(seen.normal[k])))
             one.impulse += float(weights @ seen.normal[k])

@@ -12,8 +12,9 @@ which it would break away forward and backward; see `rest`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,24 +24,34 @@ from scipy.integrate import DOP853, LSODA, OdeSolver
 from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.rates import WORKS, Dynamics, Layout
+from trunnion.dynamics.guards import Guards
+from trunnion.dynamics.rates import WORKS, Dynamics, Layout, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.stiffness import shortest
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
-__all__ = ["Integration"]
+__all__ = ["MOST_EVALUATIONS", "Integration"]
 
 Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
+MOST_EVALUATIONS = 1_000_000  # of the accelerations, if not stated otherwise
 CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
+NEAR = 1e-8  # of the coordinate: places that are one
+SLIGHT = 1e-6  # of a typical acceleration: one that may be rounding
 INSIDE = 1e-9  # of the coordinate: how far from a bend forces are asked of walks, which take less for rest
+MEETING = 1e-3  # likewise, of a bend at which assemblies meet: the digits of the accelerations are lost like its square
+
+
+class _Over(Exception):  # noqa: N818 (it is no error)
+    """The motion ends with the last step; `Solution.ended` says why."""
 
 
 class Passing(NamedTuple):
@@ -55,8 +66,9 @@ class Integration:
     """One motion from its initial state.
 
     bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
-    limits: coordinates between which the driver may move; progress: told the time that is reached; inside: share of the
-    coordinate by which forces are asked for on this side of a bend; times: s, at which a load jumps or bends.
+    limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
+    reached; inside: share of the coordinate by which forces are asked for on this side of a bend; times: s, at which a
+    load jumps or bends; evaluations: of the accelerations, at most; meetings: see `Places`.
     """
 
     motion: FreeMotion
@@ -65,10 +77,12 @@ class Integration:
     tolerance: float
     bends: Sequence[float] = ()
     period: float | None = None
-    limits: tuple[float, float] = (-np.inf, np.inf)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     progress: Callable[[float], None] | None = None
     inside: float = INSIDE
     times: Sequence[float] = ()
+    evaluations: int = MOST_EVALUATIONS
+    meetings: Sequence[tuple[float, int]] = ()
 
     def __post_init__(self) -> None:
         self.layout = Layout.of(self.motion)
@@ -80,6 +94,9 @@ class Integration:
         self._unique, self._doubts = True, 0
         self.breaks = [*sorted(times), self.duration]
         self.rest = Rest(self.motion, self.layout) if self.sticks else None
+        self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
+        margins = getattr(self.dynamics, "margins", Walks(self.motion).margins)
+        self.guards = Guards(self.motion, self.layout, self.limits, margins)
 
     @property
     def sticks(self) -> bool:
@@ -92,18 +109,23 @@ class Integration:
 
     def run(self, row: Array) -> Solution:
         """The motion from an initial row."""
+        with suppress(_Over):
+            self._run(row)
+        return self.solution
+
+    def _run(self, row: Array) -> None:
         self._follow(0.0, row, 0.0, 0.0)
         if not self._begins(row):
-            return self.solution
+            return
         before, time, step, stayed = -1.0, 0.0, None, 0
         sense = float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0
         for _ in range(MOST_EVENTS):
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
-                return self.solution
+                return
             stayed, before = (stayed + 1 if time == before else 0), time
             if stayed > STUCK:
                 self._stop("step", time, row)
-                return self.solution
+                return
             k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
             until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else 0.0))
             self._couple(time, row, now)
@@ -115,7 +137,6 @@ class Integration:
                 self._note(time, "break-away", sense)
             time, row, step = self._move(time, row, until, sense, now, step)
         self.end("events", time, {"count": float(MOST_EVENTS)})
-        return self.solution
 
     def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
         """The state of a row."""
@@ -152,9 +173,32 @@ class Integration:
         self.solution.events.append(Event(time, kind, self.motion.names[0], figure, unit))
 
     def _add(self, stretch: Stretch) -> None:
-        self.solution.stretches.append(stretch)
+        """Add a step, up to where the motion ends in it."""
+        stretches = self.solution.stretches
+        ended = self.guards.ended(stretch, stretches[-1] if stretches else None)
+        if ended is not None:
+            stretch = stretch._replace(end=max(stretch.begin, ended.time))
+        self._measured(stretch)
+        stretches.append(stretch)
+        while self.guards.passed:
+            self._note(self.guards.passed.pop(), "change-point")
         if self.progress:
-            self.progress(stretch.end)
+            self.progress(min(1.0, stretch.end / self.duration))
+        if ended is None and self.solution.asked > self.evaluations:
+            ended = self._exhausted(stretch)
+        if ended is not None:
+            self.solution.ended = ended
+            raise _Over
+
+    def _measured(self, stretch: Stretch) -> None:
+        """What contacts come to in a step: nothing, where there are none."""
+
+    def _exhausted(self, stretch: Stretch) -> Ended:
+        """The end where the evaluations are used up, with what makes them so many."""
+        row = stretch.state(np.array([stretch.end]))[:, 0]
+        at = self.moment(stretch.end, row, stretch.sense, stretch.now)
+        figures = shortest(self.motion, at, stretch.end - stretch.begin)
+        return Ended("simulate.evaluations", stretch.end, {"count": self.evaluations, "of": self.duration, **figures})
 
     @property
     def snapshot(self) -> Snapshot | None:
@@ -193,9 +237,11 @@ class Integration:
         n = self.layout.coordinates
         between = self._place(float(row[0]), sense or float(np.sign(row[n])))
         rate = self._rate(sense, now, between)
-        if row[n] == 0.0 and row[0] in self.limits and rate(time, row)[n] * (row[0] - sum(self.limits) / 2) > 0.0:
-            self.end("range", time, {"coordinate": float(row[0])})
-            return time, row, None
+        if row[n] == 0.0 and row[0] in self.ends[:, 0]:
+            outward = np.sign(row[0] - np.mean(self.ends[:, 0])) * rate(time, row)[n]
+            if outward > SLIGHT * self.motion.unit[0]:  # else it is rounding, or ends by the steps that follow
+                self._end_at(time, float(row[0]))
+                return time, row, None
         first = min(step, 0.5 * (until - time)) if step else None
         absolute, marks = self._absolute(row), [time]
         solver = self._solver(rate, time, row, until, absolute, first)
@@ -209,6 +255,9 @@ class Integration:
             solver, failed = (solver, None) if near else self._stepped(solver, rate, absolute)
             if near is None and (solver.status == "failed" or not np.all(np.isfinite(solver.y))):
                 return self._failed(before, row, sense, now, failed)
+            if near is None and (end := self._left_range(row, np.array(solver.y))) is not None:
+                self._end_at(before, end)
+                return before, row, None
             passed = near or self._passed(row, np.array(solver.y), sense, between)
             if passed is not None and passed.number == 0 and row[n] == 0.0:  # from rest: nearer first
                 size = 0.25 * (float(solver.t) - before)
@@ -228,15 +277,16 @@ class Integration:
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
         """The derivative of a row by time, within one stretch: nothing beyond its ends is asked for."""
         n, one_way = self.layout.coordinates, len(self.motion.names) == 1
-        low, high = between
+        low, high = (end + side * self._inside(end) for end, side in zip(between, (1.0, -1.0), strict=True))
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
             speeds = numbers[n : 2 * n]
             asked = numbers.copy()
-            if one_way:
-                inside = self.inside * max(1.0, abs(float(numbers[0])))
-                asked[0] = min(max(numbers[0], low + inside), high - inside)
+            if not one_way:
+                asked[:n] = self._in_range(numbers[:n])
+            else:
+                asked[0] = min(max(numbers[0], low), high)
                 if sense and sense * speeds[0] < 0.0:
                     asked[n] = 0.0
             at = self.moment(moment, asked, sense, now)
@@ -246,6 +296,16 @@ class Integration:
             return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
 
         return rate
+
+    def _inside(self, end: float) -> float:
+        """How far from the end of a stretch forces are asked for."""
+        if not np.isfinite(end):
+            return 0.0
+        return (self.inside if self._meeting(end) is None else MEETING) * max(1.0, abs(end))
+
+    def _in_range(self, coordinates: Array) -> Array:
+        """Coordinates of which none is beyond its range, where no force may be known."""
+        return np.clip(coordinates, *self.ends) if self.limits else coordinates
 
     def _solver(
         self, rate: Callable[[float, Array], Array], begin: float, row: Array, end: float, absolute: Array,
@@ -288,13 +348,24 @@ class Integration:
         reached = speed * speed + 2.0 * float(rate(time, row)[n]) * (level - float(row[0]))
         return Passing(0, level) if reached > 0.0 else None
 
+    def _left_range(self, before: Array, after: Array) -> float | None:
+        """The end of its range that one coordinate, which stood there, has left by more than rounding."""
+        for end, outward in zip(self.ends[:, 0], (-1.0, 1.0), strict=True) if len(self.motion.names) == 1 else ():
+            slack = NEAR * max(1.0, abs(end))
+            if abs(before[0] - end) <= slack < outward * (after[0] - end):
+                return float(end)
+        return None
+
     def _passed(self, before: Array, after: Array, sense: float, between: tuple[float, float]) -> Passing | None:
         """What a step has passed: the speed 0, or else a bend; the step is then taken anew, up to it."""
         n = self.layout.coordinates
         if sense and sense * after[n] <= 0.0:
             return Passing(n, 0.0)
         if len(self.motion.names) == 1:
+            low, high = self.ends[:, 0]
             for level in between:
+                if level in (low, high) and low <= after[0] <= high:  # it comes back by rounding
+                    continue
                 if np.isfinite(level) and (before[0] - level) * (after[0] - level) < 0:
                     ahead = (level - before[0]) * before[n] > 0.0
                     return Passing(0, level) if ahead or before[n] == 0.0 else Passing(n, 0.0)
@@ -328,8 +399,8 @@ class Integration:
 
         begin, state = float(row[k]), row.copy()
         if begin == to.value:
-            if k == 0 and to.value in self.limits:
-                self.end("range", time, {"coordinate": to.value})
+            if k == 0:
+                self._end_at(time, to.value)
             return time, row
         state[k], absolute = time, self._absolute(row)
         absolute[k] = self.tolerance / max(float(np.max(self.pace)), 1e-300)
@@ -350,9 +421,25 @@ class Integration:
         found = np.array(solver.y)
         end, found[k] = float(found[k]), to.value
         self._follow(end, found, sense, now)
-        if k == 0 and to.value in self.limits:
-            self.end("range", end, {"coordinate": to.value})
+        if k == 0:
+            self._end_at(end, to.value)
         return end, found
+
+    def _end_at(self, time: float, coordinate: float) -> None:
+        """End the motion where a coordinate is the end of the range, or that of a change point."""
+        if coordinate in self.ends[:, 0]:
+            self.end("range", time, {"driver": self.motion.names[0], "coordinate": coordinate})
+        elif (module := self._meeting(coordinate)) is not None:
+            self.end("change_point", time, self.motion.change_point(module, coordinate))
+
+    def _meeting(self, coordinate: float) -> int | None:
+        """The module of which two assemblies meet at a bend, if they do."""
+        for meeting, module in self.meetings:
+            apart = coordinate - meeting
+            apart -= self.period * round(apart / self.period) if self.period and np.isfinite(apart) else 0.0
+            if abs(apart) < NEAR * max(1.0, abs(coordinate)):
+                return module
+        return None
 
     def _plain(
         self, time: float, row: Array, until: float, sense: float, now: float, rate: Callable[[float, Array], Array]
@@ -388,7 +475,7 @@ class Integration:
     def _place(self, q: float, sense: float) -> tuple[float, float]:
         """The coordinates on either side of q at which a step ends; a coordinate that is one of them is left behind."""
         bends = np.asarray(self.bends, float)
-        low, high = self.limits
+        low, high = (float(end) for end in self.ends[:, 0])
         if len(bends):
             period = 0.0 if self.period is None else self.period
             laps = np.floor(q / period) * period + period * np.arange(-1, 2) if period else [0.0]

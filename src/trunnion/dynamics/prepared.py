@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from trunnion.dynamics.clutch_motion import ClutchMotion
 from trunnion.dynamics.compiled_rates import compiled_rates
-from trunnion.dynamics.integrate import INSIDE, Integration
+from trunnion.dynamics.integrate import INSIDE, MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics, Walks
-from trunnion.dynamics.start import Places, load_times
+from trunnion.dynamics.start import Places, load_times, ranges
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stick_motion import StickMotion
 from trunnion.dynamics.tables import tabulated
@@ -30,14 +30,18 @@ def rates_of(motion: FreeMotion, known: Places) -> Dynamics:
 def integration_of(
     motion: FreeMotion, known: Places, duration: float, tolerance: float,
     progress: Callable[[float], None] | None = None, rates: Dynamics | None = None,
+    evaluations: int = MOST_EVALUATIONS,
 ) -> Integration:  # fmt: skip
-    """What integrates a motion. rates: those of `rates_of`, if they are there."""
+    """What integrates a motion. rates: those of `rates_of`, if they are there; evaluations: see `Integration`."""
     rates, times = rates or rates_of(motion, known), load_times(motion, duration)
+    limits = ranges(motion, motion.names, known)
     if motion.resisted:
         assert not isinstance(rates, TabulatedRates)  # which are of one coordinate
-        return StickMotion(motion, rates, duration, tolerance, progress=progress, times=times)
+        return StickMotion(
+            motion, rates, duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
+        )
     kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration
     return kind(
-        motion, rates, duration, tolerance, known.bends, known.period, known.limits, progress,
-        TABLED if isinstance(rates, TabulatedRates) else INSIDE, times,
+        motion, rates, duration, tolerance, known.bends, known.period, limits, progress,
+        TABLED if isinstance(rates, TabulatedRates) else INSIDE, times, evaluations, known.meetings,
     )  # fmt: skip

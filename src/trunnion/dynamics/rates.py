@@ -147,6 +147,12 @@ class Walks:
         works = works_of(found.back, at._replace(onsets=found.onsets), motion.contacts)
         return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
 
+    def margins(self, at: Moment) -> Array:
+        """See `FreeMotion.margins`, (module, lane)."""
+        with np.errstate(all="ignore"):
+            walk = self.motion.walk(at, np.zeros_like(at.q))
+            return np.array([np.broadcast_to(margin, at.q.shape[1]) for margin in self.motion.margins(walk)])
+
     def look(self, at: Moment) -> Seen:
         """See `Seeing`."""
         motion = self.motion

@@ -270,7 +270,7 @@ def _undefined(books: Books) -> Iterator[Finding]:
         yield finding_for("simulate.undefined", "loads", count=len(rows), time=float(books.time[rows[0]]))
 
 
-OF_DRIVER = ("simulate.range", "simulate.dead_centre")  # ends that tell a place of the driver
+OF_DRIVER = ("simulate.range", "simulate.dead_centre", "simulate.change_point")  # ends that tell a place of a driver
 
 # ---- findings -------------------------------------------------------------------------------------------------
 
@@ -286,14 +286,16 @@ def motion_findings(
         yield finding_for("simulate.centred", joints=centred)
     yield from _of_contacts(motion, run, impacts)
     yield from (finding_for(code, "joints", **figures) for code, figures in solution.notes.items())
+    if passed := [event.time for event in solution.events if event.kind == "change-point"]:
+        yield finding_for("simulate.passed", "assembly", times=len(passed), time=passed[0])
     name = next(iter(_shown(motion, run)), next(iter(system.mechanism.drivers)))
-    turns, effort = system.turns(name), effort_units(system)[list(system.mechanism.drivers).index(name)]
+    effort = effort_units(system)[list(system.mechanism.drivers).index(name)]
     yield from _locks(motion, solution)
     yield from _rests(motion, solution, name, effort)
-    if solution.ended is not None:
-        ended = solution.ended
-        unit: dict[str, Any] = {"unit": "rad" if turns else "m", "driver": name} if ended.code in OF_DRIVER else {}
-        yield finding_for(ended.code, f"drivers.{name}", time=ended.time, **ended.figures, **unit)
+    if (ended := solution.ended) is not None:
+        driver = ended.figures.get("driver", name)
+        of = {"driver": driver, "unit": "rad" if system.turns(driver) else "m"} if ended.code in OF_DRIVER else {}
+        yield finding_for(ended.code, f"drivers.{driver}", time=ended.time, **{**ended.figures, **of})
 
 
 def _locks(motion: FreeMotion, solution: Solution) -> Iterator[Finding]:
@@ -406,7 +408,9 @@ def _summary(motion: FreeMotion, own: Found, run: Run, scales: Scales) -> Sequen
             found.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, books.time, efforts,
                                   course.extreme(EFFORT)))  # fmt: skip
         found += steady_figures(motion, solution, i, course)
-    found += _reactions(own, list(run.system.joints))
+    ended = solution.ended is not None and solution.ended.code == "simulate.change_point"
+    if not ended and not any(event.kind == "change-point" for event in solution.events):  # there they have no bound
+        found += _reactions(own, list(run.system.joints))
     found += impact_figures(motion.contacts.labels, impacts, solution.end)
     if not np.any(np.isfinite(books.works[0])):  # it does not begin
         return found

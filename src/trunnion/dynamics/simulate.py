@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,13 +16,12 @@ from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
-from trunnion.dynamics.integrate import Integration
+from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
 from trunnion.dynamics.rates import Layout, Seeing, Walks
 from trunnion.dynamics.result import Books, Found, result_of
-from trunnion.dynamics.solution import Solution
-from trunnion.dynamics.start import initial_row, load_times, places
+from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.steady import steady as steady_result
@@ -31,6 +30,7 @@ from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
+from trunnion.solve.change_points import TOUCHING
 from trunnion.solve.run import Run, prepare
 
 if TYPE_CHECKING:
@@ -59,20 +59,54 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     impact_step: float | None = None,
     steady: bool = False,
+    evaluations: int = MOST_EVALUATIONS,
+    pass_change_points: bool = False,
 ) -> xr.Dataset:
     """Motion in time of a mechanism whose drivers are free: coordinates, forces, energy and events.
 
-    duration: s, ten cycles of the stated motion if not given; steps: equal intervals at whose ends the result stands;
-    tolerance: relative, of every step of the integration; progress: called with the time that is reached, s;
-    impact_step: s, of Moreau's time stepping of joints in play between rigid bodies, from event to event if not given;
-    steady: instead of the motion from its start the cycle that it comes to repeat, see `dynamics.steady_cycle`.
-    Returns a Dataset with the names and units of `analyse` over `time`, with works, energies and events beside them; of
-    a steady cycle that of `analyse`, over as many positions as steps, equally spaced in time.
-    Method: the free coordinates accelerate so that the effort the modules demand is what the motors give
-    (`dynamics.state`); integrated from event to event (`dynamics.integrate`).
-    Raises MechanismError if no driver is free, or if the motion cannot be found for what the joints are.
+    Parameters
+    ----------
+    mechanism
+        With a driver that is free or has a motor.
+    duration
+        s; ten cycles of the stated motion if not given.
+    steps
+        Equal intervals at whose ends the result stands.
+    tolerance
+        Relative, of every step of the integration.
+    progress
+        Called with the share of the duration that is reached, from 0 to 1.
+    impact_step
+        s, of Moreau's time stepping of joints in play between rigid bodies; from event to event if not given.
+    steady
+        Instead of the motion from its start the cycle that it comes to repeat, see `dynamics.steady_cycle`.
+    evaluations
+        Of the accelerations, at most. A motion that needs more ends there, with a finding that names what makes it
+        stiff.
+    pass_change_points
+        Go on through poses in which two assemblies meet, with the velocities that the links have, instead of ending
+        there. Reactions have no bound at such a pose.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the names and units of `analyse` over `time`, with works, energies and events beside them; NaN after a
+        motion that ends early. Of a steady cycle that of `analyse`, over as many positions as steps, equally spaced
+        in time.
+
+    Raises
+    ------
+    MechanismError
+        If no driver is free, or if the motion cannot begin or be found for what the joints are.
+
+    Notes
+    -----
+    The free coordinates accelerate so that the effort the modules demand is what the motors give (`dynamics.state`);
+    integrated from event to event (`dynamics.integrate`).
     """
-    return simulated(mechanism, duration, steps, tolerance, progress, impact_step, steady).dataset
+    return simulated(
+        mechanism, duration, steps, tolerance, progress, impact_step, steady, evaluations, pass_change_points
+    ).dataset
 
 
 @np.errstate(all="ignore")
@@ -84,6 +118,8 @@ def simulated(
     progress: Callable[[float], None] | None = None,
     impact_step: float | None = None,
     steady: bool = False,
+    evaluations: int = MOST_EVALUATIONS,
+    pass_change_points: bool = False,
 ) -> Result:
     """What `simulate` does, before it becomes a Dataset."""
     refuse(mechanism)
@@ -92,20 +128,21 @@ def simulated(
     if not playing:
         refuse_undetermined(run)
     duration = CYCLES * run.cycle.duration if duration is None else duration
-    _check_numbers(duration, steps, tolerance)
+    _check_numbers(duration, steps, tolerance, evaluations)
     _check_step(impact_step, duration, mechanism)
     if steady:
-        return steady_result(mechanism, duration, steps, tolerance, progress)
+        return steady_result(mechanism, duration, steps, tolerance, progress, evaluations)
     if playing:
-        return _with_play(run, duration, steps, tolerance, progress, impact_step)
-    motion = StickingMotion.of(run)
+        return _with_play(run, duration, steps, tolerance, progress, impact_step, evaluations, pass_change_points)
+    motion = StickingMotion.of(run, passing=pass_change_points)
     known = places(motion)
     rates, row, time = rates_of(motion, known), initial_row(motion), np.linspace(0.0, duration, steps + 1)
-    _check_start(motion, row, known.limits)
+    _check_start(motion, row, ranges(motion, motion.names, known))
 
     def found(tolerance: float) -> Found:
         motion.begin(None)
-        solution = _run(integration_of(motion, known, duration, tolerance, progress, rates), row.copy())
+        integration = integration_of(motion, known, duration, tolerance, progress, rates, evaluations)
+        solution = integration.run(row.copy())
         return Found.of(motion, solution, time, lambda when: Filling(motion, solution, when).books())
 
     return result_of(motion, _balanced(found, tolerance))
@@ -115,15 +152,16 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
     """A motion whose energy account is right to ACCOUNT, or MISSED times a coarse tolerance, if a finer one has it so.
 
     A step over a bend of a force that is not known beforehand, as where a reaction turns round, may be wrong by more
-    than its estimate says; the account tells. What is interrupted, or stepped to the first order, is left as it is.
+    than its estimate says; the account tells. What has used up its evaluations, or is stepped to the first order, is
+    left as it is.
     """
     best, most = find(tolerance), max(ACCOUNT, MISSED * tolerance)
     for _ in range(FINER):
         tolerance = max(0.1 * tolerance, FINEST)
-        if not best.share > most or best.solution.stepped or _stopped(best):
+        if not best.share > most or best.solution.stepped or _exhausted(best):
             break
         other = find(tolerance)
-        if _stopped(other) or not other.share < best.share:
+        if _exhausted(other) or not other.share < best.share:
             break
         helps, best = other.share < HELPS * best.share, other
         if not helps:
@@ -131,29 +169,32 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
     return best
 
 
-def _stopped(found: Found) -> bool:
-    return found.solution.ended is not None and found.solution.ended.code == "simulate.stopped"
+def _exhausted(found: Found) -> bool:
+    return found.solution.ended is not None and found.solution.ended.code == "simulate.evaluations"
 
 
 def _with_play(
     run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None,
-    impact_step: float | None,
+    impact_step: float | None, evaluations: int, passing: bool,
 ) -> Result:  # fmt: skip
     """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
     loose = prepare(bare.mechanism, free=True)
     refuse_undetermined(loose, in_play(run.system.mechanism))
-    motion = (ClosedMotion if is_rigid(run.system.mechanism) else StickingMotion).of(loose, contacts)
-    row = initial_row(motion)
+    motion = (ClosedMotion if is_rigid(run.system.mechanism) else StickingMotion).of(loose, contacts, passing)
+    row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
+    _check_start(motion, row, limits)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
     times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
     integrating = _integrating(motion, impact_step)
 
     def found(tolerance: float) -> Found:
-        integration = integrating(duration, tolerance, progress=progress, times=times)
-        solution = _run(integration, row.copy())
+        integration = integrating(
+            duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
+        )
+        solution = integration.run(row.copy())
 
         def between(when: Array) -> Books:
             return Filling(motion, solution, when, bare).books()
@@ -171,20 +212,19 @@ def _integrating(motion: FreeMotion, impact_step: float | None) -> Callable[...,
     return partial(StickMotion if motion.resisted else ContactMotion, motion, rates)
 
 
-def _run(integration: Integration, row: Array) -> Solution:
-    """The motion from an initial row; of one that is interrupted what is done."""
-    try:
-        return integration.run(row)
-    except KeyboardInterrupt:
-        integration.end("stopped", integration.solution.end)
-        return integration.solution
-
-
-def _check_start(motion: FreeMotion, row: Array, limits: tuple[float, float]) -> None:
-    """MechanismError for a start outside the range of the one free driver, or where nothing moves that has a mass."""
-    if not limits[0] <= row[0] <= limits[1]:
-        what = f"begins at {row[0]:g} (SI), outside its range from {limits[0]:g} to {limits[1]:g}"
-        raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin within the range"))
+def _check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
+    """MechanismError for a start outside a range, at a change point, or where nothing moves that has a mass."""
+    for name, (low, high) in limits.items():
+        place = row[motion.names.index(name)]
+        if not low <= place <= high:
+            what = f"begins at {place:g} (SI), outside its range from {low:g} to {high:g}"
+            raise MechanismError(Finding(what, f"drivers.{name}.initial", "begin within the range"))
+    at = Layout.of(motion).moment(np.zeros(1), row[:, None])
+    for module, margin in zip(motion.meeting, motion.margins(motion.walk(at, np.zeros_like(at.q))), strict=True):
+        if np.ravel(margin)[0] < TOUCHING:
+            links = ", ".join(motion.system.plan.modules[module].links)
+            what = f"begins at a change point: two assembly modes of the links {links} coincide there"
+            raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", "begin elsewhere"))
     if len(motion.names) != 1:
         return
     rows = np.repeat(row[:, None], 2, axis=1)
@@ -210,13 +250,15 @@ def _check_step(step: float | None, duration: float, mechanism: Mechanism) -> No
         raise MechanismError(Finding(f"a step of {step:g} s", "impact_step", remedy))
 
 
-def _check_numbers(duration: float, steps: int, tolerance: float) -> None:
+def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: int) -> None:
     """MechanismError for numbers that make no sense."""
     found = []
     if not (np.isfinite(duration) and duration > 0):
         found.append(Finding(f"a duration of {duration:g} s", "duration", "give a time above 0, such as 2 s"))
     if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
         found.append(Finding(f"cannot give {steps} steps", "steps", f"give a whole number from 1 to {MOST_STEPS:,}"))
+    if not isinstance(evaluations, (int, np.integer)) or evaluations < 1:
+        found.append(Finding(f"cannot do {evaluations} evaluations", "evaluations", "give a whole number from 1"))
     if not 1e-13 <= tolerance <= 1e-2:
         found.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))
     if found:

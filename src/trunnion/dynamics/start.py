@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import Cycle, Values
 
-__all__ = ["Places", "initial_row", "load_times", "nominal_motion", "placed", "places"]
+__all__ = ["Places", "initial_row", "load_times", "nominal_motion", "placed", "places", "ranges"]
 
 Array = NDArray[np.float64]
 
@@ -25,11 +26,16 @@ CLOSE = 1e-9  # of the way: bends that are one
 @dataclass(frozen=True)
 class Places:
     """Coordinates of the one free driver at which a force jumps or bends, the period after which they come again, and
-    the coordinates between which the nominal cycle knows the assembly."""
+    the coordinates between which the nominal cycle knows the assembly.
+
+    meetings: coordinates at which two assemblies of a module meet and the motion ends, with its number; they are among
+    the bends.
+    """
 
     bends: tuple[float, ...] = ()
     period: float | None = None
     limits: tuple[float, float] = (-np.inf, np.inf)
+    meetings: tuple[tuple[float, int], ...] = ()
 
 
 def _number(values: object) -> float:
@@ -46,6 +52,18 @@ def initial_row(motion: FreeMotion) -> Array:
         row[i] = _number(values.get(f"{path}.initial.coordinate", begin))
         row[layout.coordinates + i] = _number(values.get(f"{path}.initial.speed", 0.0))
     return row
+
+
+def ranges(motion: FreeMotion, drivers: Iterable[str], known: Places) -> dict[str, tuple[float, float]]:
+    """The coordinates between which free drivers may move, of those that have a range."""
+    if len(motion.system.mechanism.drivers) == 1:
+        return {motion.names[0]: known.limits}
+    stated = {}
+    for name in drivers:
+        ends = [motion.values.get(f"drivers.{name}.range.{end}") for end in ("from", "to")]
+        if name in motion.names and None not in ends:
+            stated[name] = min(map(_number, ends)), max(map(_number, ends))
+    return stated
 
 
 def load_times(motion: FreeMotion, duration: float) -> list[float]:
@@ -78,9 +96,17 @@ def places(motion: FreeMotion) -> Places:
     if len(motion.system.mechanism.drivers) != 1:
         return Places()
     run, cycle = motion.run, motion.cycle
+    begin, speed = map(_number, nominal_motion(motion, run.values))
+    meetings = [
+        (time, module)
+        for module, each in run.chosen.meetings.items()
+        if not motion.passes(module)
+        for meeting in each
+        for time in sorted(set(meeting))
+    ]
     times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
-    begin, speed = nominal_motion(motion, run.values)
-    return placed(times, _number(begin), _number(speed), cycle)
+    known = placed(np.append(times, [time for time, _ in meetings]), begin, speed, cycle)
+    return replace(known, meetings=tuple((begin + speed * time, module) for time, module in meetings))
 
 
 def nominal_motion(motion: FreeMotion, values: Values) -> tuple[Number, Number]:

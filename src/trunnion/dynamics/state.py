@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +84,8 @@ class Accelerated(NamedTuple):
 class FreeMotion:
     """A mechanism with free drivers, ready to be asked for its accelerations.
 
-    run: prepared for the nominal cycle; drives: what drives the free coordinates, by name; assembly: of every module.
+    run: prepared for the nominal cycle; drives: what drives the free coordinates, by name; assembly: of every module;
+    passing: whether it goes on through change points, where it can.
     """
 
     run: Run
@@ -92,12 +93,14 @@ class FreeMotion:
     assembly: Assembly
     method: FrictionMethod = field(default_factory=FrictionMethod)
     contacts: Contacts = field(default_factory=Contacts)
+    passing: bool = False
 
     @classmethod
-    def of(cls, run: Run, contacts: Contacts | None = None) -> FreeMotion:
+    def of(cls, run: Run, contacts: Contacts | None = None, passing: bool = False) -> Self:
         """The free motion of a prepared mechanism."""
-        found = drives(run.system, run.values)
-        return cls(run, found, follows(run, len(found) > 1), contacts=contacts or Contacts())
+        free = drives(run.system, run.values)
+        assembly = follows(run, len(free) > 1, passing)
+        return cls(run, free, assembly, contacts=contacts or Contacts(), passing=passing)
 
     @property
     def system(self) -> System:
@@ -160,6 +163,22 @@ class FreeMotion:
         fall = [gravity / (size if self.system.turns(name) else 1.0) for name in self.names]
         return np.maximum(self.unit, fall)
 
+    @cached_property
+    def meeting(self) -> tuple[int, ...]:
+        """The modules of which two assemblies may meet on the way: the nominal cycle tells it of one driver alone."""
+        if len(self.system.mechanism.drivers) == 1:
+            return tuple(self.run.chosen.meetings)
+        return tuple(number for number, module in enumerate(self.system.plan.modules) if module.rank > 1)
+
+    def passes(self, number: int) -> bool:
+        """Whether a module goes on through poses in which two of its assemblies meet: closed forms can."""
+        return self.passing and bool(self.system.groups[number].BRANCHES)
+
+    def change_point(self, number: int, coordinate: float) -> dict[str, Any]:
+        """What is told of a motion that ends where two assemblies of a module meet, at a place of the first driver."""
+        links = list(self.system.plan.modules[number].links)
+        return {"driver": self.names[0], "coordinate": coordinate, "links": links}
+
     # ---- walks ------------------------------------------------------------------------------------------------
 
     def values_at(self, at: Moment, second: Array) -> Values:
@@ -169,6 +188,10 @@ class FreeMotion:
     def walk(self, at: Moment, second: Array) -> Forward:
         """Motion alone."""
         return forward(self.system, self.values_at(at, second), self.assembly, at.time)
+
+    def margins(self, walk: Forward) -> list[Number]:
+        """1/condition of every module of `meeting`, which is 0 where two of its assemblies meet."""
+        return [1.0 / primal(self.system.groups[k].condition(walk.poses[k])) for k in self.meeting]
 
     def solve(
         self, at: Moment, second: Array, zero_slip: Mapping[str, Sense] | None = None, sliding: bool = False

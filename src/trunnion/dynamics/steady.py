@@ -10,6 +10,7 @@ from trunnion.cycle import summary
 from trunnion.cycle.positions import Positions, positions
 from trunnion.dynamics.course import Courses
 from trunnion.dynamics.filling import Filling
+from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.repeated import Repeated, motion_law
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.steady_cycle import INDIFFERENT, SteadyCycle, refuse_unsteady, steady_cycle
@@ -29,8 +30,9 @@ DIFFERS = 1e-3  # of the largest effort: a cycle that is not the one that was fo
 
 @np.errstate(all="ignore")
 def steady(
-    mechanism: Mechanism, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None = None
-) -> Result:
+    mechanism: Mechanism, duration: float, steps: int, tolerance: float,
+    progress: Callable[[float], None] | None = None, evaluations: int = MOST_EVALUATIONS,
+) -> Result:  # fmt: skip
     """The steady cycle of a mechanism as `analyse` gives a cycle: with the speed that varies as it was found.
 
     Positions are equally spaced in time. Raises MechanismError where a cycle cannot be asked for, UnsteadyError where
@@ -42,7 +44,7 @@ def steady(
         what = "it may stick while others slide, as several drivers are free, which is not followed in a steady cycle"
         remedy = "use friction laws that are smooth at rest (brown-mcphee, dahl, lugre), or leave --steady out"
         raise MechanismError([Finding(what, f"joints.{joint}", remedy) for joint in motion.resisted])
-    found = steady_cycle(motion, duration, tolerance, progress)
+    found = steady_cycle(motion, duration, tolerance, progress, evaluations)
     each = Repeated.of(motion, found.solution)
     moving = mechanism.with_motions({name: motion_law(one) for name, one in zip(motion.names, each, strict=True)})
     run = prepare(moving)

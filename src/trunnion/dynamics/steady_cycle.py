@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.dynamics.course import Courses
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.integrate import Integration
+from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import FINEST, integration_of, rates_of
 from trunnion.dynamics.rates import Dynamics, Layout
@@ -116,8 +116,9 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
 
 
 def steady_cycle(
-    motion: FreeMotion, duration: float, tolerance: float, progress: Callable[[float], None] | None = None
-) -> SteadyCycle:
+    motion: FreeMotion, duration: float, tolerance: float, progress: Callable[[float], None] | None = None,
+    evaluations: int = MOST_EVALUATIONS,
+) -> SteadyCycle:  # fmt: skip
     """The steady cycle that a motion comes to from its start. duration: of the run-up, s, which may take up to LONGER
     times as long; tolerance: of its steps; UnsteadyError where there is none."""
     first = next((i for i, name in enumerate(motion.names) if motion.system.turns(name)), None)
@@ -129,7 +130,8 @@ def steady_cycle(
     unstable = None  # one that no run-up comes to, unless it begins there
     for longer in LONGER:
         end = longer * duration
-        solution = integration_of(motion, known, end, tolerance, progress, rates).run(initial_row(motion))
+        integration = integration_of(motion, known, end, tolerance, progress, rates, evaluations)
+        solution = integration.run(initial_row(motion))
         course = Courses.of_solution(motion, solution, first)
         if solution.ended or solution.stretches[-1].resting:
             break

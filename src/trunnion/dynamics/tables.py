@@ -137,8 +137,8 @@ def unfit(motion: FreeMotion) -> str:
     mechanism = motion.system.mechanism
     if len(mechanism.drivers) != 1:
         return "several drivers move"
-    if motion.followed:
-        return "a group is followed along the motion"
+    if motion.meeting:
+        return "two assemblies meet on its way"
     if any(gear.teeth for gear in mechanism.gears.values()):
         return "a gear pair has teeth"
     timed = {"time", "speed"} | {name for name, table in mechanism.tables.items() if table.over == "time"}

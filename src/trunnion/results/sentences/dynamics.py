@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from trunnion.results.quantities import readable
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["DYNAMICS"]
+
+
+def _exhausted(time: float, count: int, of: float, constant: float, causes: list[str]) -> str:
+    ends = f"{count:,} evaluations of the forces are used up at {readable(time, 's')} of {readable(of, 's')}: "
+    if not np.isfinite(constant):
+        return f"{ends}the motion ends there"
+    why = f", by {' and '.join(causes)}" if causes else ""
+    share = f"{of / constant:.3g} of which are in the time that is asked for"
+    return f"{ends}the motion ends there. Its shortest time constant is {readable(constant, 's')}{why}, {share}"
+
 
 DYNAMICS: dict[str, Sentence] = {
     "simulate.stays_at_rest": Sentence(
@@ -42,7 +55,7 @@ DYNAMICS: dict[str, Sentence] = {
     ),
     "simulate.range": Sentence(
         WARNING,
-        "{driver} reaches {coordinate:.6g} {unit}, the end of its stated range, at {time:~s}: the motion ends there",
+        "{driver} reaches {coordinate:~{unit}}, the end of its stated range, at {time:~s}: the motion ends there",
         "widen drivers.{driver}.range, or stop the motion before by a load or a brake",
     ),
     "simulate.no_acceleration": Sentence(
@@ -105,7 +118,23 @@ DYNAMICS: dict[str, Sentence] = {
         "the motion that was found",
         "run it without --steady to see the motion from its start",
     ),
-    "simulate.stopped": Sentence(WARNING, "stopped at {time:~s}: the motion until then is kept"),
+    "simulate.change_point": Sentence(
+        ERROR,
+        "at {time:~s}, at {coordinate:~{unit}} of {driver}, the links {links} come to a change point, where two of "
+        "their assembly modes coincide: neither reactions nor what follows are determined, and the motion ends there",
+        "change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake; or go on with the "
+        "velocities that the links have: --pass-change-points",
+    ),
+    "simulate.passed": Sentence(
+        WARNING,
+        "change points are passed {times:#time}, first at {time:~s}, with the velocities that the links have: "
+        "reactions have no bound there, so that no largest ones are told",
+    ),
+    "simulate.evaluations": Sentence(
+        ERROR,
+        _exhausted,
+        "check what makes it so fast, ask for a shorter --time or more --evaluations",
+    ),
     "simulate.locks": Sentence(
         WARNING,
         "the mechanism locks as it runs, at {time:~s}: it stops at once, and loses {energy:~J}",

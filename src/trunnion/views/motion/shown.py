@@ -22,7 +22,8 @@ __all__ = [
 Array = NDArray[np.float64]
 WORDS = {
     "break-away": "starts", "rest": "rests", "stick": "sticks", "lock": "locks", "motor-off": "motor off",
-    "dead-centre": "dead centre", "brake": "brake on", "clutch-slips": "clutch slips", "clutch-holds": "clutch holds",
+    "dead-centre": "dead centre", "change-point": "change point", "brake": "brake on",
+    "clutch-slips": "clutch slips", "clutch-holds": "clutch holds",
     "clutch-opens": "clutch opens",
 }  # fmt: skip
 OF_IMPACTS = ("impact", "lift-off", "closes")  # events without a word in figures: the curves show them
@@ -40,7 +41,8 @@ ENERGIES = (
 
 
 # findings that tell where a motion ends early
-EARLY = ("range", "no_acceleration", "unsolved", "not_assembled", "dead_centre", "step", "events", "stopped")
+EARLY = ("range", "no_acceleration", "unsolved", "not_assembled", "dead_centre", "step", "events", "change_point",
+         "evaluations")  # fmt: skip
 ENDS = {f"simulate.{code}" for code in (*EARLY, "no_contact_force")}
 
 

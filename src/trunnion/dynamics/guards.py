@@ -99,7 +99,7 @@ class Guards:
         ahead = looks[:, 1:-1] + (looks[:, 1:-1] - looks[:, :-2]) * spans[1:] / spans[:-1]
         for row, module in self._meeting:
             places = np.flatnonzero(ahead[row] <= NEARLY * looks[row, 1:-1]) + 1
-            for time in touched(lambda moment, row=row: float(margins(np.array([moment]))[row, 0]), times, places):
+            for time in touched(lambda moment, row=row: float(margins(np.array([moment]))[row, 0]), times, places):  # type: ignore[misc]
                 if not self.motion.passes(module):
                     place = float(stretch.state(np.array([time]))[0, 0])
                     yield Ended("simulate.change_point", time, self.motion.change_point(module, place))

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses, Place
-from trunnion.algebra.dual import primal
 from trunnion.algebra.quadrature import CANCELLED
 from trunnion.cycle import contact_loss
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
+from trunnion.cycle.scales import scales_of
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
@@ -313,7 +313,7 @@ def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array
 
     Forces, and moments by the size of the mechanism, come of one another; so do powers; lengths are like its size.
     """
-    length = float(np.ravel(primal(run.system.size(run.values)))[0])
+    length = scales_of(run).length
     names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
     units, turning = np.ones(len(names)), [run.system.turns(name) for name in run.system.mechanism.drivers]
     units[names == "reaction_moment"] = length

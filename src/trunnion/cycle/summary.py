@@ -446,7 +446,7 @@ def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
         if at.course is not None and at.method.margin_up_to:
             margins = margin_of(run, at.method)
             least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
-            worst = None if least is None else 0.0 if least.everywhere else least.time
+            worst = None if least is None else margins.side(least, "locking_margin", -1.0)
         return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked, worst)
 
 

@@ -42,8 +42,7 @@ CHECKED, TORN = 5, 1e3  # times that edges are looked at; of what is small: a ro
 TOSSED = 1e-3  # of the whole: width of panels whose state may be the gravest that they have
 HALVED = 2  # rounds in which a panel is halved; then it is parted about the place where a row bends most
 NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
-ALIKE = 1e-9  # of the size of a course: tops that are one, of which the first counts
-FLAT = 1e-9  # of its size: a course that changes less is constant
+FLAT = 1e-9  # of its size: a course that changes less is constant, and of tops that differ less the first counts
 BESIDE = 1e-8  # of the whole: an extreme is at a break if it is no farther from it
 ONE = 1e-7  # of the whole: passages that are one, as where a row touches a level
 REAL = 1e-7  # imaginary part of a root that counts as real: of a double root it is the square root of rounding
@@ -183,7 +182,7 @@ class Courses:
         of: Callable[[Array], Array],
         sign: float = 1.0,
         panels: NDArray[np.bool_] | None = None,
-        size: float = 0.0,
+        floor: float = 0.0,
     ) -> Place | None:
         """The largest value of a number that is made of the rows, (row, …) to (…), or with sign −1 its least one.
 
@@ -193,8 +192,8 @@ class Courses:
             Such as `lambda rows: rows[3]`.
         panels
             Among which it is looked for, all if not given.
-        size
-            Largest magnitude of what is like the number: what is rounding of it is no change.
+        floor
+            What is rounding of the number: a smaller change is none.
 
         Returns
         -------
@@ -207,8 +206,8 @@ class Courses:
         if not np.any(np.isfinite(values)):
             return None
         high, low = float(np.max(values)), float(np.min(values[np.isfinite(values)]))
-        size = max(abs(high), abs(low), 1e-2 * size)
-        if high - low <= FLAT * size:
+        flat = max(FLAT * max(abs(high), abs(low)), floor)
+        if high - low <= flat:
             return Place(sign * high, float("nan"), everywhere=True)
         near = np.flatnonzero(np.max(values, axis=1) >= high - NEAR * (high - low))
         chosen, values = chosen[near], values[near]
@@ -220,7 +219,7 @@ class Courses:
             rows, most = np.arange(len(chosen)), np.argmax(values, axis=1)
             better = values[rows, most] > best
             top, best = np.where(better, spots[rows, most], top), np.where(better, values[rows, most], best)
-        k = int(np.argmax(best >= np.max(best) - ALIKE * size))
+        k = int(np.argmax(best >= np.max(best) - flat))
         time = float(self.edges[chosen[k]] + self.half[chosen[k]] * (top[k] + 1.0))
         nearest = float(self.breaks[np.argmin(np.abs(self.breaks - time))])
         if abs(nearest - time) <= BESIDE * self.span:

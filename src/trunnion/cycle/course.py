@@ -110,10 +110,6 @@ class CycleCourse:
         """Of how much of the cycle a figure is, where a pin loses contact in the rest; empty where it does nowhere."""
         return "" if np.all(self.valid) else f"without {self.courses.share(~self.valid):.2g} of the cycle"
 
-    def size(self, name: str) -> float:
-        """The largest magnitude of what is like a variable."""
-        return float(np.max(self.courses.sizes[self._places[name]], initial=0.0)) if name in self.shapes else 0.0
-
     @cached_property
     def _largest(self) -> Array:
         """The largest magnitude of every row in sound panels."""
@@ -143,18 +139,18 @@ class CycleCourse:
         of: Callable[[Rows], Array],
         sign: float = 1.0,
         panels: NDArray[np.bool_] | None = None,
-        like: str = "",
+        unit: str = "",
     ) -> Place | None:
         """The largest or least value of a number made of the variables, in sound panels if no others are given.
 
-        like: a variable of its kind, so that rounding is told from change.
+        unit: of the number, so that rounding is told from change.
         """
         chosen = self.sound if panels is None else panels
-        return self.courses.extreme(self._named(of), sign, chosen, self.size(like) if like else 0.0)
+        return self.courses.extreme(self._named(of), sign, chosen, scales_of(self.run).floor(unit))
 
-    def top(self, of: Callable[[Rows], Array], sign: float = 1.0, like: str = "") -> Top | None:
+    def top(self, of: Callable[[Rows], Array], sign: float = 1.0, unit: str = "") -> Top | None:
         """The same with its place in words."""
-        found = self.extreme(of, sign, None, like)
+        found = self.extreme(of, sign, None, unit)
         return None if found is None else Top(found.value, self.told(found))
 
     def told(self, place: Place) -> str:
@@ -322,16 +318,16 @@ def stacked(arrays: Arrays, names: Sequence[str], places: int) -> tuple[dict[str
 def like(run: Run, shapes: Mapping[str, tuple[int, ...]], sizes: Array) -> Array:
     """The largest magnitude of what is like each row: what is far below it is rounding.
 
-    Forces, and moments by the size of the mechanism, come of one another; so do powers; lengths are like its size.
+    Forces, and moments by a length, come of one another; so do powers; see `scales_of`.
     """
-    length = scales_of(run).length
+    scales = scales_of(run)
     names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
     units, turning = np.ones(len(names)), [run.system.turns(name) for name in run.system.mechanism.drivers]
-    units[names == "reaction_moment"] = length
+    units[names == "reaction_moment"] = scales.length
     for name in ("drive_effort", "drive_effort_change"):
-        units[names == name] = np.where(turning, length, 1.0)[: np.count_nonzero(names == name)]
+        units[names == name] = np.where(turning, scales.length, 1.0)[: np.count_nonzero(names == name)]
     forces, powers = np.isin(names, FORCES), np.isin(names, (*POWERS, SUPPOSED))
-    found = np.where(names == "joint_rotation_error", 1.0, length)
-    found[forces] = units[forces] * np.max(sizes[forces] / units[forces], initial=0.0)
-    found[powers] = np.max(sizes[powers], initial=0.0)
+    found = np.where(names == "joint_rotation_error", 1.0, scales.length)
+    found[forces] = units[forces] * np.max(sizes[forces] / units[forces], initial=scales.force)
+    found[powers] = np.max(sizes[powers], initial=scales.force * scales.length * scales.rate)
     return found

@@ -337,7 +337,7 @@ def _effort_figures(system: System, course: CycleCourse) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
         for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)):
-            top = course.top(lambda rows, i=i: rows["drive_effort"][i], sign, "drive_effort")  # type: ignore[misc]
+            top = course.top(lambda rows, i=i: rows["drive_effort"][i], sign, unit)  # type: ignore[misc]
             if top is not None:
                 yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, top.place)
         yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
@@ -355,7 +355,7 @@ def _friction_figures(
     if means.supposed > 0:
         off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
-    lost = course.top(lambda rows: np.sum(rows["friction_power"], axis=0), like="friction_power")
+    lost = course.top(lambda rows: np.sum(rows["friction_power"], axis=0), unit="W")
     if lost is not None:
         yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
 
@@ -381,7 +381,7 @@ def _reaction_figures(system: System, course: CycleCourse, scales: Scales) -> It
         for what, variable, unit in loads:
             top = course.top(
                 lambda rows, of=variable, i=i: np.sqrt(np.sum(rows[of][i] ** 2, axis=0)),  # type: ignore[misc]
-                like=variable,
+                unit=unit,
             )
             if top is None:
                 continue

@@ -1,34 +1,29 @@
 """Means over a cycle: of powers, of friction, of the squares of efforts, and the efficiency that follows from them.
 
-They are integrals between the places where the model switches (`switches`), so that they do not depend on how many
-positions were asked for, and each has the error of its integral. A mean that this error, or rounding, may have made is
+They are read of the course of the cycle (`course`), so that they do not depend on how many positions were asked for,
+and each has the error of its integral. A mean that this error, or rounding, may have made is
 0: power that a load gives and takes back.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.quadrature import CANCELLED, Effort, integrals
+from trunnion.algebra.quadrature import CANCELLED
 from trunnion.errors import Status
-from trunnion.solve.switches import Mechanisms, edges
 
-__all__ = ["AVERAGED", "MOST_SUPPOSED", "SUPPOSED", "Mean", "Means", "Powers", "means_of", "still", "unknown"]
+__all__ = ["AVERAGED", "MOST_SUPPOSED", "RESIDUALS", "SUPPOSED", "Mean", "Means", "still", "unknown"]
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
-Powers = Callable[[Rows, Array], Mapping[str, Array]]
-
-# what `Powers` has of each lane and node, NaN where there is no answer
+# what means are made of, NaN where there is no answer
 AVERAGED = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual")
-SUPPOSED = "supposed_power"  # and may have, W: by how much that through the drivers differs from what stands in for it
+SUPPOSED = "supposed_power"  # W: by how much that through the drivers differs from what stands in for it
 MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
-NEGLIGIBLE = 1e-9  # of the largest power: what is below it need not be known to many digits
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
 
 
@@ -88,46 +83,6 @@ class Means:
     def efficiency_error(self) -> float:
         """The same, with the share of the drive work that is supposed where pins do not settle."""
         return self.integration_error + abs(self.efficiency) * self.supposed
-
-
-def means_of(
-    of: Mechanisms, powers: Powers, between: Sequence[Array] | None = None, effort: Effort | None = None
-) -> list[Means]:
-    """The means of every mechanism over its cycle.
-
-    powers: what `AVERAGED` names, (…, lane, node), at the times (lane, node), s, of one mechanism a lane. between:
-    times in rising order that the integrals are parted at, those of `switches` if not given.
-    """
-    drivers = len(of.system.mechanism.drivers)
-
-    def functions(rows: Rows, time: Array) -> Array:
-        found = powers(rows, time)
-        driven, lost = np.sum(found["drive_power"], axis=0), found["friction_power"]
-        known = [driven, found["useful_power"], np.sum(lost, axis=0), np.abs(found["power_residual"])]
-        whole = np.abs(driven)
-        both = [whole, found.get(SUPPOSED, np.zeros_like(whole))]
-        return np.concatenate([np.stack(known), found["drive_effort"] ** 2, lost, np.stack(both)])
-
-    def floor(sizes: Array) -> Array:
-        """Powers that are nothing beside the others; how even the residual is does not matter."""
-        least = np.empty_like(sizes)
-        least[:] = NEGLIGIBLE * np.max(sizes[:3], axis=0)
-        least[3] = np.inf
-        least[4 : 4 + drivers] = NEGLIGIBLE * np.max(sizes[4 : 4 + drivers], axis=0, initial=0.0)
-        least[-2:] = np.inf
-        return least
-
-    between = edges(of) if between is None else between
-    found = integrals(functions, between, floor, effort)
-    told = []
-    for k, times in enumerate(between):
-        value, error, size = (part[:, k] / (times[-1] - times[0]) for part in (found.value, found.error, found.size))
-        rounding = np.maximum(CANCELLED * size, RESIDUALS * value[3])
-        rounding[2] = max(rounding[2], CANCELLED * np.max(size[:3]))
-        driven, useful, lost = (Mean(*(float(one[i]) for one in (value, error, size, rounding))) for i in range(3))
-        efforts, share = np.sqrt(value[4 : 4 + drivers]), float(value[-1] / value[-2]) if value[-2] > 0 else 0.0
-        told.append(Means(driven, useful, lost, value[4 + drivers : -2], efforts, share))
-    return told
 
 
 def unknown(means: Means) -> Means:

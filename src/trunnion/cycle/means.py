@@ -1,7 +1,7 @@
 """Means over a cycle: of powers, of friction, of the squares of efforts, and the efficiency that follows from them.
 
-They are integrals between the places where the model switches (`switches`), so that they do not depend on how many
-positions were asked for, and each has the error of its integral. A mean that this error, or rounding, may have made is
+They are read of the course of the cycle (`course`), so that they do not depend on how many positions were asked for,
+and each has the error of its integral. A mean that this error, or rounding, may have made is
 0: power that a load gives and takes back.
 """
 
@@ -22,16 +22,9 @@ from trunnion.solve.loads import has_useful_work
 __all__ = ["IDEAL", "MOST_SUPPOSED", "RESIDUALS", "SUPPOSED", "Mean", "Means", "still", "unknown"]
 
 Array = NDArray[np.float64]
-
-IDEAL = (
-    "drive_power",
-    "useful_power",
-    "friction_power",
-    "drive_effort",
-    "power_residual",
-    "status",
-)  # what the means of the ideal mechanism are made of
-SUPPOSED = "supposed_power"  # and may have, W: by how much that through the drivers differs from what stands in for it
+# what the means of the ideal mechanism are made of
+IDEAL = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual", "status")
+SUPPOSED = "supposed_power"  # W: by how much that through the drivers differs from what stands in for it
 MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
 

@@ -269,13 +269,10 @@ class Locking:
         joint = min(sound, key=sound.__getitem__, default="")
         return (joint, sound[joint]) if joint else None
 
-    def figures(self, run: Run) -> list[Figure]:
-        """The joint that decides, at the least margin."""
+    def figures(self, run: Run, place: str) -> list[Figure]:
+        """The joint that decides, at the place of the least margin."""
         decides = self.responsible()
-        if decides is None or self.first is None:
-            return []
-        dial = run.system.dial(run.values, np.array([self.first, run.cycle.duration]))
-        return [critical_figure(run, *decides, f"at {dial.at(0)}")]
+        return [] if decides is None else [critical_figure(run, *decides, place)]
 
 
 def look(

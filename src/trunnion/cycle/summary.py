@@ -348,8 +348,9 @@ def _friction_figures(
 ) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
     if found.method.margin_up_to:
-        yield _least_margin(run, found.method)
-    yield from near.figures(run) if near else ()
+        margin = _least_margin(run, found.method)
+        yield margin
+        yield from near.figures(run, margin.place) if near else ()
     means = course.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
     if means.supposed > 0:

@@ -156,7 +156,6 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
-        "stopped": int(outcome.stopped),
         "summary": figure_rows(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
         "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],

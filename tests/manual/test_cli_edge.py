@@ -193,3 +193,29 @@ def test_a_figure_of_an_analysis_is_pointed_to_the_verb_that_draws_it(program: R
     assert code == 2
     assert f"trunnion plot {model} --out x.png" in " ".join(err.split())
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds"),
+    [
+        (["simulate", "flywheel-press.yaml", "--time", "100000s"], 4.0),
+        pytest.param(["tolerance", "toleranced-rssr.yaml", "--samples", "10000000", "--jobs", "1"], 5.0,
+                     marks=pytest.mark.slow),
+        pytest.param(["sweep", "rssr.yaml", "--over", "a=20mm:30mm:1000", "--margin"], 3.0, marks=pytest.mark.slow),
+        pytest.param(["locking", "rssr.yaml", "--steps", "100000"], 3.0, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_ctrl_c_leaves_the_files_of_before(words: list[str], seconds: float, tmp_path: Path) -> None:
+    """One rule for every verb: a part of a result replaces nothing, and the exit status is 130."""
+    old = tmp_path / "r.csv"
+    old.write_text("of before\n")
+    verb, model, *more = words
+    command = [sys.executable, "-m", "trunnion", verb, str(EXAMPLES / model), *more, "--out", str(old)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err.startswith("stopped")
+    assert list(tmp_path.iterdir()) == [old]
+    assert old.read_text() == "of before\n"

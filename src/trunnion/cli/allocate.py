@@ -30,7 +30,6 @@ from trunnion.cli.options import (
 from trunnion.cli.result import Shown, check_files, check_model, show_tables
 from trunnion.cli.terminal import bar, console
 from trunnion.cli.tolerance import SECTIONS as OF_TOLERANCES
-from trunnion.cli.tolerance import STOPPED
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.results.attributes import findings_of
 
@@ -127,7 +126,7 @@ def allocate(
         lost = _write_model(mechanism, result, file, write, force, bool(exit_status(findings)))
         findings += lost
         shown.written += [] if lost else [write]
-    shown.end(_named(findings, mechanism), STOPPED if result.attrs["stopped"] else None)
+    shown.end(_named(findings, mechanism))
 
 
 def _criterion(stated: Criterion | None, target: float | None) -> Criterion:
@@ -144,11 +143,10 @@ def _write_model(
     """Write the model with what was found, or say why it is not written."""
     from trunnion.model.rewrite import rewrite_mechanism
 
-    if result.attrs["found"] and not result.attrs["stopped"] and not failed:
+    if result.attrs["found"] and not failed:
         rewrite_mechanism(_bought(mechanism, result), file, write, force)
         return []
     why = "the tolerances found do not meet the limits" if result.attrs["found"] else "there is no allocation"
-    why = "stopped before the tolerances were verified" if result.attrs["stopped"] else why
     return [Finding(f"'{write}' is not written: {why}", "--write", "", Severity.ERROR)]
 
 

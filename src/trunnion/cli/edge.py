@@ -2,6 +2,9 @@
 
 0 fine, 1 findings, 2 bad input, 3 a fault of the program itself, 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
 Only `--debug` shows where a fault of the program arose.
+
+Ctrl-C ends every verb alike: no result of a part of the work is shown or written, and files of before stay. Samples
+that are kept in a checkpoint are told.
 """
 
 from __future__ import annotations
@@ -43,7 +46,7 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
     except SystemExit as stop:  # typer's own end, of a usage error or of Ctrl-C too
         code = stop.code
         if code == STOPPED:
-            _say("stopped; a file named above as written is whole, no other was begun")
+            _say(f"stopped; a file named above as written is whole, no other was begun{_kept(stop)}")
         elif interrupt.number:
             _say("stopped")
     except MechanismError as error:
@@ -59,6 +62,13 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
                 traceback.print_exc()
             code = _unforeseen(error)
     return int(code or 0)
+
+
+def _kept(stop: BaseException | None) -> str:
+    """What a run that was stopped says of its work, see `studies.tolerance`."""
+    while stop is not None and not (isinstance(stop, KeyboardInterrupt) and stop.args):
+        stop = stop.__context__
+    return f"; {stop.args[0]}" if stop is not None else ""
 
 
 def _unforeseen(error: BaseException) -> int:

@@ -25,7 +25,8 @@ from trunnion.cli.terminal import bar, say
 
 __all__ = ["simulate"]
 
-MILLISECOND = 1000.0
+PERCENT = 100
+EVALUATIONS = 1_000_000  # as `simulate` has it
 
 Kind = Annotated[
     str | None,
@@ -60,6 +61,13 @@ def simulate(
         bool,
         typer.Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle."),
     ] = False,
+    evaluations: Annotated[
+        int, typer.Option("--evaluations", help="Evaluations of the forces, after which the motion ends.")
+    ] = EVALUATIONS,
+    pass_change_points: Annotated[
+        bool,
+        typer.Option("--pass-change-points", help="Go on by momentum where two assemblies of the links meet."),
+    ] = False,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -83,14 +91,12 @@ def simulate(
     mechanism = stated(file, set_, table, friction)
     if not in_play(mechanism):
         _check_without_play(out or [], of, kind)
-    with lines_of(file), bar("ms", None if duration is None else int(duration * MILLISECOND)) as progress:
-
-        def told(reached: float) -> None:
-            if progress:
-                progress(int(reached * MILLISECOND))
-
+    with lines_of(file), bar("%", PERCENT) as progress:
+        reached = None if progress is None else lambda share: progress(int(PERCENT * share))
         try:
-            result = simulated(mechanism, duration, steps, tolerance, told, step, steady)
+            result = simulated(
+                mechanism, duration, steps, tolerance, reached, step, steady, evaluations, pass_change_points
+            )
         except UnsteadyError as none:
             say(placed(none.findings, file, ["drivers"]))
             raise typer.Exit(exit_status(none.findings)) from None

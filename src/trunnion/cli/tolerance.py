@@ -32,9 +32,8 @@ from trunnion.results.attributes import summary_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["STOPPED", "shown_of", "tolerance"]
+__all__ = ["shown_of", "tolerance"]
 
-STOPPED = 130
 SECTIONS = ("measures", "joints", "tolerances")
 
 Methods = Annotated[
@@ -110,7 +109,7 @@ def tolerance(
             cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
         )  # fmt: skip
     shown = shown_of(result, mechanism.name, file, out or [], units_row, kind, report)
-    shown.finish(STOPPED if result.attrs["stopped"] else None)
+    shown.finish()
 
 
 def shown_of(

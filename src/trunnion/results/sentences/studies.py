@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from trunnion.errors import agreeing, counted
+from trunnion.errors import agreeing
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["STUDIES"]
@@ -307,11 +307,6 @@ TOLERANCE = {
         NOTE,
         "motions in time are integrated one by one, which is slower by far: {why}",
         "begin with few samples or points",
-    ),
-    "samples.stopped": Sentence(
-        WARNING,
-        lambda kept, done, samples: f"stopped before the end: {done:,} of {counted(samples, 'sample')}",
-        lambda kept, done, samples: "continue with --resume" if kept else "use --checkpoint FILE to keep what is done",
     ),
     "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}", quiet=True),
     "samples.machines": Sentence(

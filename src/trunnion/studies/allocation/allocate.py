@@ -335,8 +335,6 @@ class _Search:
                 asked.mechanism.with_tolerances(bought), asked.measures, ["monte-carlo"], asked.samples,
                 asked.seed + FRESH * stream, asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
             )  # fmt: skip
-            if sampled.attrs["stopped"]:  # a part of the samples decides no tolerances
-                raise KeyboardInterrupt
             share, low, high = (float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high"))
             return share, low, high
 

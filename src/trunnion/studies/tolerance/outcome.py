@@ -23,5 +23,4 @@ class Outcome:
     job: Sampling | None = None
     tally: SampleTally | None = None
     indices: Indices | None = None
-    stopped: bool = False
     target: float | None = None

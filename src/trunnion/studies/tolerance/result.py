@@ -157,7 +157,6 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
         "steps": found.steps,
-        "stopped": int(outcome.stopped),
         **scales_of(found.run).summary(summary(outcome, counted, units, dial)),
         "findings": finding_rows(stated),
         "missed": [f"{one.where}: {one.what}" for one in stated if one.code.startswith(MISSED)],

@@ -35,7 +35,7 @@ class Sampled:
 
 
 def sampled(job: Sampling, tally: SampleTally, study: ToleranceStudy) -> Sampled | None:
-    """All figures of a tally; None of one that was stopped before its first block."""
+    """All figures of a tally; None of an empty one."""
     count = len(job.measures)
     totals = [total for tree in tally.trees if (total := tree.total()) is not None]
     if not totals:

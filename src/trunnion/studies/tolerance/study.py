@@ -17,7 +17,6 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.tolerance import runner
 from trunnion.studies.tolerance.indices import indices
 from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
-from trunnion.studies.tolerance.sampling import SampleTally, Sampling
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,23 +77,29 @@ def tolerance(
     _check(methods, samples, seed, engine, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
-    job, tally, shares, stopped = None, None, None, False
+    job, tally, shares = None, None, None
     if (method := next((one for one in methods if one in SAMPLINGS), None)) is not None:
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         if jobs is None:
             jobs = 1 if job.samples * job.positions < FEW and cluster is None else None
-        ran = runner.run(
-            job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
-            threads=engine == "compiled",
-        )  # fmt: skip
-        tally, stopped = ran.tally, ran.stopped
-        notes += [*chosen, *ran.notes, *_stopped(ran, job, kept=checkpoint is not None)]
+        try:
+            ran = runner.run(
+                job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
+                threads=engine == "compiled",
+            )  # fmt: skip
+            if ran.stopped:
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            kept = (f"samples are in {checkpoint}: go on with --resume",) if checkpoint else ()
+            raise KeyboardInterrupt(*kept) from None
+        tally = ran.tally
+        notes += [*chosen, *ran.notes]
     if "sobol" in methods:
         own = found.sampling("quasi-monte-carlo", samples, seed, _engine(found, stated, samples, cluster=None)[0])
         own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
         shares = indices(found.sampler(own), samples, seed)
-    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, stopped, target), [*found.told, *notes])
+    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, target), [*found.told, *notes])
 
 
 def _known(methods: Sequence[str]) -> tuple[tuple[str, ...], list[Finding]]:
@@ -110,18 +115,6 @@ def _engine(found: ToleranceStudy, engine: str, samples: int, cluster: str | Non
     many = samples * len(found.plan.times)
     engine = "numpy" if cluster else engine_for(engine, found.kernel, found.run.values, many)
     return engine, [finding_for("samples.engine", "samples", engine=engine)] if engine != "numpy" else []
-
-
-def _stopped(ran: runner.JobRun[SampleTally], job: Sampling, kept: bool) -> list[Finding]:
-    """What to say of a run that was stopped. kept: whether its samples are in a file."""
-    if not ran.stopped:
-        return []
-    return [finding_for("samples.stopped", "samples", kept=kept, done=done_of(job, ran.tally), samples=job.samples)]
-
-
-def done_of(job: Sampling, tally: SampleTally) -> int:
-    """Samples in a tally."""
-    return int(sum(np.max(total.count) for tree in tally.trees if (total := tree.total()) is not None))
 
 
 def _check(methods: Sequence[str], samples: int, seed: int, engine: str, target: float | None) -> None:

@@ -118,7 +118,7 @@ def test_stopped_and_resumed(tmp_path: Path) -> None:
             pressed.append(samples)
             signal.raise_signal(signal.SIGINT)
 
-    with pytest.raises(KeyboardInterrupt, match=r"run\.npz: go on with --resume"):
+    with pytest.raises(KeyboardInterrupt, match=r"run\.npz: --resume continues"):
         trunnion.tolerance(mechanism(), samples=SAMPLES, steps=STEPS, seed=5, chunk=1, checkpoint=path, progress=stop)
     whole = trunnion.tolerance(mechanism(), samples=SAMPLES, steps=STEPS, seed=5, methods=("linear", "monte-carlo"))
     rest = trunnion.tolerance(

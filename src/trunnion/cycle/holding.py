@@ -57,8 +57,6 @@ def reverse_figure(run: Run) -> Figure | None:
         return Figure(name, subject, None, note=_beside(run))
     states = found & set(PUSHES)
     value, held = min(float(delivered / given), 1.0), states <= {LockingState.SELF_LOCKING}
-    if value <= 0 and not _by_friction(run):
-        return Figure(name, subject, value, note="held without friction")
     if value <= 0 and held:
         return Figure(name, subject, value, note="self-locking")
     if value <= 0:
@@ -87,14 +85,6 @@ def _reversed(run: Run) -> Courses:
 
     breaks = breaks_between(run.cycle, run.edges) if run.cycle.duration > 0 else np.array([0.0, 1.0])
     return Courses.of(look, breaks, lambda sizes: 0.0 * sizes + np.max(sizes), accuracy_of(run.cycle, Accuracy()))
-
-
-def _by_friction(run: Run) -> bool:
-    """Whether the loads would drive it backward somewhere without friction."""
-    time = run.cycle.times(SCANNED if run.cycle.duration > 0 else 1)
-    back = reverse(run, run.walk(time), FrictionMethod())
-    bare = reverse(run, run.walk(time), FrictionMethod(multiple=np.zeros(len(time))))
-    return bool(np.any(bare.delivered[pushed(back)] > 0))
 
 
 def _centred(run: Run) -> str:

@@ -386,11 +386,9 @@ def _reaction_figures(system: System, course: CycleCourse, scales: Scales) -> It
             )
             if top is None:
                 continue
-            key = f"{name}.{what.replace(' ', '_')}_max"
-            if top.value > scales.floor(unit):
+            if planar or top.value > scales.floor(unit):
+                key = f"{name}.{what.replace(' ', '_')}_max"
                 yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", top.place)
-            elif planar:  # rounding has no place
-                yield Figure(key, f"{what} of {name}", 0.0, unit, "maximum")
         if PAIRS[kind].guided:
             ends = [
                 course.extreme(lambda rows, i=i: rows["joint_slide"][i], sign, course.valid)  # type: ignore[misc]

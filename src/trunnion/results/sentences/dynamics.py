@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+from math import isfinite
 
 from trunnion.results.quantities import readable
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
@@ -12,10 +12,10 @@ __all__ = ["DYNAMICS"]
 
 def _exhausted(time: float, count: int, of: float, constant: float, causes: list[str]) -> str:
     ends = f"{count:,} evaluations of the forces are used up at {readable(time, 's')} of {readable(of, 's')}: "
-    if not np.isfinite(constant):
+    if not isfinite(constant):
         return f"{ends}the motion ends there"
     why = f", by {' and '.join(causes)}" if causes else ""
-    share = f"{of / constant:.3g} of which are in the time that is asked for"
+    share = f"{of / constant:.3g} of which fit into the stated time"
     return f"{ends}the motion ends there. Its shortest time constant is {readable(constant, 's')}{why}, {share}"
 
 
@@ -122,8 +122,8 @@ DYNAMICS: dict[str, Sentence] = {
         ERROR,
         "at {time:~s}, at {coordinate:~{unit}} of {driver}, the links {links} come to a change point, where two of "
         "their assembly modes coincide: neither reactions nor what follows are determined, and the motion ends there",
-        "change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake; or go on with the "
-        "velocities that the links have: --pass-change-points",
+        "change a length, or stop the motion before it by drivers.{driver}.range, a load or a brake; or pass it "
+        "with the velocities that the links have: --pass-change-points",
     ),
     "simulate.passed": Sentence(
         WARNING,

@@ -91,7 +91,7 @@ def tolerance(
             if ran.stopped:
                 raise KeyboardInterrupt
         except KeyboardInterrupt:
-            kept = (f"samples are in {checkpoint}: go on with --resume",) if checkpoint else ()
+            kept = (f"samples are in {checkpoint}: --resume continues from them",) if checkpoint else ()
             raise KeyboardInterrupt(*kept) from None
         tally = ran.tally
         notes += [*chosen, *ran.notes]

@@ -49,7 +49,7 @@ FOLLOWED = ("drive_effort", *POWERS, "reaction_force", "reaction_moment", "joint
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
 HELD = 16  # beside the status of panels in which accelerations leave out the travel of seats
 SIDE = 1e-7  # of the cycle: beside a break
-NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther
+NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther, and said to be there
 CLOSE = 1e-10  # of the cycle: breaks that are one
 
 
@@ -159,6 +159,8 @@ class CycleCourse:
         if place.everywhere and cycle.duration > 0:
             return "everywhere"
         time = 0.0 if place.everywhere else time
+        nearest = float(self.courses.breaks[np.argmin(np.abs(self.courses.breaks - time))])
+        time = nearest if abs(nearest - time) <= NEXT * self.courses.span else time
         if cycle.periodic and cycle.duration - time <= CLOSE * cycle.duration:
             time = 0.0
         return f"at {self.run.system.dial(self.run.values, np.array([time, cycle.duration])).at(0)}"

@@ -28,6 +28,7 @@ __all__ = ["holding_figures", "holding_multiples", "reverse_figure"]
 
 Array = NDArray[np.float64]
 LITTLE = 1e-3  # of what the useful loads give: what masses, other loads and springs may supply beside it
+BACK = Accuracy(1e-7, shortest=1e-8, rounds=14, most=32)  # beside a locked position each one takes long
 SCANNED = 360  # positions at which it is looked how much the loads give
 BACK_LOCKED = LockingState.LOCKED_BACKWARD, LockingState.JAMMED
 HELD = LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD
@@ -84,7 +85,7 @@ def _reversed(run: Run) -> Courses:
         return powers, states(ahead, other, known, least)
 
     breaks = breaks_between(run.cycle, run.edges) if run.cycle.duration > 0 else np.array([0.0, 1.0])
-    return Courses.of(look, breaks, lambda sizes: 0.0 * sizes + np.max(sizes), accuracy_of(run.cycle, Accuracy()))
+    return Courses.of(look, breaks, lambda sizes: 0.0 * sizes + np.max(sizes), accuracy_of(run.cycle, BACK))
 
 
 def _centred(run: Run) -> str:

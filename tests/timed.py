@@ -141,3 +141,65 @@ def mass_on_a_belt() -> Mechanism:
         },
         springs={"hold": {"between": ["ground.F", "mass.S"], "stiffness": 100, "free_length": 1}},
     )
+
+
+TORQUE = {"kind": "constant", "effort": 2.0}
+
+
+def in_space(place: list[float]) -> dict[str, Any]:
+    return {"at": [*place, 0], "axis": [0, 0, 1]}
+
+
+def driven_four_bar(space: str, sides: tuple[float, float, float, float], at: list[float], **driver: Any) -> Mechanism:
+    """Crank, coupler, rocker and ground; in space with a ball and a cylinder. Bodies without gravity."""
+    a, b, c, d = sides
+    flat = space == "planar"
+
+    def link(length: float, first: str, last: str) -> dict[str, Any]:
+        inertia: Any = 0.01 if flat else {"xx": 0.01, "yy": 0.01, "zz": 0.01}
+        points = {first: [0, 0], last: [length, 0]}
+        centre = [length / 2, 0] if flat else [length / 2, 0, 0]
+        return {"points": points if flat else {key: in_space(place) for key, place in points.items()},
+                "mass": 1.0, "centre": centre, "inertia": inertia}  # fmt: skip
+
+    begin: dict[str, Any] = {"initial": {"coordinate": 1.0}} if "range" in driver else {"start": 1.0}
+    ground = {"A": [0, 0], "D": [d, 0]}
+    kinds = ["revolute"] * 4 if flat else ["revolute", "spherical", "cylindrical", "revolute"]
+    ends = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["ground", "rocker"]}
+    return Mechanism(
+        space=space,
+        gravity=[0, 0] if flat else [0, 0, 0],
+        links={
+            "ground": {"points": ground if flat else {key: in_space(place) for key, place in ground.items()}},
+            "crank": link(a, "A", "B"), "coupler": link(b, "B", "C"), "rocker": link(c, "D", "C"),
+        },
+        joints={name: {"type": kind, "links": links} for kind, (name, links) in zip(kinds, ends.items(), strict=True)},
+        drivers={"A": {"speed": 1, "motor": TORQUE, **begin, **driver}},
+        assembly={"C": at if flat else [*at, 0]},
+    )  # fmt: skip
+
+
+PARALLELOGRAM = (0.3, 1.0, 0.3, 1.0), [1.16, 0.25]
+ANTIPARALLELOGRAM = (0.3, 1.0, 0.3, 1.0), [0.9, -0.28]
+DELTOID = (0.4, 1.0, 1.0, 0.4), [0.9, 0.8]
+# both cranks about their pins, 0.01 + 0.15², and the coupler on a circle
+INERTIA = 2 * (0.01 + 0.15**2) + 0.3**2
+
+
+def beside(mechanism: Mechanism) -> Mechanism:
+    """The same beside a wheel of its own that is free, too."""
+    data = mechanism.data()
+    flat = mechanism.space == "planar"
+    data["links"]["ground"]["points"]["W"] = [5, 5] if flat else in_space([5, 5])
+    data["links"]["disc"] = {"points": {"W": [0, 0] if flat else in_space([0, 0])},
+                             "inertia": 0.05 if flat else {"xx": 0.1, "yy": 0.1, "zz": 0.1}}  # fmt: skip
+    data["joints"]["W"] = {"type": "revolute", "links": ["ground", "disc"]}
+    data["drivers"]["W"] = {"speed": 1, "free": True, "initial": {"speed": 3}}
+    return Mechanism(**data)
+
+
+def swinging(space: str, **spring: float) -> Mechanism:
+    """A parallelogram at whose crank a spring or damper acts."""
+    data = driven_four_bar(space, *PARALLELOGRAM, range=[0.2, 3.0], motor={"kind": "constant", "effort": 0.1}).data()
+    data["springs"] = {"stop": {"joint": "A", **({"free_angle": 1.0} if "stiffness" in spring else {}), **spring}}
+    return Mechanism(**data)

@@ -9,7 +9,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from manual.conftest import Run
-from timed import LINEAR, two_wheels
+from timed import LINEAR, PARALLELOGRAM, beside, driven_four_bar, swinging, two_wheels
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PRESS = EXAMPLES / "flywheel-press.yaml"
@@ -81,3 +81,25 @@ def test_a_clutch_beside_joints_in_play_is_refused_with_what_to_remove(program: 
     code, _, err = program("simulate", "played.yaml", "--time=1ms")
     assert code == 2
     assert "remove it, or the contact of the joints in play" in err
+
+
+def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path) -> None:
+    for name, mechanism in {
+        "p": driven_four_bar("planar", *PARALLELOGRAM), "s": swinging("planar", stiffness=1e12),
+        "w": beside(driven_four_bar("planar", *PARALLELOGRAM, range=[0.2, 2.0])),
+    }.items():  # fmt: skip
+        (tmp_path / f"{name}.json").write_text(json.dumps(mechanism.data()))
+    code, _, err = program("simulate", "p.json", "--time=1s")
+    assert code == 1
+    assert "at 180° of A, the links coupler, rocker come to a change point" in err
+    code, _, err = program("simulate", "p.json", "--time=0.7s", "--pass-change-points")
+    assert code == 0
+    assert "change points are passed" in err
+    code, _, err = program("simulate", "s.json", "--time=1s", "--evaluations", 1000, "--out", "s.csv")
+    assert code == 1
+    assert "1,000 evaluations of the forces are used up at" in err
+    assert "springs.stop.stiffness = 1e+12" in err
+    assert (tmp_path / "s.csv").read_text().splitlines()[-1].count(",") > 10
+    code, _, err = program("simulate", "w.json", "--time=1s")
+    assert code == 0
+    assert "A reaches 114.6°, the end of its stated range" in err

@@ -38,7 +38,8 @@ __all__ = ["MOST_EVALUATIONS", "Integration"]
 Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
-MOST_EVALUATIONS = 1_000_000  # of the accelerations, if not stated otherwise
+MOST_EVALUATIONS = 500_000  # of the forces, if not stated otherwise
+WALK = 25  # evaluations by tables or machine code that take about as long as a walk through the modules
 CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
@@ -68,7 +69,7 @@ class Integration:
     bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
     limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
     reached; inside: share of the coordinate by which forces are asked for on this side of a bend; times: s, at which a
-    load jumps or bends; evaluations: of the accelerations, at most; meetings: see `Places`.
+    load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK; meetings: see `Places`.
     """
 
     motion: FreeMotion
@@ -96,6 +97,7 @@ class Integration:
         self.rest = Rest(self.motion, self.layout) if self.sticks else None
         self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         margins = getattr(self.dynamics, "margins", Walks(self.motion).margins)
+        self._walked = self.motion.walked[0]
         self.guards = Guards(self.motion, self.layout, self.limits, margins)
 
     @property
@@ -184,7 +186,8 @@ class Integration:
             self._note(self.guards.passed.pop(), "change-point")
         if self.progress:
             self.progress(min(1.0, stretch.end / self.duration))
-        if ended is None and self.solution.asked > self.evaluations:
+        spent = self.solution.asked + WALK * (self.motion.walked[0] - self._walked)
+        if ended is None and spent > self.evaluations:
             ended = self._exhausted(stretch)
         if ended is not None:
             self.solution.ended = ended

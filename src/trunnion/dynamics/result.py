@@ -183,7 +183,9 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residua
             i = motion.names.index(name)
             coordinates[row], rates[row] = books.at.q[i], books.at.rate[i]
         else:
-            coordinates[row], rates[row], _ = system.drive(motion.values, name, books.time)
+            over = ~np.isfinite(books.works[0])  # there is no motion any more
+            moved = system.drive(motion.values, name, books.time)[:2]
+            coordinates[row], rates[row] = (np.where(over, np.nan, part) for part in moved)
     return {
         "drive_coordinate": coordinates,
         "drive_rate": rates,

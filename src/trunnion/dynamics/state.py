@@ -85,7 +85,7 @@ class FreeMotion:
     """A mechanism with free drivers, ready to be asked for its accelerations.
 
     run: prepared for the nominal cycle; drives: what drives the free coordinates, by name; assembly: of every module;
-    passing: whether it goes on through change points, where it can.
+    passing: whether it goes on through change points, where it can; walked: how often forces were asked for by a walk.
     """
 
     run: Run
@@ -94,6 +94,7 @@ class FreeMotion:
     method: FrictionMethod = field(default_factory=FrictionMethod)
     contacts: Contacts = field(default_factory=Contacts)
     passing: bool = False
+    walked: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
 
     @classmethod
     def of(cls, run: Run, contacts: Contacts | None = None, passing: bool = False) -> Self:
@@ -198,6 +199,7 @@ class FreeMotion:
     ) -> Backward:
         """Motion and forces. zero_slip, sliding: see `backward.Given`; of one coordinate what begins to move in its
         sense."""
+        self.walked[0] += 1
         given = Given(
             self.beginning(at) if zero_slip is None else zero_slip,
             dict(zip(self.bristles, at.bristles, strict=True)),

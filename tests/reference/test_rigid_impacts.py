@@ -282,7 +282,7 @@ def test_a_rod_in_two_guides_keeps_its_account() -> None:
 def test_impacts_that_accumulate_on_two_guides_at_once_come_to_rest() -> None:
     """A contact that another lets go lower than rounding stays closed, and one that is a rounding below its wall as the
     other strikes does not strike again."""
-    found = simulate(trammel(2e-5, 0.1), 0.3, 30)
+    found = simulate(trammel(2e-5, 0.1), 0.29, 30)  # at 0.2917 s it reaches the end of its range
     assert codes(found) == []
     assert balanced(found)
 

@@ -61,7 +61,8 @@ class Guards:
         n = self.layout.coordinates
         for k, name in self._limited:
             times = np.linspace(stretch.begin, stretch.end, LOOKS + 1)
-            turns = np.flatnonzero(np.diff(np.sign(stretch.state(times)[n + k])))
+            rates = stretch.state(times)[n + k]
+            turns = np.flatnonzero(rates[1:] * rates[:-1] < 0.0)  # not where the motion has ended: NaN
             times = np.unique([*times, *(_root(stretch, n + k, 0.0, times[i], times[i + 1]) for i in turns)])
             places = stretch.state(times)[k]
             for level, outward in zip(self.limits[name], (-1.0, 1.0), strict=True):

@@ -15,9 +15,9 @@ import trunnion
 from measured import references
 from mechanisms_parts import Data
 from toleranced import alone, sampler, varied
+from trunnion.measures.evaluation import NumpyKernel, sharpened
 from trunnion.measures.figures import figure
 from trunnion.measures.measures import coordinate_unit
-from trunnion.measures.over_cycle import figures_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.run import Run, prepare
@@ -111,7 +111,9 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
             known = nominal[measure.name]
             scale = max(abs(own), abs(known.figure), *(np.max(np.abs(part), initial=0.0) for part in known.parts))
             if found.references[measure.name].corner and measure.rule not in EXTREMES:  # a mean of what jumps
-                own = figures_of(run, [measure], FrictionMethod())[measure.name]
+                places, alike = references(run, [measure], STEPS)
+                kernel = NumpyKernel(run, [measure], FrictionMethod())
+                own = sharpened(alike[measure.name], kernel, places, run.values).figure
                 assert figures[k, i] == pytest.approx(own, rel=0, abs=1e-6 * scale, nan_ok=True), measure.name
                 continue
             if found.references[measure.name].corner:

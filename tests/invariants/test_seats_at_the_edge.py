@@ -81,10 +81,9 @@ def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None
     valid = result["status"].values != 3
     slide = result["joint_slide"].sel(joint="S").values
     figures = {one.name: one for one in result.trunnion.summary}
-    note = f"of {np.count_nonzero(valid)} of 360 positions"
-    assert note == "of 219 of 360 positions"
-    assert figures["S.stroke"].value == pytest.approx(np.ptp(slide[valid]))
-    assert {figures[name].note for name in ("S.stroke", "course.min", "course.max")} == {note}
+    share = np.count_nonzero(~valid) / 360
+    assert figures["S.stroke"].note == f"without {share:.2g} of the cycle"
+    assert figures["S.stroke"].value == pytest.approx(figures["stroke"].value, rel=1e-4)
     assert figures["course.max"].value == pytest.approx(np.max(slide[valid]))
     for name, pick in (("minimum", np.min), ("maximum", np.max)):
         assert figures[name].value == pytest.approx(pick(slide[valid]), rel=1e-5)  # valid, next to the stretch

@@ -85,8 +85,10 @@ def test_figures_say_which_positions_they_are_of_where_contact_is_lost() -> None
     assert figures["S.stroke"].note == f"without {share:.2g} of the cycle"
     assert figures["S.stroke"].value == pytest.approx(figures["stroke"].value, rel=1e-4)
     assert figures["course.max"].value == pytest.approx(np.max(slide[valid]))
+    dense = analyse(Mechanism(**data), steps=20_000)
+    slide = dense["joint_slide"].sel(joint="S").values[dense["status"].values != 3]
     for name, pick in (("minimum", np.min), ("maximum", np.max)):
-        assert figures[name].value == pytest.approx(pick(slide[valid]), rel=1e-5)  # valid, next to the stretch
+        assert figures[name].value == pytest.approx(pick(slide), rel=1e-5)  # valid, next to the stretch
     found = {one.where: one for one in result.trunnion.findings if one.code == "measure.contact_lost"}
     for name in ("low", "swing", "there"):
         assert figures[name].value is None

@@ -59,7 +59,7 @@ def swept(names, law=None, status=None, ideal=False, name="Cardan joint", margin
         given |= described({key: values}, {key: one.over(*names)}, UNITS)
     attributes = {
         "name": name, "swept": json.dumps(list(names), ensure_ascii=False),
-        "findings": "[]", "steps": 36,
+        "scale_of_length": 1.0, "scale_of_rate": 1.0, "scale_of_force": 1.0, "findings": "[]", "steps": 36,
     }  # fmt: skip
     empty = xr.Dataset({}, {**{dim: (dim, np.array(one)) for dim, one in labels.items()}, **coordinates}, attributes)
     return with_variables(empty, given)

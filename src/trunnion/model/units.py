@@ -144,6 +144,8 @@ def _registry() -> pint.UnitRegistry[Fraction]:
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as pint has it
 _M, _RAD, _S = {"meter": Fraction(1)}, {"radian": Fraction(1)}, {"second": Fraction(1)}
 _NEWTON = {"gram": Fraction(1), "meter": Fraction(1), "second": Fraction(-2)}
+_JOULE = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-2)}
+_WATT = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3)}
 _PASCAL = {"gram": Fraction(1), "meter": Fraction(-1), "second": Fraction(-2)}
 _VOLT = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
 # of the units in most models: name and root as pint has them, factor to SI; a test holds them against pint
@@ -164,6 +166,9 @@ _COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
     "N": ("newton", Fraction(1), _NEWTON),
     "mN": ("millinewton", Fraction(1, 1000), _NEWTON),
     "kN": ("kilonewton", Fraction(1000), _NEWTON),
+    "W": ("watt", Fraction(1), _WATT),
+    "J": ("joule", Fraction(1), _JOULE),
+    "Pa": ("pascal", Fraction(1), _PASCAL),
     "MPa": ("megapascal", Fraction(10**6), _PASCAL),
     "GPa": ("gigapascal", Fraction(10**9), _PASCAL),
     "bar": ("bar", Fraction(10**5), _PASCAL),

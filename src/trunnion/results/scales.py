@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -55,16 +56,11 @@ class Scales(NamedTuple):
         float
             In that unit; NaN, which nothing is below, of what is no unit of mechanics.
         """
-        try:
-            factor, (length, mass, time, _) = unit_named("deg" if unit == "°" else unit or "1")
-        except UnitError:
-            return float("nan")
-        # a mass is a force over an acceleration, length times rate²
-        powers = (float(length - mass), float(-time - 2 * mass), float(mass))
+        powers, factor = _powers(unit)
         if any(size == 0 and power < 0 for size, power in zip(self, powers, strict=True)):
             return 0.0
         size: float = math.prod(size**power for size, power in zip(self, powers, strict=True))
-        return ROUNDING * size / float(factor)
+        return ROUNDING * size / factor
 
     def zeroed(self, values: Array, unit: str) -> Array:
         """The values in a unit, 0 where they are rounding."""
@@ -78,11 +74,24 @@ class Scales(NamedTuple):
     def of_figures(self, figures: Iterable[Figure]) -> list[Figure]:
         """Figures, 0 where they are rounding, but for those that tell of the solution."""
         return [
-            replace(one, value=float(self.zeroed(np.array(one.value), one.unit)))
-            if isinstance(one.value, float) and not one.numerical
+            replace(one, value=0.0)
+            if isinstance(one.value, float) and not one.numerical and abs(one.value) <= self.floor(one.unit)
             else one
             for one in figures
         ]
+
+
+@cache
+def _powers(unit: str) -> tuple[tuple[float, float, float], float]:
+    """The powers of length, rate and force in a unit, and its factor to SI; NaN of what is no unit of mechanics."""
+    if unit in ("", "1"):  # without the package that reads units
+        return (0.0, 0.0, 0.0), 1.0
+    try:
+        factor, (length, mass, time, _) = unit_named("deg" if unit == "°" else unit)
+    except UnitError:
+        return (0.0, 0.0, 0.0), math.nan
+    # a mass is a force over an acceleration, length times rate²
+    return (float(length - mass), float(-time - 2 * mass), float(mass)), float(factor)
 
 
 def extreme_place(course: Array, place: str, floor: float = ROUNDING) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from trunnion.results.scales import without_noise
 from trunnion.views.sweep import curves as sweep_curves
 from trunnion.views.sweep import map as sweep_map
 from trunnion.views.sweep.panels import board, field
@@ -29,6 +30,7 @@ def figure(
     Raises MechanismError for names that are not swept, and for a map of fewer than two names that vary.
     """
     check_kind(kind)
+    result = without_noise(result)
     told = field(result, measure, x, family)
     plan = told.plan
     mapped = kind == "map"

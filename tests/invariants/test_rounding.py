@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import trunnion
-from mechanisms import inverted_slider_crank, model, slider_crank, transformed
+from mechanisms import build, inverted_slider_crank, model, slider_crank, transformed
 from mechanisms_space import rssr
 from trunnion import Mechanism
 from trunnion.results.quantities import parts
@@ -198,3 +198,44 @@ def test_an_unloaded_mechanism_has_no_floor_of_forces_and_a_bare_dataset_none() 
     assert extreme_place(np.array([np.nan, 2.0, 2.0]), "at 4°") == "everywhere"
     assert extreme_place(np.array([2.0]), "at 4°") == "at 4°"
     assert extreme_place(np.array([2.0, np.inf]), "at 4°") == "at 4°"
+
+
+def test_a_dead_centre_does_not_make_the_rest_rounding() -> None:
+    """Forces and rates have no bound there, so they are no scale of what friction takes elsewhere."""
+    data = {
+        "space": "planar",
+        "links": {
+            "frame": {"points": {"O": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+            "crank": {"points": {"O": [0, 0], "P": [0.1, 0]}},
+            "rod": {"points": {"P": [0, 0], "Q": [0.1, 0]}},
+            "piston": {"points": {"Q": [0, 0], "S": {"at": [0, 0], "axis": [1, 0]}}},
+        },
+        "joints": {
+            "O": {"type": "revolute", "links": ["frame", "crank"]},
+            "P": {"type": "revolute", "links": ["crank", "rod"]},
+            "Q": {"type": "revolute", "links": ["rod", "piston"]},
+            "S": {"type": "prismatic", "links": ["frame", "piston"], "guide": {"length": 0.03}},
+        },
+        "joint_defaults": {"friction": 1e-4, "pin": {"radius": 0.006}},
+        "loads": {"t": {"joint": "O", "resisting_torque": 10.0, "useful": True}},
+        "assembly": {"P": [0.05, 0.086]},
+    }
+    means = []
+    for gap in (1e-9, 1e-6):  # of the end of the stroke from the dead centre, m
+        drivers = {"S": {"speed": 0.01, "range": [0.1, 0.2 - gap]}}
+        result = trunnion.analyse(Mechanism.model_validate({**data, "drivers": drivers}), steps=100)
+        means.append({one.name: one.value for one in result.trunnion.summary}["friction_power_mean"])
+    assert 0 < means[1] <= means[0]
+    assert means[0] == pytest.approx(means[1], rel=0.5)
+
+
+def test_what_does_nothing_is_no_scale() -> None:
+    """A load on the ground and a point at which nothing acts leave all figures as they are."""
+    data = model(slider_crank(offset=0.0), friction=0.1)
+    plain = trunnion.analyse(build(data), steps=24)
+    more = copy.deepcopy(data)
+    more.setdefault("loads", {})["huge"] = {"link": "ground", "at": "A", "force": [1e15, 0.0]}
+    changed = trunnion.analyse(build(more), steps=24)
+    values = [[one.value for one in result.trunnion.summary if not one.numerical] for result in (plain, changed)]
+    assert values[0] == values[1]
+    assert any(values[0])

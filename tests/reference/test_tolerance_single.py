@@ -19,6 +19,7 @@ from trunnion.measures.evaluation import figures_of
 from trunnion.measures.figures import figure
 from trunnion.measures.measures import coordinate_unit
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.loads import has_useful_work
 from trunnion.solve.run import Run, prepare
 from trunnion.statistics.streams import uniforms
 from trunnion.studies.tolerance.first_order import study
@@ -75,7 +76,8 @@ def measures_of(run: Run) -> list[str]:
     sliding = [name for name, (kind, _) in joints.items() if kind in ("prismatic", "cylindrical")]
     link, point = [one for one in run.system.points if one[0] != mechanism.fixed_link][-1]
     found = [f"{statistic}:effort:{driver}" for statistic in ("maximum", "minimum", "rms", "mean", "largest")]
-    found += ["efficiency:cycle", f"effort:{driver}", f"path_error:{link}.{point}", f"straightness:{link}.{point}"]
+    found += ["efficiency:cycle"] * has_useful_work(mechanism)
+    found += [f"effort:{driver}", f"path_error:{link}.{point}", f"straightness:{link}.{point}"]
     found += [f"rms:path_error:{link}.{point}", f"{link}.{point}.x", f"maximum:{link}.{point}.y"]
     for joint in turning[-1:] + sliding[:1]:
         found += [f"transmission_error:{joint}", f"peak-to-peak:transmission_error:{joint}", f"stroke:{joint}"]

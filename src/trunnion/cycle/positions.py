@@ -38,7 +38,7 @@ COARSE, FINER = 1e-3, Effort(1e-5, 6)  # of the efficiency: its error that asks 
 
 
 def check_steps(steps: int) -> None:
-    if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
         remedy = f"give a whole number from 1 to {MOST_STEPS:,}, for all positions are held in memory"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
 

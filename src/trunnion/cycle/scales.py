@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import fill_chunk
+from trunnion.errors import Status
 from trunnion.results import variables as results
 from trunnion.results.scales import Scales
 from trunnion.solve.run import Run
@@ -36,36 +37,47 @@ def _looked(run: Run) -> Mapping[str, NDArray[np.float64]]:
 def largest(run: Run, arrays: Mapping[str, NDArray[np.float64]]) -> Scales:
     """The scales of some positions.
 
+    Positions near a dead centre count only if there are no others: their forces and rates have no bound. Of points
+    those of the joints count, and of stated forces those on links that move: nothing else is in what is solved.
+
     Parameters
     ----------
     run
-        Of the mechanism: its stated lengths, loads and weights count too, for they may cancel at every position.
+        Of the mechanism: its loads and weights count too, for they may cancel at every position.
     arrays
         Over the positions, by the names of `results.variables`.
     """
-    system, stated = run.system, _stated(run)
-    size = float(np.max(primal(system.size(run.values))))
-    length = max(size, *stated["m"], peak(arrays["point_position"]), peak(arrays["joint_slide"]))
-    speed = max(peak(arrays["joint_slide_velocity"]), peak(arrays["point_velocity"]))
+    system, mechanism = run.system, run.system.mechanism
+    sound = arrays["status"] < Status.NEAR_SINGULAR
+    if np.any(sound):
+        arrays = {name: array[..., sound] for name, array in arrays.items() if array.shape[-1:] == sound.shape}
+    joints = [point in system.joints for _, point in system.points]
+    length = max(peak(arrays["point_position"][joints]), peak(arrays["joint_slide"]))
+    length = length or float(np.max(primal(system.size(run.values))))
+    speed = max(peak(arrays["joint_slide_velocity"]), peak(arrays["point_velocity"][joints]))
     rate = max(peak(arrays["joint_rotation_velocity"]), speed / length) or 1 / (run.cycle.duration or 1.0)
-    forces, torques = [*stated["N"], peak(arrays["reaction_force"])], [*stated["N m"], peak(arrays["reaction_moment"])]
-    for driver, efforts in zip(system.mechanism.drivers, arrays["drive_effort"], strict=True):
+    forces, torques = _stated_forces(run)
+    forces.append(peak(arrays["reaction_force"]))
+    torques.append(peak(arrays["reaction_moment"]))
+    for driver, efforts in zip(mechanism.drivers, arrays["drive_effort"], strict=True):
         (torques if system.turns(driver) else forces).append(peak(efforts))
-    return Scales(length, rate, max(0.0, *forces, max(torques) / length))
+    return Scales(length, rate, max(*forces, max(torques) / length))
 
 
-def _stated(run: Run) -> dict[str, list[float]]:
-    """Stated lengths, moments, and forces with the weight of all links, by their units."""
-    values = {path: peak(np.asarray(primal(value), float)) for path, value in run.values.items()}
-    gravity = float(np.linalg.norm([values.get(f"gravity.{axis}", 0.0) for axis in "xyz"]))
-    masses = [value for path, value in values.items() if path.startswith("links.") and path.endswith(".mass")]
-    found = {"m": [0.0], "N m": [0.0], "N": [gravity * sum(masses)]}
-    for path, one in run.system.mechanism.parameter_set.entries.items():
-        if one.kind.unit in found and path in values:
-            found[one.kind.unit].append(values[path])
-    return found
+def _stated_forces(run: Run) -> tuple[list[float], list[float]]:
+    """Stated forces with the weight of all links that move, N, and stated moments, N m."""
+    mechanism, values = run.system.mechanism, run.values
+    gravity = float(np.linalg.norm([peak(primal(values.get(f"gravity.{axis}", 0.0))) for axis in "xyz"]))
+    masses = [peak(primal(values[f"links.{name}.mass"])) for name in mechanism.links if f"links.{name}.mass" in values]
+    resting = {name for name, load in mechanism.loads.items() if load.link == mechanism.fixed_link}
+    stated = {"N": [gravity * sum(masses)], "N m": [0.0]}
+    for path, entry in mechanism.parameter_set.entries.items():
+        rests = entry.location[:1] == ("loads",) and entry.location[1] in resting
+        if entry.kind.unit in stated and path in values and not rests:
+            stated[entry.kind.unit].append(peak(primal(values[path])))
+    return stated["N"], stated["N m"]
 
 
-def peak(values: NDArray[np.float64]) -> float:
+def peak(values: ArrayLike) -> float:
     """Largest magnitude, without a copy of the values; 0 of none."""
     return float(max(np.nanmax(values, initial=0.0), -np.nanmin(values, initial=0.0)))

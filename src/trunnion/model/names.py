@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import json
+import os
 import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
@@ -43,7 +44,7 @@ def as_key(name: str) -> str:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """A remedy for an unknown name: the nearest known ones, else the first few that exist."""
-    names = list(dict.fromkeys(known))
+    name, names = str(name), list(dict.fromkeys(known))
     folded = {one.casefold(): one for one in reversed(names)}
     if (meant := MEANT.get(name.casefold())) in names:
         return f"did you mean '{meant}'{REMARKS.get(meant, '')}?"
@@ -85,11 +86,14 @@ def _strict(function: Callable[..., Any], name: str) -> Callable[..., Any]:
         return function  # what it hands on is checked where it arrives
     known = [key for key, one in parameters.items() if one.kind is not inspect.Parameter.POSITIONAL_ONLY]
     call_name = f"{name.removesuffix('.__init__')}()"
+    of_mechanism = next(iter(parameters), "") == "mechanism"
 
     @functools.wraps(function)
     def call(*args: Any, **keywords: Any) -> Any:
         if not keywords.keys() <= parameters.keys():
             check_keywords(call_name, keywords, [key for key in known if key != "self"])
+        if of_mechanism and isinstance(args[0] if args else keywords.get("mechanism"), (str, os.PathLike, type(None))):
+            raise TypeError(f"{call_name} takes a Mechanism: trunnion.read(FILE) makes one")
         return function(*args, **keywords)
 
     return call

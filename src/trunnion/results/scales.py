@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["EVERYWHERE", "Scales", "extreme_place", "scales_in", "without_noise"]
 
 Array = NDArray[np.float64]
-ROUNDING = 1e-11  # of the largest of its kind: what is less is no more than rounding
+ROUNDING = 1e-10  # of the largest of its kind: what is less is no more than rounding
 EVERYWHERE = "everywhere"  # the place of an extreme of what is constant
 # variables that tell how well a result is solved: their rounding is what they are there for
 OF_SOLUTION = (

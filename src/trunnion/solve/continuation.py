@@ -27,7 +27,7 @@ CLOSED = 1e-12  # of the largest unknown: residual of a solution, and about the 
 TINY = 1e-300  # where all unknowns are 0
 NEAR_AIM = 0.25  # of Newton's first step by which the corrected point may miss its aim
 TINY_MOVE = 0.02  # of the largest unknown
-MOST_TRIALS = 1000  # steps of a lane; 130 is much
+MOST_TRIALS = 200  # steps of a lane; 130 is much
 
 
 def follow(

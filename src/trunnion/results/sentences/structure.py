@@ -139,8 +139,8 @@ STRUCTURE: dict[str, Sentence] = {
     "mobility.friction_open": Sentence(
         ERROR,
         "statics does not determine the forces on which the friction in the joints {joints} depends",
-        "state one joint for bearings on one line, with pin.bearing (guide.length) from end to end, joints with more "
-        "freedoms (cylindrical, spherical), or friction: 0 for these joints",
+        "give the joints {constraints:#freedom} more (cylindrical, spherical), state bearings on one line as one joint "
+        "with pin.bearing (guide.length) from end to end, or friction: 0",
     ),
     "mobility.special": Sentence(
         WARNING,

@@ -236,7 +236,11 @@ class Determinacy:
             found += [self._overdriven()] if one.surplus else []
             found += [self._undetermined(one)] if one.undetermined else []
             found += [self._redundant(one)] if one.redundant else []
-            found += [finding_for("mobility.friction_open", "joints", joints=list(one.rubbing))] if one.rubbing else []
+            found += (
+                [finding_for("mobility.friction_open", "joints", joints=list(one.rubbing), constraints=one.redundant)]
+                if one.rubbing
+                else []
+            )
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
                 where, drag = f"links.{link}", self.dragged.get(link)

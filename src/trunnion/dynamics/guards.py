@@ -28,6 +28,9 @@ ROUNDING = 1e-9  # of a coordinate: by how much it may seem beyond its range whe
 NEARLY = 0.1  # of 1/condition: where a straight line from the last two looks leaves less at the next, it may touch zero
 
 
+FORESEEN = 1e-3  # of 1/condition: from there on it is foreseen where it touches zero
+
+
 @dataclass
 class Guards:
     """Looks at the steps of one motion.
@@ -44,10 +47,14 @@ class Guards:
     passed: list[float] = field(default_factory=list)
     last: float = -np.inf
 
-    def ended(self, stretch: Stretch, before: Stretch | None) -> Ended | None:
-        """The first end of the motion within a step. before: the step that it goes on from, if there is one."""
+    def bounded(self, stretch: Stretch, before: Stretch | None) -> tuple[Stretch, Ended | None]:
+        """A step up to the first end of the motion within it or just ahead, and that end. before: the step that it goes
+        on from, if there is one."""
         ends = [*self._out_of_range(stretch), *self._change_points(stretch, before)]
-        return min(ends, key=lambda end: end.time, default=None)
+        ended = min(ends, key=lambda end: end.time, default=None)
+        if ended is None:
+            return stretch, None
+        return self._continued(stretch)._replace(end=max(stretch.begin, ended.time)), ended
 
     # ---- ranges -----------------------------------------------------------------------------------------------
 
@@ -84,29 +91,59 @@ class Guards:
         return [(row, module) for row, module in rows if not alone or self.motion.passes(module)]
 
     def _change_points(self, stretch: Stretch, before: Stretch | None) -> Iterator[Ended]:
-        """Where 1/condition of a module touches zero, see `solve.change_points`; what is passed is taken down."""
+        """Where 1/condition of a module touches zero, see `solve.change_points`; what is passed is taken down.
+
+        Near there the digits of the accelerations are lost like its square. So it is foreseen, too, with accelerations
+        that stay as they are.
+        """
         if not self._meeting or stretch.end <= stretch.begin:
             return
         last = before if before is not None and before.end == stretch.begin else stretch
+        onward = self._continued(stretch)
         times = np.linspace(stretch.begin, stretch.end, LOOKS + 1)
         times = np.insert(times, 0, stretch.begin - (last.end - last.begin) / LOOKS)
 
         def margins(moments: Array) -> Array:
-            early = moments < stretch.begin
-            rows = np.where(early, last.state(moments), stretch.state(moments))
+            rows = np.where(moments < stretch.begin, last.state(moments), onward.state(moments))
             return self.margins(self.layout.moment(moments, rows))
 
         looks, spans = margins(times), np.diff(times)
         ahead = looks[:, 1:-1] + (looks[:, 1:-1] - looks[:, :-2]) * spans[1:] / spans[:-1]
+        near = (ahead <= NEARLY * looks[:, 1:-1]) & np.isfinite(looks[:, 2:])
         for row, module in self._meeting:
-            places = np.flatnonzero(ahead[row] <= NEARLY * looks[row, 1:-1]) + 1
-            for time in touched(lambda moment, row=row: float(margins(np.array([moment]))[row, 0]), times, places):  # type: ignore[misc]
-                if not self.motion.passes(module):
-                    place = float(stretch.state(np.array([time]))[0, 0])
-                    yield Ended("simulate.change_point", time, self.motion.change_point(module, place))
-                elif time > self.last + spans[-1]:
-                    self.last = time
-                    self.passed.append(time)
+
+            def margin(moment: float, row: int = row) -> float:
+                return float(margins(np.array([moment]))[row, 0])
+
+            met = touched(margin, times, np.flatnonzero(near[row]) + 1)
+            if self.motion.passes(module):
+                met = [time for time in met if time > self.last + spans[-1]]
+                self.passed += met
+                self.last = max([self.last, *met])
+                continue
+            left, slope = float(looks[row, -1]), float(looks[row, -1] - looks[row, -2]) / spans[-1]
+            if left < FORESEEN and slope < 0.0 and np.isfinite(margin(stretch.end - 2.0 * left / slope)):
+                met += touched(margin, stretch.end - left / slope * np.arange(3.0), [1])
+            for time in met:
+                place = float(onward.state(np.array([time]))[0, 0])
+                yield Ended("simulate.change_point", time, self.motion.change_point(module, place))
+
+    def _continued(self, stretch: Stretch) -> Stretch:
+        """A step that goes on beyond its end: works with the powers, coordinates with the accelerations that it has
+        there."""
+        n, end = self.layout.coordinates, stretch.end
+        span = (end - stretch.begin) / LOOKS
+        begun, ended = stretch.state(np.array([end - span, end])).T
+        slopes = (ended - begun) / span
+        slopes[:n] = ended[n : 2 * n]
+
+        def state(times: Array) -> Array:
+            over = np.maximum(times - end, 0.0)
+            rows = np.array(stretch.state(np.minimum(times, end))) + slopes[:, None] * over
+            rows[:n] += 0.5 * slopes[n : 2 * n, None] * over**2
+            return rows
+
+        return stretch._replace(state=state)
 
 
 def _root(stretch: Stretch, number: int, level: float, low: float, high: float) -> float:

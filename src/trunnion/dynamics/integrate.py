@@ -177,9 +177,7 @@ class Integration:
     def _add(self, stretch: Stretch) -> None:
         """Add a step, up to where the motion ends in it."""
         stretches = self.solution.stretches
-        ended = self.guards.ended(stretch, stretches[-1] if stretches else None)
-        if ended is not None:
-            stretch = stretch._replace(end=max(stretch.begin, ended.time))
+        stretch, ended = self.guards.bounded(stretch, stretches[-1] if stretches else None)
         self._measured(stretch)
         stretches.append(stretch)
         while self.guards.passed:

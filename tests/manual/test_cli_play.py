@@ -15,6 +15,7 @@ import trunnion
 from manual.conftest import Outcome, Run
 from played import four_bar
 from trunnion.results.attributes import summary_of
+from trunnion.results.scales import scales_in
 from trunnion.views.play.figure import figure
 from trunnion.views.play.tables import tables
 
@@ -188,8 +189,8 @@ def test_no_effect_at_one_position_is_no_matter_of_the_driver() -> None:
 
 def test_rounding_is_shown_as_zero() -> None:
     result = trunnion.play(trunnion.read(SLIDER), ["stroke-position"], steps=12).copy(deep=True)
-    result["worst_case"][0, 0] = 0.9e-9 * result["worst_case_total"].min()
-    result["worst_case"][0, 1] = 1.1e-9 * result["worst_case_total"].max()
+    result["worst_case"][0, 0] = 0.9 * scales_in(result).floor("m")
+    result["worst_case"][0, 1] = 1.1 * scales_in(result).floor("m")
     shown = [row[2] for row in tables(result)[0].rows]
-    assert shown[0] == "0\u00a0µm"
+    assert shown[0] == "0\u00a0m"
     assert not shown[1].startswith("0\u00a0")

@@ -26,7 +26,7 @@ from trunnion.cli.terminal import bar, say
 __all__ = ["simulate"]
 
 PERCENT = 100
-EVALUATIONS = 500_000  # as `simulate` has it
+EVALUATIONS = 2_000_000  # as `simulate` has it
 
 Kind = Annotated[
     str | None,

@@ -141,7 +141,7 @@ class Guards:
             over = np.maximum(times - end, 0.0)
             rows = np.array(stretch.state(np.minimum(times, end))) + slopes[:, None] * over
             rows[:n] += 0.5 * slopes[n : 2 * n, None] * over**2
-            return rows
+            return np.asarray(rows)
 
         return stretch._replace(state=state)
 

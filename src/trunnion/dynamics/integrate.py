@@ -38,7 +38,7 @@ __all__ = ["MOST_EVALUATIONS", "Integration"]
 Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
-MOST_EVALUATIONS = 500_000  # of the forces, if not stated otherwise
+MOST_EVALUATIONS = 2_000_000  # of the forces, if not stated otherwise
 WALK = 25  # evaluations by tables or machine code that take about as long as a walk through the modules
 CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations

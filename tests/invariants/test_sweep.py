@@ -132,7 +132,8 @@ def test_two_names_are_a_grid() -> None:
         one = trunnion.analyse(mechanism.with_values({"AB": length, "B.friction.coefficient": coefficient}), STEPS)
         for key, value in expected(one).items():
             found = grid[key].values[..., i, k]
-            np.testing.assert_allclose(found, value, rtol=1e-9, atol=1e-15, err_msg=f"{key} {length} {coefficient}")
+            apart = 1e-10 if key == "efficiency_error" else 0.0  # itself an estimate, of last coefficients
+            np.testing.assert_allclose(found, value, rtol=1e-9, atol=apart, err_msg=f"{key} {length} {coefficient}")
 
 
 # of every kind: dyads, class III, Newton in space, closed form in space; with points that lock or cannot be assembled

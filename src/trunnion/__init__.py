@@ -55,17 +55,6 @@ _PLACES = {
 }
 _RESULTS = {"analyse", "assemble", "allocate", "locking", "play", "simulate", "sweep", "tolerance"}
 _MODULES = {"dual": "trunnion.dual", "rig": "trunnion.rig"}
-# names that were public here, with where they are now
-_MOVED = {
-    "Check": ("trunnion.cycle.inspect", "Check"),
-    "Finding": ("trunnion.errors", "Finding"),
-    "compare": ("trunnion.rig", "compare"),
-    "identify": ("trunnion.rig", "identify"),
-    "observe": ("trunnion.rig", "observe"),
-    "prepare": ("trunnion.solve.run", "prepare"),
-    "read_measured": ("trunnion.rig", "read"),
-    "vocabulary": ("trunnion.cycle.vocabulary", "vocabulary"),
-}
 
 __all__ = [
     "FrictionMethod",
@@ -96,13 +85,9 @@ def __getattr__(name: str) -> Any:
 
     if name in _MODULES:
         return import_module(_MODULES[name])
-    if name not in _PLACES and name not in _MOVED:
+    if name not in _PLACES:
         raise AttributeError(f"module 'trunnion' has no attribute '{name}'")
-    module, own = _PLACES.get(name) or _MOVED[name]
-    if name in _MOVED:
-        import warnings
-
-        warnings.warn(f"trunnion.{name} is now {module}.{own}", DeprecationWarning, stacklevel=2)
+    module, own = _PLACES[name]
     if name in _RESULTS:
         import_module("trunnion.accessor")  # result.trunnion
     return getattr(import_module(module), own)

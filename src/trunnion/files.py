@@ -14,7 +14,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ from pathlib import Path
 
 from trunnion.errors import Finding, MechanismError
 
-__all__ = ["Target", "cache_directory", "folder", "reading", "same", "spare", "whole", "writing"]
+__all__ = ["Target", "cache_directory", "folder", "guard", "reading", "same", "whole", "writing"]
 
 REMEDY = "name another file"
 MOST_LINKS = 40  # one to the other, as operating systems have it
@@ -58,11 +58,11 @@ class _Run:
     written: Sequence[Target]
     read: list[Path] = field(default_factory=list)
 
-    def findings(self, path: Path, targets: Iterable[Target]) -> list[Finding]:
+    def findings(self, path: Path, targets: Sequence[Target]) -> list[Finding]:
         """Which targets an input would be lost to."""
         lost = (one for one in targets if same(one.path, path) and not (one.over and same(one.over, path)))
         return [
-            Finding(f"{_called(one.path, path)} is read here, and would be written over", one.option, REMEDY)
+            Finding(f"{_called(one.path, path)} is read here, and would be written over{_by(one)}", "", REMEDY)
             for one in lost
         ]
 
@@ -70,6 +70,10 @@ class _Run:
 def _called(written: Path, read: Path) -> str:
     """A file by the name it is written under, and the other that it has."""
     return f"'{written}'" if str(written) == str(read) else f"'{written}', which is '{read}',"
+
+
+def _by(target: Target) -> str:
+    return f" by {target.option}" if target.option else ""
 
 
 _RUN: ContextVar[_Run | None] = ContextVar("run", default=None)
@@ -104,7 +108,7 @@ def reading(path: str | os.PathLike[str]) -> None:
         run.read.append(path)
 
 
-def _guard(path: Path) -> None:
+def guard(path: Path) -> None:
     """MechanismError if something that the run has read would be written over."""
     run = _RUN.get()
     if run is None:
@@ -124,21 +128,6 @@ def same(one: Path, two: Path) -> bool:
         return not two.exists() and os.path.realpath(one) == os.path.realpath(two)
 
 
-def spare(read: Iterable[Path], written: Iterable[tuple[str, Path]]) -> None:
-    """MechanismError if a file that is to be written, by the option that names it, is one of those that are read.
-
-    A link to one counts as well.
-    """
-    kept = [one for one in read if one.exists()]
-    findings = []
-    for option, path in written:
-        if path.exists() and any(path.samefile(one) for one in kept):
-            what = f"'{path}' is read here, and would be written over"
-            findings.append(Finding(what, option, "name another file"))
-    if findings:
-        raise MechanismError(findings)
-
-
 # ---- writing --------------------------------------------------------------------------------------------------
 
 
@@ -151,7 +140,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     a folder, or it is read in this run.
     """
     asked = Path(path)
-    _guard(asked)
+    guard(asked)
     with _unwritable(asked):
         target, stream = _destination(asked)
     beside = target.parent if target else Path(tempfile.gettempdir())

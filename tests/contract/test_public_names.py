@@ -29,11 +29,6 @@ OTHERWISE = {
     ("simulate", "steps"),  # many turns, where the others have one
     ("simulate", "progress"),  # told a time
 }
-MOVED = {
-    "Check": "trunnion.cycle.inspect", "Finding": "trunnion.errors", "compare": "trunnion.rig",
-    "identify": "trunnion.rig", "observe": "trunnion.rig", "prepare": "trunnion.solve.run",
-    "read_measured": "trunnion.rig", "vocabulary": "trunnion.cycle.vocabulary",
-}  # fmt: skip
 
 
 def test_the_names_fit_one_page() -> None:
@@ -77,15 +72,6 @@ def test_a_public_function_is_typed_and_told(name: str) -> None:
         if argument not in ("mechanism", "measurement", "result", "path", "of"):
             assert argument in told, f"{argument} of {name} is not told"
     assert "Raises" in told or "MechanismError" in told
-
-
-@pytest.mark.parametrize("name", sorted(MOVED))
-def test_a_name_that_has_moved_works_and_says_where_to(name: str) -> None:
-    with pytest.warns(DeprecationWarning, match=MOVED[name]):
-        old = getattr(trunnion, name)
-    new = "read" if name == "read_measured" else name
-    module = sys.modules[MOVED[name]]
-    assert old is getattr(module, new)
 
 
 def test_there_are_no_other_names() -> None:

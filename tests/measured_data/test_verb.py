@@ -116,7 +116,8 @@ def test_results_are_not_written_over_what_is_read(program: Run, rig: Path, tmp_
     for name in ("a.csv", "link.csv", "rig.json"):
         code, _, err = program("data", "rig.json", "--out", name)
         assert code == 2
-        assert f"--out: '{name}' is read here, and would be written over — name another file" in err
+        assert f"error: '{name}'" in err
+        assert "is read here, and would be written over by --out — name another file" in err
     (tmp_path / "b.csv").write_bytes(before[0])
     code, _, err = program("data", "rig.json", "b.csv", "--out", "b.csv")
     assert code == 2

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.cli.inputs import spare_data
 from trunnion.cli.model import exit_status, lines_of, stated
 from trunnion.cli.options import (
     DataFiles,
@@ -65,7 +64,6 @@ def compare(
     from trunnion.rig.reading.read import read_measured
 
     check_files(out or [], report, of="comparison", kind=kind)
-    spare_data(mapping, data, out, report, file, table)
     mechanism = stated(file, set_, table, friction, seat)
     measurement = read_measured(mapping, [str(path) for path in data] if data else None)
     with lines_of(file), bar("conditions", len(measurement.conditions)) as progress:

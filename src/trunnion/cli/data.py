@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from trunnion.cli.inputs import spare_data
 from trunnion.cli.options import Data, UnitsRow
 from trunnion.cli.result import check_files, show_tables
 from trunnion.cli.terminal import console, say, wrote
@@ -32,7 +31,6 @@ def data(
     from trunnion.views.rig.measured import tables
 
     check_files(out or [], drawn=False)
-    spare_data(mapping, files, out)
     measurement = read_measured(mapping, files)
     show_tables("", tables(measurement))
     if measurement.done:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.cli.inputs import spare_data
 from trunnion.cli.model import lines_of, stated
 from trunnion.cli.options import (
     DataFiles,
@@ -130,7 +129,6 @@ def identify(
 
     check_files(out or [], report, of="identification", kind=kind)
     check_model(write, file, force)
-    spare_data(mapping, data, out, report, file, table, write)
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())

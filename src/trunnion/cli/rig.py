@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trunnion.cli.inputs import tables_read
 from trunnion.cli.model import exit_status, lines_of, stated
 from trunnion.cli.options import File, FrictionLaw, Seats, Seed, Set, TableFile
 from trunnion.cli.terminal import bar, console, say, show_rows, wrote
@@ -48,7 +47,6 @@ def rig(
     seat: Seats = None,
 ) -> None:
     """Virtual test rig: plan sensors, or write simulated data files."""
-    from trunnion.model.file import files_named
     from trunnion.rig.reading.rig_file import Rig
     from trunnion.rig.virtual.files import check_folder, check_form
     from trunnion.rig.virtual.observe import observe
@@ -63,7 +61,7 @@ def rig(
     with lines_of(file), _lines_of_rig(rig_file):
         count = len(stated_rig.schedule.rows())
         if out:
-            check_folder(stated_rig, out, format_ or "", [rig_file, file, *tables_read(table), *files_named(file)])
+            check_folder(stated_rig, out, format_ or "")
         with bar("conditions", count, least=FEWEST) as progress:
             observation = observe(mechanism, stated_rig, seed, progress)
     found = list(observation.findings)

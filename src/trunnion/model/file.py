@@ -11,7 +11,6 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from functools import lru_cache
 from io import StringIO
 from pathlib import Path
@@ -26,11 +25,10 @@ from ruamel.yaml.parser import Parser
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.csv_table import TableFiles, place_findings, with_own_points, with_points
-from trunnion.model.named_file import in_folder, stated_files
 from trunnion.model.text import read_text
 
 __all__ = [
-    "Lines", "composed", "entries_of", "files_named", "place", "placed", "read_entries", "read_model", "text_of",
+    "Lines", "composed", "entries_of", "place", "placed", "read_entries", "read_model", "text_of",
     "version_findings", "write_model",
 ]  # fmt: skip
 
@@ -67,16 +65,6 @@ def read_model(
     if findings:
         raise MechanismError(place(findings, str(path), lines, data)) from None
     return model
-
-
-def files_named(path: str | os.PathLike[str]) -> list[Path]:
-    """The files of points that a model file names, as far as they are there; none of a file that cannot be read."""
-    found = []
-    with suppress(MechanismError):
-        for section, key, name in stated_files(read_entries(Path(path))[0]):
-            with suppress(MechanismError):
-                found.append(in_folder(Path(path).resolve().parent, name, f"{section}.{key}.file"))
-    return found
 
 
 def read_entries(

@@ -334,15 +334,22 @@ class System:
         return functools.reduce(np.maximum, rates)
 
     def size(self, values: Values) -> Number:
-        """Length typical of the mechanism, m: the widest spread of two points on one link."""
+        """Length typical of the mechanism, m: the widest spread of two joints on one link, else of any two points."""
+        links = {name: list(link.points) for name, link in self.mechanism.links.items()}
+        jointed = {name: [point for point in points if point in self.joints] for name, points in links.items()}
+        between_joints, between_points = self._spread(values, jointed), self._spread(values, links)
+        widest = np.where(between_joints > 0, between_joints, between_points)
+        return np.where(widest > 0, widest, 1.0)
+
+    @staticmethod
+    def _spread(values: Values, links: Mapping[str, Sequence[str]]) -> Number:
+        """The largest distance of the points of a link from its first one, m."""
         widest: Number = 0.0
-        for name, link in self.mechanism.links.items():
-            places = [
-                tuple(primal(values[f"links.{name}.points.{point}.{axis}"]) for axis in "xy") for point in link.points
-            ]
+        for name, points in links.items():
+            places = [tuple(primal(values[f"links.{name}.points.{point}.{axis}"]) for axis in "xy") for point in points]
             for x, y in places[1:]:
                 widest = np.maximum(widest, np.hypot(x - places[0][0], y - places[0][1]))
-        return np.where(widest > 0, widest, 1.0)
+        return widest
 
     def cycle(self, values: Values, turns: Mapping[str, float] | None = None, free: bool = False) -> Cycle:
         """How long the drivers take: the longest that ends, or the least time in which all make whole periods.

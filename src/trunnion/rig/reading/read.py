@@ -93,14 +93,6 @@ def read_measured(
     )
 
 
-def files_read(mapping: Path, files: Iterable[Path] | None = None) -> list[Path]:
-    """What `read_measured` reads: the mapping file, the data files that it names or that are given in their place."""
-    mapped = read_mapping(mapping)
-    stated = (*mapped.mapping.files, *(one for one in mapped.mapping.starts if one.file))
-    named = list(files or ()) or [mapped.folder / entry.file for entry in stated]
-    return [mapping, *named]
-
-
 def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> str:
     """How many turns there are, and of how many if some are not used."""
     recorded, lost = sum(one.recorded for one in accounts), sum(one.left_out for one in accounts)

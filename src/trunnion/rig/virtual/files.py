@@ -12,7 +12,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.files import spare
+from trunnion.files import guard
 from trunnion.rig.reading.rig_file import FORMATS, Rig
 from trunnion.rig.virtual.cases import Case, case_names, speed_differs
 from trunnion.version import __version__
@@ -50,7 +50,7 @@ def check_form(form: str) -> None:
         raise MechanismError(Finding(f"{form} needs {package}", "format", f"pip install 'trunnion[{form}]'"))
 
 
-def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str, read: Iterable[Path] = ()) -> None:
+def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str) -> None:
     """MechanismError if a file of a rig would be written over one that is read, or over one that no rig has written.
 
     A folder in which mapping and truth, as far as they are there, are those of a rig, and the truth is there, is a
@@ -58,7 +58,8 @@ def check_folder(rig: Rig, folder: str | os.PathLike[str], form: str, read: Iter
     """
     folder = Path(folder)
     files = [f"{name}.{form or rig.format}" for name in case_names(len(rig.schedule.rows()))]
-    spare(read, (("--out", folder / name) for name in (*files, MAPPING, TRUTH)))
+    for name in (*files, MAPPING, TRUTH):
+        guard(folder / name)
     strange = [name for name in (MAPPING, TRUTH) if (folder / name).exists() and not _of_a_rig(folder / name)]
     if not (folder / TRUTH).exists():
         strange += [name for name in files if (folder / name).exists()]

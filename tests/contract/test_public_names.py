@@ -110,6 +110,8 @@ def test_friction_is_not_switched_off_by_a_keyword(model: str) -> None:
     for verb in (trunnion.analyse, trunnion.sweep, trunnion.tolerance, trunnion.allocate, trunnion.rig.compare):
         with pytest.raises(TypeError, match=r"give it mechanism.with_friction\('off'\)"):
             verb(mechanism, friction="off")
+    with pytest.raises(TypeError, match=r"takes a FrictionMethod; mechanism.with_friction\('off'\)"):
+        trunnion.analyse(mechanism, friction_method="off")  # type: ignore[arg-type]
     with pytest.raises(trunnion.MechanismError, match="no method 'off'"):
         trunnion.FrictionMethod("off")  # type: ignore[arg-type]
 

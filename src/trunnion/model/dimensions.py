@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.model.quantity import Quantity
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["evaluation_order", "nominal_dimensions"]
 

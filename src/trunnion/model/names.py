@@ -33,6 +33,11 @@ BY_METHOD = {
     "set": "mechanism.with_values({NAME: VALUE})",
     "table": "mechanism.with_table(NAME, FILE)",
 }
+# arguments that are neither a text nor a path, with what they are
+OBJECTS = {
+    "mechanism": "a Mechanism: trunnion.read(FILE) makes one",
+    "friction_method": "a FrictionMethod; mechanism.with_friction('off') leaves friction out",
+}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
 
 
@@ -86,14 +91,15 @@ def _strict(function: Callable[..., Any], name: str) -> Callable[..., Any]:
         return function  # what it hands on is checked where it arrives
     known = [key for key, one in parameters.items() if one.kind is not inspect.Parameter.POSITIONAL_ONLY]
     call_name = f"{name.removesuffix('.__init__')}()"
-    of_mechanism = next(iter(parameters), "") == "mechanism"
+    first = next(iter(parameters), "")
 
     @functools.wraps(function)
     def call(*args: Any, **keywords: Any) -> Any:
         if not keywords.keys() <= parameters.keys():
             check_keywords(call_name, keywords, [key for key in known if key != "self"])
-        if of_mechanism and isinstance(args[0] if args else keywords.get("mechanism"), (str, os.PathLike, type(None))):
-            raise TypeError(f"{call_name} takes a Mechanism: trunnion.read(FILE) makes one")
+        for key, value in (*([(first, args[0])] if args else []), *keywords.items()):
+            if key in OBJECTS and (isinstance(value, (str, os.PathLike)) or (value is None and key == first)):
+                raise TypeError(f"{call_name} takes {OBJECTS[key]}")
         return function(*args, **keywords)
 
     return call

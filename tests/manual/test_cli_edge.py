@@ -136,8 +136,9 @@ def test_a_program_that_is_ended_leaves_no_draft(number: signal.Signals, end: st
     steps = PARTS if end != "xlsx" else ["--steps", "20000"]
     before, words = list(tmp_path.iterdir()), ["analyse", str(FOUR_BAR), *steps, "--out", str(out)]
     with subprocess.Popen(
-        [sys.executable, "-m", "trunnion", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+        [sys.executable, "-m", "trunnion", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # under nohup, say, it is ignored
+    ) as process:  # fmt: skip
         while len(list(tmp_path.iterdir())) == len(before) and process.poll() is None:
             time.sleep(0.001)
         process.send_signal(number)

@@ -117,9 +117,10 @@ class Guards:
 
             met = touched(margin, times, np.flatnonzero(near[row]) + 1)
             if self.motion.passes(module):
-                met = [time for time in met if time > self.last + spans[-1]]
-                self.passed += met
-                self.last = max([self.last, *met])
+                for time in sorted(met):
+                    if time > self.last + spans[-1]:  # not the same one from the looks before and after it
+                        self.passed.append(time)
+                        self.last = time
                 continue
             left, slope = float(looks[row, -1]), float(looks[row, -1] - looks[row, -2]) / spans[-1]
             if left < FORESEEN and slope < 0.0 and np.isfinite(margin(stretch.end - 2.0 * left / slope)):

@@ -203,7 +203,6 @@ def test_a_figure_of_an_analysis_is_pointed_to_the_verb_that_draws_it(program: R
         pytest.param(["tolerance", "toleranced-rssr.yaml", "--samples", "10000000", "--jobs", "1"], 5.0,
                      marks=pytest.mark.slow),
         pytest.param(["sweep", "rssr.yaml", "--over", "a=20mm:30mm:1000", "--margin"], 3.0, marks=pytest.mark.slow),
-        pytest.param(["locking", "rssr.yaml", "--steps", "100000"], 3.0, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_ctrl_c_leaves_the_files_of_before(words: list[str], seconds: float, tmp_path: Path) -> None:

@@ -338,7 +338,7 @@ class System:
         links = {name: list(link.points) for name, link in self.mechanism.links.items()}
         jointed = {name: [point for point in points if point in self.joints] for name, points in links.items()}
         between_joints, between_points = self._spread(values, jointed), self._spread(values, links)
-        widest = np.where(between_joints > 0, between_joints, between_points)
+        widest: Number = np.where(between_joints > 0, between_joints, between_points)
         return np.where(widest > 0, widest, 1.0)
 
     @staticmethod

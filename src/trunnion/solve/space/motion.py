@@ -18,7 +18,7 @@ from trunnion.algebra.nested import each
 from trunnion.algebra.space import Frame, Screw, compose, line_of, minus, moment_at, rotated, times, vector_minus
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, plus, scaled, transpose
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.spatial_tree import Element
+from trunnion.groups.tree import Element
 from trunnion.joints.pairs import Reaction
 from trunnion.joints.spatial_load import halves
 from trunnion.model.parts import InertiaTensor
@@ -151,19 +151,6 @@ class SpatialWalk(Forward):
 
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))
-
-    def outside(self, place: Place) -> tuple[Screw | None, Screw | None]:
-        """Twist of the known link of a joint and its derivative."""
-        link = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
-        return (None, None) if link is None else self.motions[link][1:]
-
-    def moved(
-        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
-    ) -> tuple[Sequence[Screw], Sequence[Screw]]:
-        """Twists of a module's links and their derivatives."""
-        speeds = group.rates(pose, twists, rates)
-        found = group.twists(pose, twists, speeds)
-        return found, group.acceleration(pose, found, twists, accelerations, seconds, speeds)
 
     # ---- forces -----------------------------------------------------------------------------------------------
 

@@ -15,6 +15,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from trunnion.algebra import literal
 from trunnion.algebra.literal import less, plus
 from trunnion.algebra.namespace import Number, namespace
@@ -96,7 +98,8 @@ class Dyad(ABC):
         if slides[1]:
             walls = about((-inner.s, inner.c), 0.0, place), Wrench(0.0, 0.0, 1.0)
         matrix = (-power(walls[0], s_b), power(walls[0], s_d)), (-power(walls[1], s_b), power(walls[1], s_d))
-        area = 1 / less(literal.times(matrix[0][0], matrix[1][1]), literal.times(matrix[0][1], matrix[1][0]))
+        moves = less(literal.times(matrix[0][0], matrix[1][1]), literal.times(matrix[0][1], matrix[1][0]))
+        area = 1 / (np.float64(moves) if isinstance(moves, float) else moves)  # of Python's own 0 it would raise
         guides = (
             point_of(frames[0], place_of(b_i)) if slides[0] else None,
             place if slides[1] else None,

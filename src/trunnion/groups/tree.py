@@ -361,10 +361,16 @@ class Tree(ABC):
             last = functools.reduce(np.maximum, moves)
             shrink = 1 / np.maximum(last, 1.0)  # as a whole, so that the direction stays
             after = self._advanced(now, [[value * shrink for value in values] for values in steps], size)
-            return [*self._in_row(after), last]
+            further, there = [*self._in_row(after), last], arrived(state)
+            return (
+                further if not np.any(there) else [np.where(there, *pair) for pair in zip(state, further, strict=True)]
+            )
+
+        def arrived(state: list[Number]) -> Number:
+            return np.logical_not(state[-1] > NEARLY)
 
         start = [*self._in_row(q), np.inf]
-        *row, last = looped(step, start, rounds, lambda state: np.logical_not(state[-1] > NEARLY))
+        *row, last = looped(step, start, rounds, arrived)
         return self._by_joint(row), np.broadcast_to(last, np.broadcast_shapes(*(np.shape(v) for v in (last, *row))))
 
     def _finish_late(

@@ -401,9 +401,9 @@ def _record(
         motion, unit = walk.freedom(joint, walk.system.turns(joint))
         effort = back.efforts[joint] = algebra.power(wrench, motion)
         back.reactions[joint] = algebra.minus(wrench, algebra.times(effort, unit))
-    if back.travels:
-        back.passed[joint] = algebra.power(whole, walk.against(joint))
     second = walk.system.joints[joint][1][1]
+    if back.travels:
+        back.passed[joint] = algebra.power(walk.on_link(second, whole, joint), walk.against(joint))
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, whole if link == second else algebra.times(-1.0, whole), joint))

@@ -121,6 +121,11 @@ class Forward(ABC):
         """Element of a joint on a link that lies in a frame."""
         return self.algebra.compose(frame, self.local[link, joint])
 
+    def against(self, joint: str) -> Any:
+        """Twist of the second link of a joint against the first."""
+        first, second = self.system.joints[joint][1]
+        return self.algebra.minus(self.motions[second].twist, self.motions[first].twist)
+
     def speed(self, joint: str) -> Number:
         """Relative speed of a joint, second link against first, along its first freedom; rad/s, m/s."""
         return self.rates(joint)[0 if self.system.turns(joint) else 1]
@@ -249,10 +254,6 @@ class Forward(ABC):
     @abstractmethod
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
         """Turn or slide of a joint, whichever a driver moves, from its elements."""
-
-    @abstractmethod
-    def against(self, joint: str) -> Any:
-        """Twist of the second link of a joint against the first; in the plane of the joint's point on the second."""
 
     @abstractmethod
     def slip_motion(self, joint: str) -> tuple[Number, Number]:

@@ -45,19 +45,14 @@ class PlaneWalk(Forward):
             return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
         return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
-    def against(self, joint: str) -> Twist:
-        """Velocity of a joint's point on its second link and spin of that link, against the first."""
-        first, second = (self.motions[link].twist for link in self.system.joints[joint][1])
-        twist = plane.minus(second, first)
-        return Twist(*velocity_at(twist, place_of(self.ends(joint)[1])), twist.w)
-
     def rates(self, joint: str) -> tuple[Number, Number]:
         """Rate of the turn or of the slide."""
-        first, second = self.system.joints[joint][1]
         if self.system.turns(joint):
+            first, second = self.system.joints[joint][1]
             return self.motions[second].twist.w - self.motions[first].twist.w, 0.0
-        axis, speed = self.ends(joint)[0], self.against(joint)
-        return 0.0, axis.c * speed.x + axis.s * speed.y
+        axis, at = self.ends(joint)
+        x, y = velocity_at(self.against(joint), place_of(at))
+        return 0.0, axis.c * x + axis.s * y
 
     def second_rates(self, joint: str) -> tuple[Number, Number]:
         """Its derivative; the Coriolis part 2 ω × ṡ lies across the slide."""
@@ -84,8 +79,7 @@ class PlaneWalk(Forward):
 
     def hole_spin(self, joint: str) -> tuple[Number, ...]:
         """Angular velocity of the hole of a joint against its pin, rad/s."""
-        first, second = self.system.joints[joint][1]
-        return (self.motions[second].twist.w - self.motions[first].twist.w,)
+        return (self.against(joint).w,)
 
     def in_hole(self, joint: str, wrench: Wrench) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""

@@ -80,11 +80,6 @@ class SpatialWalk(Forward):
             return self._stated[link, name].place
         return cast(Vector3, super().local_place(link, name))
 
-    def against(self, joint: str) -> Screw:
-        """Twist of the second link of a joint against the first."""
-        first, second = self.system.joints[joint][1]
-        return minus(self.motions[second].twist, self.motions[first].twist)
-
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis: θ and s of its dual angle."""
         turn, slide = _dual_angle(*self.ends(joint))

@@ -100,8 +100,8 @@ _GROUPS = (
     Fault(
         "ball-acceleration-carried",
         "groups/tree.py",
-        "            total = algebra.added(total, algebra.bracket(twist, part))\n            if not motion.together:\n",
-        "            if not motion.together:\n                total = algebra.added(total, algebra.bracket(twist, part))\n",
+        "            total = algebra.added(total, bracket(twist, part))\n            if not motion.together:\n",
+        "            if not motion.together:\n                total = algebra.added(total, bracket(twist, part))\n",
         ("tests/invariants/test_spatial_groups.py", "-k", "accelerations or free_spin"),
     ),
     Fault(

@@ -528,12 +528,13 @@ class Tree(ABC):
     def _carried(self, pose: Pose, k: int, rates: Sequence[Number], twists: Sequence[Any], outer: Sequence[Any]) -> Any:
         """Σ q̇ (V × s) of a joint: its screws are carried along by its first link and by the freedoms before them."""
         algebra, motion = self.algebra, self.motion(k)
+        bracket = algebra.bracket
         if k in self.chords:
             rates = self.own_rates(pose, k, rates, self.across(k, twists, outer))
         total, twist = algebra.ZERO, self.of(k, 0, twists, outer)
         for screw, rate in zip(pose.screws[k], rates, strict=True):
             part = algebra.times(rate, screw)
-            total = algebra.added(total, algebra.bracket(twist, part))
+            total = algebra.added(total, bracket(twist, part))
             if not motion.together:
                 twist = algebra.added(twist, part)
         return total

@@ -15,7 +15,8 @@ import trunnion
 from geared import geared_five_bar, geared_loop, planet_drive, rocker_train
 from mechanisms_parts import Data, body, prismatic, revolute, slide
 from trunnion import Mechanism
-from trunnion.groups.general import OUTER, General, GroupJoint
+from trunnion.groups.general import General
+from trunnion.groups.tree import OUTER, GroupJoint
 
 Array = NDArray[np.float64]
 DURANGO = Path(__file__).parents[1] / "examples" / "durango-fourbar.yaml"

@@ -176,13 +176,12 @@ def groups_table() -> str:
 
     rows = []
     for name, group in GROUPS.items():
-        is_module = inspect.ismodule(group)
-        home = group.__name__ if is_module else type(group).__module__
-        about = inspect.getdoc(group if is_module else inspect.getmodule(type(group))) or ""
+        home = type(group).__module__
+        about = inspect.getdoc(inspect.getmodule(type(group))) or ""
         rows.append((code(name), code(home.removeprefix("trunnion.")), about.splitlines()[0]))
     about = inspect.getdoc(cylindrical_dyad) or ""
     rows.append(("`CCC`, in space", "`groups.cylindrical_dyad`", about.splitlines()[0]))
-    rows.append(("every other", "`groups.general`", "Any planar group, by Newton's method and one Jacobian"))
+    rows.append(("every other", "`groups.general`", "Any planar group, by Newton's method; drivers too"))
     rows.append(("every other, in space", "`groups.spatial`", "Any spatial group, likewise; drivers too"))
     return rows_of(("module", "where", "what"), rows)
 

@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechanisms import KIND, Array, dyad
+from mechanisms import Array, dyad
 from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, compose
-from trunnion.groups import GROUPS, rrr
-from trunnion.groups.general import OUTER, General, GroupJoint
+from trunnion.algebra.plane import Frame, Twist, Wrench, acceleration_at, compose, moment_at, velocity_at
+from trunnion.groups import GROUPS
+from trunnion.groups.general import General
+from trunnion.groups.rrr import meet
+from trunnion.groups.tree import OUTER, GroupJoint
 
 LANES = 10_000
 
@@ -62,22 +64,21 @@ class Case:
     def guess(self) -> list[Array]:
         """Free tree coordinates of the pose it was built from."""
         found: list[Array] = []
-        for i in self.group.free:
-            step = self.group.steps[i]
+        for k, _ in self.group.free:
             one, two = (
                 element if link == OUTER else compose(self.frames[link], element)
-                for link, element in zip(self.group.joints[step.joint].sides, self.elements[step.joint], strict=True)
+                for link, element in zip(self.group.joints[k].sides, self.elements[k], strict=True)
             )
-            if self.group.joints[step.joint].kind == "revolute":
+            if self.group.joints[k].kind == "revolute":
                 found.append(np.arctan2(one.c * two.s - one.s * two.c, one.c * two.c + one.s * two.s))
             else:
                 found.append(one.c * (two.x - one.x) + one.s * (two.y - one.y))
         return found
 
-    def outer(self, kind: Any) -> list[Any]:
-        """Random motion of every element on an outside link; one rigid body each, as they may be different links."""
+    def outer(self) -> list[Any]:
+        """Random twist, or derivative of one, of every outside link, a different one for each joint."""
         return [
-            kind(*self.rng.normal(size=(3, self.lanes))) if OUTER in joint.sides else None
+            Twist(*self.rng.normal(size=(3, self.lanes))) if OUTER in joint.sides else None
             for joint in self.group.joints
         ]
 
@@ -109,6 +110,7 @@ def test_rrr_equals_general(offset: float) -> None:
     left = (d.x - b.x) * (c.y - b.y) - (d.y - b.y) * (c.x - b.x) > 0
     assert 4000 < np.count_nonzero(left) < 6000
     branch = np.where(left, 1, -1)
+    rrr = GROUPS["RRR"]
     closed = rrr.position(case.elements, branch)
     condition = rrr.condition(closed)
     good = condition < 1e3
@@ -117,12 +119,9 @@ def test_rrr_equals_general(offset: float) -> None:
     same(pose.frames, closed.frames, weight)
     same(closed.frames, case.frames, weight)
 
-    outer = case.outer(Twist)
-    twists = rrr.velocity(closed, outer)
-    same(group.velocity(pose, outer), twists, weight * size_of(twists, LANES))
-    outer_a = case.outer(Acceleration)
-    seconds = rrr.acceleration(closed, twists, outer, outer_a)
-    same(group.acceleration(pose, twists, outer, outer_a), seconds, weight * size_of(seconds, LANES))
+    outer = case.outer(), case.outer()
+    for one, two in zip(group.moved(pose, *outer), rrr.moved(closed, *outer), strict=True):
+        same(one, two, weight * size_of(two, LANES))
     loads = case.loads()
     reactions = rrr.reactions(closed, loads)
     same(group.reactions(pose, loads), reactions, weight * size_of(reactions, LANES))
@@ -134,9 +133,11 @@ def test_rrr_equals_general(offset: float) -> None:
 def test_one_branch_for_all_lanes(branch: int) -> None:
     """A scalar branch puts C on its side in every lane; mirrored in x the other branch is its mirror image."""
     case = Case(dyad("RRR"), 500, 11)
+    rrr = GROUPS["RRR"]
     pose = rrr.position(case.elements, branch)
     b, d = case.elements[0][0], case.elements[2][0]
-    side = (d.x - b.x) * pose.bc[1] - (d.y - b.y) * pose.bc[0]
+    c = compose(pose.frames[0], case.elements[1][0])
+    side = (d.x - b.x) * (c.y - b.y) - (d.y - b.y) * (c.x - b.x)
     assert np.all(np.sign(side) == branch)
     mirrored = [tuple(Frame(e.x, -e.y, e.c, -e.s) for e in pair) for pair in case.elements]
     other = rrr.position(mirrored, -branch)
@@ -153,7 +154,7 @@ def test_rrr_where_the_circles_do_not_meet() -> None:
         (Frame(far, 0.0 * far), Frame(0.0, 0.0)),
     ]
     with np.errstate(all="ignore"):
-        closed = rrr.position(elements, 1)
+        closed = GROUPS["RRR"].position(elements, 1)
         general = dyad("RRR").position(elements, [np.full(4, 1.0), np.full(4, -1.0)])
     expected = [True, False, False, True]
     np.testing.assert_array_equal(np.isfinite(closed.frames[0].x + closed.frames[1].c), expected)
@@ -253,7 +254,7 @@ def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
     """Outer links and drives move along t; frames differentiated by nested duals in t give the same motion."""
     group = TOPOLOGIES[name]
     case, pose, good = regular(group, 300, 2)
-    twists_out, seconds_out = case.outer(Twist), case.outer(Acceleration)
+    twists_out, seconds_out = case.outer(), case.outer()
     rates = [case.rng.normal(size=300) for _ in group.driven]
     seconds = [case.rng.normal(size=300) for _ in group.driven]
     zero = np.zeros(300)
@@ -271,10 +272,11 @@ def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
                 continue
             c, s = element.c, element.s
             ww = v.w * v.w
+            speed, second = velocity_at(v, element[:2]), acceleration_at(v, a, element[:2])
             sides.append(
                 Frame(
-                    along(element.x, v.x, a.x),
-                    along(element.y, v.y, a.y),
+                    along(element.x, speed[0], second[0]),
+                    along(element.y, speed[1], second[1]),
                     along(c, -v.w * s, -a.w * s - ww * c),
                     along(s, v.w * c, a.w * c - ww * s),
                 )
@@ -282,13 +284,14 @@ def test_general_motion_is_the_derivative_of_its_position(name: str) -> None:
         moved.append(tuple(sides))
     drive = [along(q, r, b) for q, r, b in zip(case.drive, rates, seconds, strict=True)]
     curve = group.position(moved, case.guess(), drive)
-    twists = group.velocity(pose, twists_out, rates)
-    accelerations = group.acceleration(pose, twists, twists_out, seconds_out, seconds, rates)
-    for frame, twist, second in zip(curve.frames, twists, accelerations, strict=True):
+    for frame, placed, twist, change in zip(
+        curve.frames, pose.frames, *group.moved(pose, twists_out, seconds_out, rates, seconds), strict=True
+    ):
+        speed, second = velocity_at(twist, placed[:2]), acceleration_at(twist, change, placed[:2])
         for i in (0, 1):
             first = primal(derivative(frame[i]))
             both = derivative(derivative(frame[i]))
-            np.testing.assert_allclose(twist[i][good], (first + zero)[good], rtol=1e-8, atol=1e-8)
+            np.testing.assert_allclose((speed[i] + zero)[good], (first + zero)[good], rtol=1e-8, atol=1e-8)
             size = 1 + np.abs(both + zero)
             assert np.all((np.abs(second[i] - both) <= 1e-7 * size)[good])
         c, s = primal(frame.c), primal(frame.s)
@@ -312,11 +315,9 @@ def test_general_reactions_balance_every_link(name: str) -> None:
         for link, sign in ((joint.sides[1], 1.0), (joint.sides[0], -1.0)):
             if link == OUTER:
                 continue
-            frame = case.frames[link]
-            dx, dy = second.x - frame.x, second.y - frame.y
             total[link][0] = total[link][0] + sign * wrench.x
             total[link][1] = total[link][1] + sign * wrench.y
-            total[link][2] = total[link][2] + sign * (wrench.m + dx * wrench.y - dy * wrench.x)
+            total[link][2] = total[link][2] + sign * moment_at(wrench, (-second.x, -second.y))
         if k not in group.driven:
             free = wrench.m if joint.kind == "revolute" else wrench.x * first.c + wrench.y * first.s
             assert np.all(np.abs(free + np.zeros(300))[good] < 1e-9), f"joint {k} resists its own freedom"
@@ -331,20 +332,18 @@ def test_general_balances_power(name: str) -> None:
     """Virtual power: loads on the links' motion, reactions on outer elements, drive efforts on their rates."""
     group = TOPOLOGIES[name]
     case, pose, good = regular(group, 300, 4)
-    outer = case.outer(Twist)
+    outer = case.outer()
     rates = [case.rng.normal(size=300) for _ in group.driven]
-    twists, loads = group.velocity(pose, outer, rates), case.loads()
+    (twists, _), loads = group.moved(pose, outer, outer, rates, rates), case.loads()
     reactions = group.reactions(pose, loads)
     power: Any = sum(
         load.x * twist.x + load.y * twist.y + load.m * twist.w for load, twist in zip(loads, twists, strict=True)
     )
     for k, (joint, wrench) in enumerate(zip(group.joints, reactions, strict=True)):
-        first, second = pose.elements[k]
+        first, second = pose.elements[k][:2]
         if OUTER in joint.sides:
-            base, side = outer[k], joint.sides.index(OUTER)
-            at = (first, second)[side]
-            dx, dy = second.x - at.x, second.y - at.y
-            given_power = wrench.x * (base.x - base.w * dy) + wrench.y * (base.y + base.w * dx) + wrench.m * base.w
+            side, (x, y) = joint.sides.index(OUTER), velocity_at(outer[k], second[:2])
+            given_power = wrench.x * x + wrench.y * y + wrench.m * outer[k].w
             power = power + (given_power if side == 0 else -given_power)
         if k in group.driven:
             effort = wrench.m if joint.kind == "revolute" else wrench.x * first.c + wrench.y * first.s
@@ -355,8 +354,7 @@ def test_general_balances_power(name: str) -> None:
 
 def table_case(kind: str, lanes: int) -> tuple[Any, General, Case]:
     """An entry of the table, the general group of the same joints, and random poses of it."""
-    driven = len(kind) == 1
-    general = General(1, (GroupJoint(KIND[kind], (OUTER, 0)),), (0,)) if driven else dyad(kind)
+    general = dyad(kind)
     return GROUPS[kind], general, Case(general, lanes, 21)
 
 
@@ -365,28 +363,18 @@ def test_every_entry_equals_the_general_group(kind: str) -> None:
     """Whatever is in the table: same motion and reactions as the general group, by duals as well."""
     lanes = 400
     closed, general, case = table_case(kind, lanes)
-    pose = general.position(case.elements, case.guess(), case.drive)
+    pose = general.position(case.elements, case.guess())
     good = np.broadcast_to(pose.condition, (lanes,)) < 300
-    branches = [None] if len(kind) == 1 else [1, -1]
-    found = [closed.position(case.elements, branch, case.drive) for branch in branches]
+    found = [closed.position(case.elements, branch) for branch in (1, -1)]
     hit = np.zeros(lanes, bool)
-    rates, seconds = ([case.rng.normal(size=lanes) for _ in case.drive] for _ in range(2))
-    outer, outer_a, loads = case.outer(Twist), case.outer(Acceleration), case.loads()
-    twists = general.velocity(pose, outer, rates)
-    accelerations = general.acceleration(pose, twists, outer, outer_a, seconds, rates)
-    expected = [pose.frames, twists, accelerations, general.reactions(pose, loads)]
+    outer, loads = (case.outer(), case.outer()), case.loads()
+    expected = [pose.frames, *general.moved(pose, *outer), general.reactions(pose, loads)]
     for one in found:
         here = good & np.all(
             [np.abs(a.x - b.x) + np.abs(a.c - b.c) < 1e-6 for a, b in zip(one.frames, case.frames, strict=True)], axis=0
         )
         hit |= here
-        speeds = closed.velocity(one, outer, rates)
-        actual = [
-            one.frames,
-            speeds,
-            closed.acceleration(one, speeds, outer, outer_a, seconds, rates),
-            closed.reactions(one, loads),
-        ]
+        actual = [one.frames, *closed.moved(one, *outer), closed.reactions(one, loads)]
         for a, b in zip(actual, expected, strict=True):
             same(a, b, np.where(here, size_of(b, lanes) * np.where(here, pose.condition, 1.0), np.inf))
         assert np.all(np.broadcast_to(closed.closure(one), (lanes,))[here] < 1e-12)
@@ -400,7 +388,7 @@ def test_meet(bc: float, cd: float, turn: float, bend: float, branch: int) -> No
     b = (0.3, -0.7)
     c = (b[0] + bc * np.cos(turn), b[1] + bc * np.sin(turn))
     d = (c[0] + cd * np.cos(turn + np.pi - bend), c[1] + cd * np.sin(turn + np.pi - bend))
-    x, y = rrr.meet(b, d, bc, cd, branch)
+    x, y = meet(b, d, bc, cd, branch)
     assert np.hypot(x, y) == pytest.approx(bc, rel=1e-9)
     assert np.hypot(b[0] + x - d[0], b[1] + y - d[1]) == pytest.approx(cd, rel=1e-7)
     side = (d[0] - b[0]) * y - (d[1] - b[1]) * x
@@ -414,7 +402,7 @@ def test_circles_that_miss_each_other_by_a_nanometre_do_not_meet(inward: bool) -
     centre = bc - cd if inward else bc + cd
     for gap, meets in ((-1e-9, True), (0.0, True), (1e-12, False), (1e-9, False), (1e-7, False)):
         with np.errstate(invalid="ignore"):
-            found = rrr.meet((0.0, 0.0), (centre - gap if inward else centre + gap, 0.0), bc, cd, 1)
+            found = meet((0.0, 0.0), (centre - gap if inward else centre + gap, 0.0), bc, cd, 1)
         assert bool(np.all(np.isfinite(found))) == meets, gap
 
 

@@ -16,9 +16,8 @@ from trunnion.algebra.dual import derivative, seed
 from trunnion.algebra.nested import flat
 from trunnion.algebra.space import ORIGIN, Frame, Screw, added, compose, element, minus, moment_at, power, relative
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
-from trunnion.groups.spatial import SpatialGroup, SpatialPose
-from trunnion.groups.spatial_tree import Element
-from trunnion.groups.tree import OUTER, GroupJoint
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.tree import OUTER, Element, GroupJoint, Pose
 from trunnion.joints.spatial import MOTIONS
 
 Array = NDArray[np.float64]
@@ -103,7 +102,7 @@ SIDES = [((OUTER, 0), (0, 1), (1, OUTER)), ((0, OUTER), (1, 0), (OUTER, 1)), ((O
 @pytest.mark.parametrize("sides", SIDES)
 def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int, int], ...]) -> None:
     joints, elements = dyad(sides)
-    closed, general = CylindricalDyad(2, joints, BRANCHES=(1, -1)), SpatialGroup(2, joints)
+    closed, general = CylindricalDyad(2, joints), SpatialGroup(2, joints)
     rng = np.random.default_rng(3)
     outer = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(2)]
     outer_second = [Screw(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for _ in range(2)]
@@ -129,11 +128,9 @@ def test_the_closed_form_of_the_dyad_is_the_general_group(sides: tuple[tuple[int
     assert solved > LANES
 
 
-def answers(group: SpatialGroup, pose: SpatialPose, outer: Any, outer_second: Any, loads: Any) -> Array:
+def answers(group: SpatialGroup, pose: Pose, outer: Any, outer_second: Any, loads: Any) -> Array:
     """Everything that a group finds, (number, lane)."""
-    speeds = group.rates(pose, outer)
-    twists = group.twists(pose, outer, speeds)
-    seconds = group.acceleration(pose, twists, outer, outer_second, (), speeds)
+    twists, seconds = group.moved(pose, outer, outer_second)
     return numbers((pose.frames, tuple(twists), tuple(seconds), tuple(group.reactions(pose, loads))))
 
 
@@ -175,7 +172,7 @@ def loop(kinds: tuple[str, ...], at: Array) -> tuple[SpatialGroup, list[Element]
     return group, elements, start, float(q[0][0])
 
 
-def follow(group: SpatialGroup, elements: list[Element], start: list[Any], drive: Array) -> list[SpatialPose]:
+def follow(group: SpatialGroup, elements: list[Element], start: list[Any], drive: Array) -> list[Pose]:
     """Poses one after the other from the first."""
     poses = []
     for value in drive:
@@ -198,9 +195,7 @@ def test_velocities_and_accelerations_are_derivatives(kinds: tuple[str, ...]) ->
     middle = poses[3]
     assert float(middle.gap) < 1e-12
     nothing = [None] * len(kinds)
-    speeds = group.rates(middle, nothing, [rate])
-    twists = group.twists(middle, nothing, speeds)
-    seconds = group.acceleration(middle, twists, nothing, nothing, [second], speeds)
+    twists, seconds = group.moved(middle, nothing, nothing, [rate], [second])
     spun = {link for link, _, _ in group.spinning}
     for link in set(range(group.links)) - spun:
         frames = [pose.frames[link] for pose in poses]
@@ -285,7 +280,7 @@ def test_a_loop_of_any_size_anywhere_turns_alike(seed_: int, size: float) -> Non
         return frame._replace(place=tuple(size * n for n in frame.place))
 
     moved = [
-        Element(*(changed(one.side(i), joint.sides[i] == OUTER) for i in (0, 1)), size * one.lead)
+        Element(*(changed(one[i], joint.sides[i] == OUTER) for i in (0, 1)), size * one.lead)
         for one, joint in zip(elements, group.joints, strict=True)
     ]
     here, there = group.position(elements, start, [drive]), group.position(moved, start, [drive])

@@ -356,14 +356,15 @@ def test_a_loop_goes_on_while_any_lane_changes() -> None:
     assert found[0].tolist() == np.minimum(rounds, 50.0).tolist()
 
 
-def test_a_loop_leaves_alone_the_lanes_that_are_done() -> None:
-    """Each lane has its own number of rounds, and none is made where all are done; the same with and without values."""
+def test_a_loop_ends_where_all_lanes_are_done() -> None:
+    """A step leaves lanes that are done; no round is made where all are; the same with and without values."""
     calls, needed = [], np.array([0.0, 3.0, 49.0, 7.0, 2.0, 60.0, 1.0, np.nan])
 
     def counted(limit: Any) -> Any:
         def step(state: list[Any]) -> list[Any]:
             calls.append(1)
-            return [state[0] + 1.0, state[0] - limit]
+            goes = state[0] < limit
+            return [np.where(goes, state[0] + 1.0, state[0]), np.where(goes, state[0] - limit, state[1])]
 
         return looped(step, [0.0 * limit, -1.0], 50, lambda state: np.logical_not(state[0] < limit))
 

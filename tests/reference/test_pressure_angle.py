@@ -91,8 +91,8 @@ def test_it_is_between_the_force_and_the_velocity_of_the_analysis(name: str, loa
     reaction = run.solve(run.cycle.times(24)).reactions[c]
 
     def velocity(link: str) -> tuple[Array, Array]:
-        frame, twist = walk.motions[link].frame, walk.motions[link].twist
-        return twist.x - twist.w * (place.y - frame.y), twist.y + twist.w * (place.x - frame.x)
+        twist = walk.motions[link].twist
+        return twist.x - twist.w * place.y, twist.y + twist.w * place.x
 
     (x, y), (hx, hy) = velocity(driven), velocity(holder)
     x, y = x - hx, y - hy

@@ -52,36 +52,33 @@ def weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
     return total
 
 
-def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number], pivoting: bool = True) -> list[list[Number]]:
+def solve(matrix: Sequence[Sequence[Number]], *sides: Sequence[Number]) -> list[list[Number]]:
     """Solutions x of A x = b for each right-hand side b in `sides`, by elimination with row pivoting per lane.
 
     matrix: n rows of n entries; sides: n entries each. Returns one list of n entries for each side.
-    Without pivoting the diagonal must outweigh the rest of each row. A singular lane comes out non-finite (a zero
-    pivot divides).
+    A singular lane comes out non-finite (a zero pivot divides).
     """
-    return _solve(matrix, sides, pivoting)[0]
+    return _solve(matrix, sides)[0]
 
 
 def solve_and_determinant(matrix: Sequence[Sequence[Number]], side: Sequence[Number]) -> tuple[list[Number], Number]:
     """`solve` for one side, and `determinant`, from one elimination."""
-    (solution,), determinant_ = _solve(matrix, (side,), True)
+    (solution,), determinant_ = _solve(matrix, (side,))
     return solution, determinant_
 
 
-def _solve(
-    matrix: Sequence[Sequence[Number]], sides: Sequence[Sequence[Number]], pivoting: bool
-) -> tuple[list[list[Number]], Number]:
+def _solve(matrix: Sequence[Sequence[Number]], sides: Sequence[Sequence[Number]]) -> tuple[list[list[Number]], Number]:
     n = len(matrix)
     columns = n + len(sides)
     rows = [[*row, *(side[i] for side in sides)] for i, row in enumerate(matrix)]
     if (table := _table(rows)) is not None:
-        return _solve_table(table, pivoting)
+        return _solve_table(table)
     xp = namespace(*(entry for row in rows for entry in row))
     rows = _quiet(rows)
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):
-            sign = _pivot(rows, k, columns, xp) if pivoting else 1.0
+            sign = _pivot(rows, k, columns, xp)
             product = product * sign * rows[k][k]
             for i in range(k + 1, n):
                 factor = rows[i][k] / rows[k][k]
@@ -123,13 +120,13 @@ def _table(rows: Sequence[Sequence[Number]]) -> Table | None:
     return table
 
 
-def _solve_table(table: Table, pivoting: bool) -> tuple[list[list[Number]], Number]:
+def _solve_table(table: Table) -> tuple[list[list[Number]], Number]:
     """`_solve` of a table, the sides in its last columns."""
     n = len(table)
     product: Number = 1.0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for k in range(n):
-            product = product * (_pivot_rows(table, k) if pivoting else 1.0) * table[k, k]
+            product = product * _pivot_rows(table, k) * table[k, k]
             _clear_below(table, k)
         x = np.empty_like(table[:, n:])
         for i in reversed(range(n)):
@@ -189,23 +186,26 @@ def _pivot(rows: list[list[Number]], k: int, columns: int, xp: Number) -> Number
     return sign
 
 
-def inverse(matrix: Sequence[Sequence[Number]], pivoting: bool = True) -> list[list[Number]]:
+def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
     """A⁻¹ as rows, by elimination with row pivoting per lane; non-finite where a lane is singular."""
     n = len(matrix)
     sides = ([1.0 if i == j else 0.0 for i in range(n)] for j in range(n))
-    columns = solve(matrix, *sides, pivoting=pivoting)
+    columns = solve(matrix, *sides)
     return [[columns[j][i] for j in range(n)] for i in range(n)]
 
 
 def quick_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """A⁻¹ as rows: adj A / det A up to 3 × 3, with half the passes over the arrays that elimination takes.
+    """A⁻¹ as rows without pivots: adj A / det A up to 3 × 3, of more rows by blocks.
 
-    It loses digits where A is badly conditioned: for an iteration that corrects itself.
+    It takes half the passes over the arrays that elimination takes, and loses digits where A is badly conditioned or
+    its diagonal small: for an iteration that corrects itself.
     """
-    if len(matrix) not in (2, 3):
-        return inverse(matrix)
     a = _quiet([list(row) for row in matrix])
+    if len(a) > 3:
+        return _inverse_by_blocks(a)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        if len(a) == 1:
+            return [[1 / a[0][0]]]
         if len(a) == 2:
             ((p, q), (r, s)) = a
             scale = 1 / (p * s - q * r)
@@ -219,9 +219,32 @@ def quick_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
         return [[minor * scale for minor in row] for row in minors]
 
 
+def _inverse_by_blocks(a: list[list[Number]]) -> list[list[Number]]:
+    """(P Q; R S)⁻¹ by S − R P⁻¹ Q, the complement of P."""
+    k = len(a) // 2
+    q, r, s = ([row[k:] for row in a[:k]], [row[:k] for row in a[k:]], [row[k:] for row in a[k:]])
+    p = quick_inverse([row[:k] for row in a[:k]])
+    before, after = _product(p, q), _product(r, p)
+    lower = quick_inverse(
+        [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(s, _product(r, before), strict=True)]
+    )
+    upper_right, lower_left = _product(before, lower), _product(lower, after)
+    upper = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(p, _product(upper_right, after), strict=True)]
+    return [
+        *([*row, *(-x for x in right)] for row, right in zip(upper, upper_right, strict=True)),
+        *([*(-x for x in left), *row] for left, row in zip(lower_left, lower, strict=True)),
+    ]
+
+
+def _product(a: Sequence[Sequence[Number]], b: Sequence[Sequence[Number]]) -> list[list[Number]]:
+    """A B."""
+    columns = list(zip(*b, strict=True))
+    return [[weighted(row, column) for column in columns] for row in a]
+
+
 def determinant(matrix: Sequence[Sequence[Number]]) -> Number:
     """Determinant by elimination with row pivoting per lane; NaN or 0 where a lane is singular."""
-    return _solve(matrix, (), True)[1]
+    return _solve(matrix, ())[1]
 
 
 def condition(matrix: Sequence[Sequence[Number]]) -> np.ndarray:

@@ -7,7 +7,7 @@ depends on the kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.dual import functions as dual_functions
 
-__all__ = ["Number", "Traced", "UntraceableError", "apart", "compiled", "looped", "namespace"]
+__all__ = ["Number", "Traced", "UntraceableError", "apart", "looped", "namespace"]
 
 # A float, a NumPy array, a dual number of them, or one that is recorded. Operators and `namespace` are all that is
 # assumed.
@@ -54,11 +54,6 @@ def namespace(*numbers: Number) -> Any:
     return found
 
 
-def compiled(numbers: Iterable[Number]) -> bool:
-    """Whether one of the numbers is compiled: it has no value to decide by."""
-    return any(isinstance(number, Traced) for number in numbers)
-
-
 def apart(lanes: Number) -> bool:
     """Whether there are lanes to go on with apart from the others.
 
@@ -70,20 +65,15 @@ def apart(lanes: Number) -> bool:
 def looped(step: Step, start: Sequence[Number], rounds: int, done: Done | None = None) -> list[Number]:
     """step(… step(start)), at most so many rounds. start, and what a step makes of it: lists of numbers.
 
-    done: whether a lane is done; it then stays as it is, whatever the lanes beside it need, and where all are no
-    further round is made. Numbers that are recorded have the step compiled once.
+    done: whether a lane is done. Where all are no further round is made; a step leaves those that are as they are,
+    whatever the lanes beside them need. Numbers that are recorded have the step compiled once.
     """
     state = list(start)
     for k in range(rounds):
         kind = next((type(number) for number in state if isinstance(number, Traced)), None)
         if kind is not None:
             return kind.looped(step, state, rounds - k, done)
-        stays = np.False_ if done is None else done(state)
-        if np.all(stays):
+        if done is not None and np.all(done(state)):
             break
-        further = step(state)
-        if np.any(stays):
-            pairs = zip(state, further, strict=True)
-            further = [new if new is old else namespace(old, new).where(stays, old, new) for old, new in pairs]
-        state = further
+        state = step(state)
     return state

@@ -1,18 +1,19 @@
-"""The few planar quantities that pass between modules, and rigid-body motion of a point.
+"""Frames, twists and wrenches in the plane, under the names that `space` has for those in space.
 
-All entries are numbers of `algebra.namespace` that broadcast over (sample, position). SI units, global axes.
+A twist is the velocity of a body's point at the origin of the global frame, with the angular velocity; a wrench has
+its moment about that origin. So twists of one link against the next, and wrenches on one link, simply add up, and the
+derivative of a twist is one, too. Entries are numbers of `algebra.namespace` that broadcast over (sample, position).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
-from trunnion.algebra.literal import is_zero, less
+from trunnion.algebra.literal import is_zero, less, plus
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
@@ -20,37 +21,38 @@ __all__ = [
     "NULL",
     "ORIGIN",
     "STILL",
+    "ZERO",
     "ZERO_LOAD",
-    "Acceleration",
     "Frame",
     "Twist",
+    "Vector2",
     "Wrench",
     "about",
-    "accelerated",
+    "acceleration_at",
     "added",
-    "along_slide",
-    "both_ends",
+    "bracket",
     "compose",
+    "distance",
+    "line_of",
     "load",
     "minus",
-    "moved",
+    "moment_at",
     "moving",
-    "pinned",
-    "point",
+    "place_of",
     "point_of",
     "power",
     "relative",
-    "root",
     "rotated",
     "rotated_moment",
-    "shifted",
+    "slid",
     "spin",
     "times",
     "turned",
+    "turned_vector",
+    "velocity_at",
 ]
 
-
-ROUNDING = 1e-15  # of the terms of a difference: a few units in the last place
+Vector2 = tuple[Number, Number]
 
 
 class Frame(NamedTuple):
@@ -71,27 +73,15 @@ class Frame(NamedTuple):
 
 
 class Twist(NamedTuple):
-    """Velocity of a point of a body (m/s) and the body's angular velocity w (rad/s)."""
+    """Velocity of a body's point at the origin, m/s, and angular velocity w, rad/s; or the derivative of both."""
 
     x: Number
     y: Number
     w: Number
-
-
-class Acceleration(NamedTuple):
-    """Acceleration of a point of a body (m/s²) and the body's angular acceleration w (rad/s²)."""
-
-    x: Number
-    y: Number
-    w: Number
-
-
-_Motion = TypeVar("_Motion", Twist, Acceleration)
-Vector2 = tuple[Number, Number]
 
 
 class Wrench(NamedTuple):
-    """Force (N) and moment (N m) about a stated point."""
+    """Force, N, and moment, N m, about the origin or a stated point."""
 
     x: Number
     y: Number
@@ -99,14 +89,17 @@ class Wrench(NamedTuple):
 
 
 _Triple = TypeVar("_Triple", Twist, Wrench)
-ZERO_LOAD = Wrench(0.0, 0.0, 0.0)
-ORIGIN = Frame(0.0, 0.0, 1.0, 0.0)
 NULL = (0.0, 0.0)
 NO_MOMENT = 0.0
-STILL = Twist(0.0, 0.0, 0.0), Acceleration(0.0, 0.0, 0.0)  # the motion of the ground
+ORIGIN = Frame(0.0, 0.0, 1.0, 0.0)
+ZERO, ZERO_LOAD = Twist(0.0, 0.0, 0.0), Wrench(0.0, 0.0, 0.0)
+STILL = ZERO, ZERO  # the motion of the ground
 
 
-def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
+# ---- frames ---------------------------------------------------------------------------------------------------
+
+
+def turned_vector(c: Number, s: Number, x: Number, y: Number) -> Vector2:
     """(x, y) turned by the angle whose cosine and sine are c, s."""
     if is_zero(y):
         return literal.times(c, x), literal.times(s, x)
@@ -115,22 +108,14 @@ def turned(c: Number, s: Number, x: Number, y: Number) -> tuple[Number, Number]:
     return c * x - s * y, s * x + c * y
 
 
-def point(frame: Frame, x: Number, y: Number) -> tuple[Number, Number]:
-    """Global place of the point with local coordinates (x, y)."""
-    if is_zero(x) and is_zero(y):
-        return frame.x, frame.y
-    dx, dy = turned(frame.c, frame.s, x, y)
-    return frame.x + dx, frame.y + dy
-
-
-def point_of(frame: Frame, local: Vector2) -> Vector2:
-    """Global place of a point given in a frame."""
-    return point(frame, *local)
+def place_of(frame: Frame) -> Vector2:
+    """The origin of a frame."""
+    return frame.x, frame.y
 
 
 def rotated(frame: Frame, v: Vector2) -> Vector2:
     """A direction given in a frame."""
-    return turned(frame.c, frame.s, *v)
+    return turned_vector(frame.c, frame.s, *v)
 
 
 def rotated_moment(frame: Frame, moment: Number) -> Number:
@@ -138,90 +123,103 @@ def rotated_moment(frame: Frame, moment: Number) -> Number:
     return moment
 
 
+def point_of(frame: Frame, v: Vector2) -> Vector2:
+    """Global place of a point given in a frame."""
+    if is_zero(v[0]) and is_zero(v[1]):
+        return frame.x, frame.y
+    dx, dy = turned_vector(frame.c, frame.s, *v)
+    return frame.x + dx, frame.y + dy
+
+
 def compose(frame: Frame, local: Frame) -> Frame:
-    """Global frame of an element given in local coordinates of a link."""
-    x, y = point(frame, local.x, local.y)
-    c, s = turned(frame.c, frame.s, local.c, local.s)
-    return Frame(x, y, c, s)
+    """A frame that is given in another."""
+    return Frame(*point_of(frame, (local.x, local.y)), *turned_vector(frame.c, frame.s, local.c, local.s))
 
 
-def relative(element: Frame, local: Frame) -> Frame:
-    """Frame of the link whose element with the local frame `local` lies at the global frame `element`."""
-    c, s = turned(element.c, element.s, local.c, -local.s)
-    dx, dy = turned(c, s, local.x, local.y)
-    return Frame(element.x - dx, element.y - dy, c, s)
+def relative(far: Frame, local: Frame) -> Frame:
+    """The frame in which `local` is where `far` is: far ∘ local⁻¹."""
+    c, s = turned_vector(far.c, far.s, local.c, -local.s)
+    dx, dy = turned_vector(c, s, local.x, local.y)
+    return Frame(far.x - dx, far.y - dy, c, s)
 
 
-def pinned(
-    pin: Frame, local: Frame, reach: tuple[Number, Number], side: tuple[Number, Number], square: Number
-) -> tuple[Frame, tuple[Number, Number]]:
-    """Frame of a link whose pin (`local`) has a known place and whose side, `side` in local axes, lies along `reach`.
-
-    square: squared length of the side, m². Also the vector from the frame's origin to the pin.
-    """
-    c, s = turned(side[0] / square, -side[1] / square, *reach)
-    arm = turned(c, s, local.x, local.y)
-    return Frame(pin.x - arm[0], pin.y - arm[1], c, s), arm
+def turned(frame: Frame, angle: Number) -> Frame:
+    """The frame turned in its place."""
+    xp = namespace(angle)
+    return Frame(frame.x, frame.y, *turned_vector(xp.cos(angle), xp.sin(angle), frame.c, frame.s))
 
 
-def both_ends(outer: Sequence[_Motion | None], group: str) -> tuple[_Motion, _Motion]:
-    """Motion of the outer elements of a dyad, first and last of its joints; ValueError if one is not given."""
-    first, _, last = outer
-    if first is None or last is None:
-        raise ValueError(f"the {group} group needs the motion of both its outer joints")
-    return first, last
+def slid(frame: Frame, way: Number) -> Frame:
+    """The frame moved along its own x axis."""
+    return Frame(frame.x + frame.c * way, frame.y + frame.s * way, frame.c, frame.s)
 
 
-def root(square: Number, scale: Number) -> Number:
-    """√square, where a dead centre makes it 0: what rounding leaves below 0, of the terms `scale`, counts as 0.
-
-    Anything further below is NaN: there is no position.
-    """
-    xp = namespace(square, scale)
-    return xp.sqrt(xp.where((square < 0) & (square > -ROUNDING * scale), 0.0, square))
+def distance(a: Frame, b: Frame) -> Number:
+    """Between the origins of two frames, m; its real part."""
+    return np.hypot(primal(b.x) - primal(a.x), primal(b.y) - primal(a.y))
 
 
-def shifted(frame: Frame, direction: tuple[Number, Number], by: Number) -> Frame:
-    """The frame moved along a direction."""
-    return Frame(frame.x + by * direction[0], frame.y + by * direction[1], frame.c, frame.s)
+# ---- twists and wrenches --------------------------------------------------------------------------------------
 
 
-def along_slide(
-    carried: Acceleration, w: Number, direction: tuple[Number, Number], speed: Number, second: Number
-) -> Acceleration:
-    """Acceleration of a point that slides on a body turning at w: that of the body there, Coriolis, and its own."""
-    coriolis = 2 * w * speed
-    return Acceleration(
-        carried.x - coriolis * direction[1] + second * direction[0],
-        carried.y + coriolis * direction[0] + second * direction[1],
-        carried.w,
-    )
+def line_of(frame: Frame) -> Twist:
+    """The twist of a turn of 1 rad/s about the origin of a frame."""
+    return Twist(frame.y, -frame.x, 1.0)
 
 
-def moved(velocity: Twist, dx: Number, dy: Number) -> Twist:
-    """Velocity of the point that lies (dx, dy) from the one given, on the same body."""
-    if is_zero(dx) and is_zero(dy):
-        return velocity
-    return Twist(velocity.x - velocity.w * dy, velocity.y + velocity.w * dx, velocity.w)
+def added(a: _Triple, b: _Triple) -> _Triple:
+    """a + b."""
+    return type(a)(plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2]))
 
 
-def accelerated(acceleration: Acceleration, w: Number, dx: Number, dy: Number) -> Acceleration:
-    """Acceleration of the point that lies (dx, dy) from the one given, on a body that turns at w."""
-    if is_zero(dx) and is_zero(dy):
-        return acceleration
-    ww = w * w
-    return Acceleration(
-        acceleration.x - acceleration.w * dy - ww * dx,
-        acceleration.y + acceleration.w * dx - ww * dy,
-        acceleration.w,
-    )
+def minus(a: _Triple, b: _Triple) -> _Triple:
+    """a − b."""
+    return type(a)(less(a[0], b[0]), less(a[1], b[1]), less(a[2], b[2]))
 
 
-def moving(frame: Frame, twist: Twist, acceleration: Acceleration, local: Vector2) -> tuple[Vector2, Vector2, Vector2]:
-    """Place, velocity and acceleration of the point of a moving frame with local coordinates."""
-    place = point(frame, *local)
-    arm = place[0] - frame.x, place[1] - frame.y
-    return place, moved(twist, *arm)[:2], accelerated(acceleration, twist.w, *arm)[:2]
+def times(factor: Number, a: _Triple) -> _Triple:
+    """factor · a."""
+    return type(a)(literal.times(factor, a[0]), literal.times(factor, a[1]), literal.times(factor, a[2]))
+
+
+def bracket(a: Twist, b: Twist) -> Twist:
+    """Lie bracket a × b: the rate of a twist b that is carried along with the twist a."""
+    x = less(literal.times(b.w, a.y), literal.times(a.w, b.y))
+    y = less(literal.times(a.w, b.x), literal.times(b.w, a.x))
+    return Twist(x, y, 0.0)
+
+
+def power(wrench: Wrench, twist: Twist) -> Number:
+    """F · v + M ω, W."""
+    force = plus(literal.times(wrench.x, twist.x), literal.times(wrench.y, twist.y))
+    return plus(force, literal.times(wrench.m, twist.w))
+
+
+def velocity_at(twist: Twist, place: Vector2) -> Vector2:
+    """Velocity that a twist has at a place, m/s: v + ω × p."""
+    return less(twist.x, literal.times(twist.w, place[1])), plus(twist.y, literal.times(twist.w, place[0]))
+
+
+def acceleration_at(twist: Twist, second: Twist, place: Vector2) -> Vector2:
+    """Acceleration at a place, m/s², of a body with a twist and its derivative: a₀ + ω̇ × p + ω × v."""
+    velocity, (x, y) = velocity_at(twist, place), velocity_at(second, place)
+    return less(x, literal.times(twist.w, velocity[1])), plus(y, literal.times(twist.w, velocity[0]))
+
+
+def moment_at(wrench: Wrench, place: Vector2) -> Number:
+    """Moment of a wrench about a place: M − p × F."""
+    return less(wrench.m, less(literal.times(place[0], wrench.y), literal.times(place[1], wrench.x)))
+
+
+def about(force: Vector2, moment: Number, place: Vector2) -> Wrench:
+    """The wrench of a force at a place and a moment, about the origin."""
+    arm = less(literal.times(place[0], force[1]), literal.times(place[1], force[0]))
+    return Wrench(force[0], force[1], plus(moment, arm))
+
+
+def load(frame: Frame, force: Vector2, moment: Number, place: Vector2) -> Wrench:
+    """What a force at a place and a moment do to a link: the wrench about the origin, whatever its frame."""
+    return about(force, moment, place)
 
 
 def spin(twist: Twist) -> Number:
@@ -229,34 +227,7 @@ def spin(twist: Twist) -> Number:
     return np.abs(primal(twist.w))
 
 
-def about(wrench: Wrench, dx: Number, dy: Number) -> Wrench:
-    """The wrench about the point that lies (dx, dy) from its present one."""
-    if (is_zero(wrench.x) and is_zero(wrench.y)) or (is_zero(dx) and is_zero(dy)):  # a pure moment, or the same point
-        return wrench
-    return Wrench(wrench.x, wrench.y, wrench.m - (dx * wrench.y - dy * wrench.x))
-
-
-def load(frame: Frame, force: Vector2, moment: Number, place: Vector2) -> Wrench:
-    """What a force at a place and a moment do to the link with a frame: the wrench about its origin."""
-    return about(Wrench(*force, moment), frame.x - place[0], frame.y - place[1])
-
-
-def added(a: Wrench, b: Wrench) -> Wrench:
-    """a + b, both about the same point."""
-    return Wrench(literal.plus(a.x, b.x), literal.plus(a.y, b.y), literal.plus(a.m, b.m))
-
-
-def minus(a: Wrench, b: Wrench) -> Wrench:
-    """a − b, both about the same point."""
-    return Wrench(less(a.x, b.x), less(a.y, b.y), less(a.m, b.m))
-
-
-def times(factor: Number, a: _Triple) -> _Triple:
-    """factor · a."""
-    return type(a)(*(literal.times(factor, n) for n in a))
-
-
-def power(wrench: Wrench, twist: Twist) -> Number:
-    """F · v + M ω of a wrench about a point and the velocity of that point, W."""
-    force = literal.plus(literal.times(wrench.x, twist.x), literal.times(wrench.y, twist.y))
-    return literal.plus(force, literal.times(wrench.m, twist.w))
+def moving(frame: Frame, twist: Twist, acceleration: Twist, local: Vector2) -> tuple[Vector2, Vector2, Vector2]:
+    """Place, velocity, acceleration of a point of a moving frame: v = v₀ + ω × p, a = a₀ + ω̇ × p + ω × v."""
+    place = point_of(frame, local)
+    return place, velocity_at(twist, place), acceleration_at(twist, acceleration, place)

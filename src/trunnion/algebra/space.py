@@ -29,12 +29,14 @@ __all__ = [
     "added",
     "bracket",
     "compose",
+    "distance",
     "element",
     "line_of",
     "load",
     "minus",
     "moment_at",
     "moving",
+    "place_of",
     "point_of",
     "power",
     "quaternion",
@@ -46,6 +48,7 @@ __all__ = [
     "times",
     "turned",
     "vector_minus",
+    "velocity_at",
 ]
 
 
@@ -176,6 +179,17 @@ def line_of(frame: Frame) -> Screw:
     return Screw(frame.z, cross(frame.place, frame.z))
 
 
+def place_of(frame: Frame) -> Vector3:
+    """The origin of a frame."""
+    return frame.place
+
+
+def distance(a: Frame, b: Frame) -> Number:
+    """Between the origins of two frames, m; its real part."""
+    apart = vector_minus(b.place, a.place)
+    return np.sqrt(primal(dot(apart, apart)))
+
+
 # ---- screws ---------------------------------------------------------------------------------------------------
 
 
@@ -212,6 +226,9 @@ def about(force: Vector3, moment: Vector3, place: Vector3) -> Screw:
 def moment_at(a: Screw, place: Vector3) -> Vector3:
     """Moment of a wrench about a place, or velocity of a twist at it: m − p × u = m + u × p."""
     return plus(a.m, cross(a.u, place))
+
+
+velocity_at = moment_at  # the same of a twist
 
 
 def load(frame: Frame, force: Vector3, moment: Vector3, place: Vector3) -> Screw:

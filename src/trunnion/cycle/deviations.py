@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.plane import point
-from trunnion.algebra.space import point_of
 from trunnion.cycle.fill import Into
 from trunnion.joints.clearance import describing
 from trunnion.model.contact import clearance
@@ -93,14 +91,13 @@ def _fill_contacts(
         size = np.sqrt(x * x + y * y + z * z)
         share = np.where(size > 0, radius / np.where(size > 0, size, 1.0), np.nan)
         along = half if end else -half
-        local: tuple[Number, Number, Number]
         if guide:
             local = (0.0, 0.0, along) if spatial else (along, 0.0, 0.0)
         elif len(model.ends[0]) == 3:
             local = (share * x, share * y, share * z)
         else:
             local = (share * x, share * y, along)
-        place = point_of(frame, local) if spatial else point(frame, local[0], local[1])
+        place = walk.algebra.point_of(frame, local[: len(walk.system.axes)])
         for axis, number in enumerate(place):
             arrays["contact_position"][i, end, axis, window] = number
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Status
-from trunnion.groups import rpr, rrp, rrr
+from trunnion.groups.dyad import DyadPose
 from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Backward
@@ -230,21 +230,20 @@ def _not_assembled(causes: Causes, dial: Dial, part: _Open) -> Finding:
 def _shortfalls(walk: Forward, number: int) -> dict[str, Number]:
     """Why a closed form has no position: each reason with the length by which it holds where it is positive."""
     module, pose = walk.system.plan.modules[number], walk.poses[number]
-    if isinstance(pose, rrr.RRRPose):
-        b, c, d = module.joints
-        (pin_b, _), _, (pin_d, _) = walk.pairs(walk.system.places[number])
-        gap = np.hypot(pin_d.x - pin_b.x, pin_d.y - pin_b.y)
-        bc, cd = pose.lengths
+    if not isinstance(pose, DyadPose):
+        return {}
+    b, c, d = module.joints
+    if module.kind == "RRR":
+        (pin_b, b_i), (c_i, c_j), (pin_d, d_j) = walk.pairs(walk.system.places[number])
+        gap, bc, cd = (np.hypot(two.x - one.x, two.y - one.y) for one, two in ((pin_b, pin_d), (b_i, c_i), (c_j, d_j)))
         return {
             f"|{b}{d}| exceeds {b}{c} + {c}{d}": gap - (bc + cd),
             f"|{b}{d}| falls short of |{b}{c} − {c}{d}|": np.abs(bc - cd) - gap,
         }
-    if isinstance(pose, rrp.RRPPose):
-        b, c, _ = module.joints
-        return {f"the path of {c} is farther from {b} than |{b}{c}|": np.abs(pose.p) - pose.length}
-    if isinstance(pose, rpr.RPRPose):
-        b, c, d = module.joints
-        return {f"|{b}{d}| falls short of the offset of the slide {c}": np.abs(pose.offset) - pose.length}
+    if module.kind == "RRP":
+        return {f"the path of {c} is farther from {b} than |{b}{c}|": np.abs(pose.lost) - pose.scale}
+    if module.kind == "RPR":
+        return {f"|{b}{d}| falls short of the offset of the slide {c}": np.abs(pose.lost) - pose.scale}
     return {}
 
 

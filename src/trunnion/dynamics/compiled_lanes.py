@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.linalg import solve
+from trunnion.algebra.linalg import quick_inverse, weighted
 from trunnion.algebra.namespace import Number, looped, namespace
 from trunnion.dynamics.tables import FIXED
 
@@ -117,7 +117,7 @@ def solved(
     def better(state: Numbers) -> list[Number]:
         *friction, done = state
         miss, slopes = _missed(pins, per, first, influence, friction)
-        (step,) = solve(slopes, miss, pivoting=False)  # a bound below 1: the diagonal is largest
+        step = [weighted(row, miss) for row in quick_inverse(slopes)]  # a bound below 1: the diagonal is largest
         new = [xp.where(done > 0.0, one, one + more) for one, more in zip(friction, step, strict=True)]
         close = _largest(xp, miss) <= CLOSE * _largest(xp, new)
         return [*new, xp.where(close | (done > 0.0), 1.0, 0.0)]

@@ -63,9 +63,11 @@ class Followed:
         assert self.snapshot is not None
         system, module = walk.system, walk.system.plan.modules[self.number]
         rates = [system.drive(walk.values, name, time)[1] for name in module.driven]
-        outer = [walk.outside(place)[0] for place in system.places[self.number]]
+        outer = [walk.outside(place) for place in system.places[self.number]]
+        known = [twist for twist, _ in outer], [second for _, second in outer]
+        twists, _ = group.moved(pose, *known, rates, (0.0,) * len(rates))
         since, missed = time - self.snapshot.time, 0.0
-        for link, frame, twist in zip(module.links, pose.frames, group.velocity(pose, outer, rates), strict=True):
+        for link, frame, twist in zip(module.links, pose.frames, twists, strict=True):
             before = self.snapshot.motions[link]
             for was, is_ in zip(flat(before.frame), flat(frame), strict=True):
                 missed = missed + self.pace * np.abs(primal(is_) - was)

@@ -227,7 +227,7 @@ class Graph:
     ) -> list[int]:
         """step(… step(start)): the nodes of one step, made once and run `rounds` times at most.
 
-        done: by lane, of a state; a lane that is done stays as it is.
+        done: by lane, of a state; where all are no further round is made.
         """
         start = [self.as_float(number) for number in start]
         if rounds < 1:
@@ -240,11 +240,7 @@ class Graph:
             self.loops.append(Loop(0, (), ()))  # its number is taken, also for loops within
             states = tuple(self.node("state", (), (index, k), differs, 1 << index) for k in range(len(start)))
             results = tuple(self.as_float(number) for number in step(list(states)))
-            ends = None
-            if done is not None:
-                stays = done(list(states))
-                results = tuple(self.where(stays, *pair) for pair in zip(states, results, strict=True))
-                ends = done(list(results))
+            ends = None if done is None else done(list(results))
             most = differs
             for number in results:
                 most |= self.differs[number]

@@ -1,21 +1,21 @@
 """Modules of a mechanism: drivers and Assur groups, on numbers.
 
-`GROUPS` lists the closed forms by the letters of their joints; everything else is a `general.General`.
+A module has `position(elements, assembly, drive)`, which gives a pose with the `frames` of its links;
+`moved(pose, outer, outer_seconds, drive, seconds)`, the twists of its links and their derivatives;
+`reactions(pose, loads)`, `closure(pose)` and `condition(pose)`; and `BRANCHES`, the assemblies that `position` takes.
+Modules see numbers only: no model, no friction, no clearance. Friction and inertia arrive as loads. `GROUPS` lists the
+closed forms in the plane by the letters of their joints; everything else is a `general.General`.
 """
 
 from __future__ import annotations
 
-from trunnion.groups import driver, prp, rpp, rpr, rrp, rrr
-from trunnion.groups.protocol import Group
+from trunnion.groups.dyad import Dyad
+from trunnion.groups.prp import PRP
+from trunnion.groups.rpp import RPP
+from trunnion.groups.rpr import RPR
+from trunnion.groups.rrp import RRP
+from trunnion.groups.rrr import RRR
 
-__all__ = ["GROUPS", "Group"]
+__all__ = ["GROUPS"]
 
-GROUPS: dict[str, Group] = {
-    "R": driver.REVOLUTE,
-    "P": driver.PRISMATIC,
-    "RRR": rrr,
-    "RRP": rrp,
-    "RPR": rpr,
-    "PRP": prp,
-    "RPP": rpp,
-}
+GROUPS: dict[str, Dyad] = {dyad.letters: dyad for dyad in (RRR(), RRP(), RPR(), PRP(), RPP())}

@@ -20,9 +20,9 @@ import numpy as np
 
 from trunnion.algebra.dual import parts, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import root
 from trunnion.algebra.pose import compose, inverse, link, transform, turn_x
 from trunnion.algebra.vector import Vector3, apply, cross, dot, length, plus, scaled, transpose
+from trunnion.groups.dyad import root
 
 __all__ = ["BRANCHES", "Loop", "closure", "condition", "meet", "position", "rates"]
 

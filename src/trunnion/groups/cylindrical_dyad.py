@@ -17,9 +17,8 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import Frame, compose, relative, vector_minus
 from trunnion.algebra.vector import Vector3, cross, dot, plus, scaled, unit, vector_parts
 from trunnion.groups import ccc
-from trunnion.groups.spatial import SpatialGroup, SpatialPose
-from trunnion.groups.spatial_tree import Element
-from trunnion.groups.tree import OUTER
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.tree import OUTER, Element, Pose
 
 __all__ = ["CylindricalDyad"]
 
@@ -27,7 +26,9 @@ __all__ = ["CylindricalDyad"]
 class CylindricalDyad(SpatialGroup):
     """Joints in the order outer, inner, outer; links: that of the first outer joint, then the other."""
 
-    def position(self, elements: Sequence[Element], assembly: int, drive: Sequence[Number] = ()) -> SpatialPose:  # type: ignore[override]
+    BRANCHES = (1, -1)
+
+    def position(self, elements: Sequence[Element], assembly: int, drive: Sequence[Number] = (), late: int = 0) -> Pose:
         """Pose of the assembly ±1: the sign of ĉ · (b̂ × d̂); NaN where the axes do not reach each other."""
         with np.errstate(all="ignore"):
             outer = [self._of(elements, k, OUTER) for k in (0, 2)]
@@ -40,16 +41,17 @@ class CylindricalDyad(SpatialGroup):
                 relative(_triad(*found), _triad(*own)) for found, own in zip(((b, c), (c, d)), sides, strict=True)
             ]
             q = [self._coordinates(elements, frames, k) for k in range(3)]
-            return self._posed(elements, q, self.size([Element(*one) for one in elements]))
+            return self._posed(elements, q, self.size(elements))
 
     def _of(self, elements: Sequence[Element], joint: int, link: int) -> Frame:
         """The element of a joint on a link."""
-        return elements[joint].side(self.joints[joint].sides.index(link))
+        frame: Frame = elements[joint][self.joints[joint].sides.index(link)]
+        return frame
 
     def _coordinates(self, elements: Sequence[Element], frames: Sequence[Frame], k: int) -> list[Number]:
         """Turn and slide of a joint from the frames of the links."""
         first, second = (
-            elements[k].side(side) if link == OUTER else compose(frames[link], elements[k].side(side))
+            elements[k][side] if link == OUTER else compose(frames[link], elements[k][side])
             for side, link in enumerate(self.joints[k].sides)
         )
         sine, cosine = dot(second.x, first.y), dot(second.x, first.x)

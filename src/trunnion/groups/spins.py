@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.groups.spatial_tree import Element
+from trunnion.groups.tree import Element
 
 if TYPE_CHECKING:
     from trunnion.groups.spatial import SpatialGroup

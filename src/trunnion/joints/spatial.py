@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.space import Frame, Screw, line_of, slid, turned
@@ -32,9 +33,9 @@ class PairMotion:
 
     kinds: tuple[str, ...]
     steps: tuple[str, ...]
-    place: Callable[[Frame, Coordinates, Number], Frame]
-    unplace: Callable[[Frame, Coordinates, Number], Frame]
-    screws: Callable[[Frame, Frame, Number], list[Screw]]
+    place: Callable[..., Any]  # of the frames and screws of its algebra
+    unplace: Callable[..., Any]
+    screws: Callable[..., list[Any]]
     advance: Callable[[Coordinates, Sequence[Number]], list[Number]] | None = None
     together: bool = False
 

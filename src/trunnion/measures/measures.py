@@ -173,7 +173,7 @@ class Measure:
         return kind.value_in_space(self, walk) if isinstance(walk, SpatialWalk) else kind.value(self, walk)
 
     def loads(self, walk: Forward) -> dict[str, Any]:
-        """The unit loads by link: their power is the rate of the measure. About the link's origin, in space the global.
+        """The unit loads by link: their power is the rate of the measure. About the global origin.
 
         They are equal and opposite on the two links of a joint.
         """

@@ -87,9 +87,8 @@ def _push(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
 
 
 def _at(walk: Forward, link: str, wrench: Wrench, x: Number, y: Number) -> Wrench:
-    """A load at a place, about the origin of a link."""
-    frame = walk.motions[link].frame
-    return plane.about(wrench, frame.x - x, frame.y - y)
+    """A load at a place, about the origin."""
+    return plane.about(wrench[:2], wrench.m, (x, y))
 
 
 def _angle(measure: MotionRequest, walk: Forward) -> Number:
@@ -103,7 +102,7 @@ def _turn(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
 
 def _rotation(measure: MotionRequest, walk: Forward) -> Number:
     first, second = (walk.motions[link].frame for link in walk.system.joints[measure.subject][1])
-    c, s = plane.turned(first.c, -first.s, second.c, second.s)
+    c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
     return namespace(c, s).arctan2(s, c)
 
 

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from trunnion.algebra.linalg import cross, dot
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups import prp, rpp, rpr, rrp, rrr
+from trunnion.groups.dyad import DyadPose
 from trunnion.solve.forward import Forward
 
 __all__ = ["of_joint", "pressure_angle", "pressure_angles"]
@@ -29,19 +28,11 @@ def pressure_angle(pose: Any) -> Number | None:
 
     Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
     """
-    match pose:  # what is lost of the force, and what moves
-        case rrr.RRRPose():
-            lost, moves = dot(pose.bc, pose.dc), 1 / pose.area
-        case rrp.RRPPose():
-            lost, moves = pose.p, pose.r
-        case rpr.RPRPose():
-            lost, moves = pose.offset, pose.along
-        case prp.PRPPose() | rpp.RPPPose():
-            lost, moves = dot(pose.u, pose.v), cross(pose.u, pose.v)
-        case _:
-            return None
-    xp = namespace(lost, moves)
-    return xp.arctan2(lost, xp.abs(moves))
+    if not isinstance(pose, DyadPose):
+        return None
+    moves = 1 / pose.area
+    xp = namespace(pose.lost, moves)
+    return xp.arctan2(pose.lost, xp.abs(moves))
 
 
 def pressure_angles(walk: Forward) -> dict[str, Number]:

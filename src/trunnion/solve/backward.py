@@ -14,7 +14,6 @@ from trunnion.algebra import literal
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
-from trunnion.groups.general import General
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.friction import FrictionLaw, LawFunction
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
@@ -228,8 +227,8 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
     back = Backward(walk, unloaded(walk) | dict(loads))
     for number in reversed(range(len(system.plan.modules))):
         module, places, group = system.plan.modules[number], system.places[number], system.groups[number]
-        if isinstance(group, General):
-            group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears_of(group)))
+        if gears := gears_of(group):
+            group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears))
         reactions = walk.reacting(group).reactions(walk.poses[number], [back.loads[link] for link in module.links])
         for place, reaction in zip(places, reactions, strict=False):  # then come those of gear pairs
             if not place.witness:
@@ -402,9 +401,9 @@ def _record(
         motion, unit = walk.freedom(joint, walk.system.turns(joint))
         effort = back.efforts[joint] = algebra.power(wrench, motion)
         back.reactions[joint] = algebra.minus(wrench, algebra.times(effort, unit))
-    if back.travels:
-        back.passed[joint] = algebra.power(whole, walk.against(joint))
     second = walk.system.joints[joint][1][1]
+    if back.travels:
+        back.passed[joint] = algebra.power(walk.on_link(second, whole, joint), walk.against(joint))
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, whole if link == second else algebra.times(-1.0, whole), joint))

@@ -145,7 +145,7 @@ def guess_reaches(group: Followed, spread: float) -> list[float]:
 def _geared(group: Any) -> list[int]:
     """Entries of q that a gear pair multiplies."""
     geared = {gear.first for gear in getattr(group, "gears", ())}
-    return [i for i, step in enumerate(group.steps) if step.joint in geared - set(group.driven)] if geared else []
+    return [group.starts[joint] for joint in group.order if joint in geared - set(group.driven)]
 
 
 def extent(group: Followed, elements: Elements) -> float:

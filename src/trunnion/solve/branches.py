@@ -20,10 +20,9 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import each
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.gear import NUMBERS, rotation
-from trunnion.groups.general import OUTER
-from trunnion.groups.protocol import Elements
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.spins import unspun
+from trunnion.groups.tree import OUTER
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
 from trunnion.results.sentences import finding_for
@@ -366,7 +365,7 @@ def _track(walk: Forward, number: int, group: Any, drive: Sequence[Number], time
     return Decision(track, ways, True, told_twice(walk, module, named, nearest if decided or ways == 1 else None))
 
 
-def _turns(walk: Forward, module: Module, group: Any, elements: Elements, times: Array) -> dict[int, Array]:
+def _turns(walk: Forward, module: Module, group: Any, elements: Sequence[Any], times: Array) -> dict[int, Array]:
     """Rotations of the known joints that gear pairs speak of and nothing drives, followed from that nearest to 0."""
     found = {}
     for i, (name, gear) in enumerate(zip(module.gears, getattr(group, "gears", ()), strict=True)):
@@ -380,7 +379,7 @@ def _turns(walk: Forward, module: Module, group: Any, elements: Elements, times:
     return found
 
 
-def _starts(group: Any, elements: Elements, drive: Sequence[Number], grid: int) -> Iterator[int]:
+def _starts(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> Iterator[int]:
     """The start of the cycle, then those of some positions spread over it where the group closes."""
     yield 0
     if grid > 1:

@@ -38,7 +38,7 @@ Vector = tuple[Number, ...]  # of two components in the plane, of three in space
 
 
 class Motion(NamedTuple):
-    """Frame of a link, its twist and the derivative of that: in the plane of the link's origin, in space of the global.
+    """Frame of a link, its twist about the global origin and the derivative of that.
 
     The types are those of `algebra.plane` or `algebra.space`.
     """
@@ -121,6 +121,11 @@ class Forward(ABC):
         """Element of a joint on a link that lies in a frame."""
         return self.algebra.compose(frame, self.local[link, joint])
 
+    def against(self, joint: str) -> Any:
+        """Twist of the second link of a joint against the first."""
+        first, second = self.system.joints[joint][1]
+        return self.algebra.minus(self.motions[second].twist, self.motions[first].twist)
+
     def speed(self, joint: str) -> Number:
         """Relative speed of a joint, second link against first, along its first freedom; rad/s, m/s."""
         return self.rates(joint)[0 if self.system.turns(joint) else 1]
@@ -200,6 +205,15 @@ class Forward(ABC):
             acceleration = motion.acceleration if own.acceleration is None else own.acceleration
             self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
 
+    def outside(self, place: Place) -> tuple[Any, Any]:
+        """Motion of the known link of a module's joint; of a witness that of its second link against its first."""
+        outer = [self.motions[link] for link, known in zip(place.links, place.outer, strict=True) if known]
+        if len(outer) < 2:
+            return (outer[0].twist, outer[0].acceleration) if outer else (None, None)
+        first, second = outer
+        minus = self.algebra.minus
+        return minus(second.twist, first.twist), minus(second.acceleration, first.acceleration)
+
     def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
         """Twists of a module's links with a free spin, without what they spin; none have one in the plane."""
         return {}
@@ -210,9 +224,8 @@ class Forward(ABC):
         module, places = system.plan.modules[number], system.places[number]
         _, rates, seconds = driven_coordinates(system, module, places, self.values, time)
         outer = [self.outside(place) for place in places]
-        twists, accelerations = self.moved(
-            system.groups[number], pose, [twist for twist, _ in outer], [second for _, second in outer], rates, seconds
-        )
+        known = [twist for twist, _ in outer], [second for _, second in outer]
+        twists, accelerations = system.groups[number].moved(pose, *known, rates, seconds)
         for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
             self.motions[link] = Motion(frame, twist, second)
         self.poses.append(pose)
@@ -243,10 +256,6 @@ class Forward(ABC):
         """Turn or slide of a joint, whichever a driver moves, from its elements."""
 
     @abstractmethod
-    def against(self, joint: str) -> Any:
-        """Twist of the second link of a joint against the first; in the plane of the joint's point on the second."""
-
-    @abstractmethod
     def slip_motion(self, joint: str) -> tuple[Number, Number]:
         """Slip of the contact of a joint that moves one way only, and its rate; m/s, m/s²."""
 
@@ -261,16 +270,6 @@ class Forward(ABC):
     @abstractmethod
     def in_hole(self, joint: str, wrench: Any) -> tuple[Vector, Vector]:
         """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
-
-    @abstractmethod
-    def outside(self, place: Place) -> tuple[Any, Any]:
-        """Motion on the known side of a module's joint, as its group wants it; None if it has none."""
-
-    @abstractmethod
-    def moved(
-        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
-    ) -> tuple[Sequence[Any], Sequence[Any]]:
-        """Twists of a module's links and their derivatives, from those outside and of its drivers."""
 
     @abstractmethod
     def frame_rate(self, frame: Any) -> Any:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from trunnion.algebra import linalg
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.literal import is_zero
-from trunnion.algebra.namespace import Number, looped
+from trunnion.algebra.namespace import Number, apart, looped
 from trunnion.algebra.nested import replaced
 from trunnion.joints.friction import LawFunction
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod, peak
-from trunnion.solve.friction_problem import Contact, FrictionProblem, State, added, largest, total
+from trunnion.solve.friction_problem import Contact, FrictionProblem, added, largest, total
 
 __all__ = [
     "Contact",
@@ -49,8 +49,6 @@ OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its l
 SETTLED = 1e-11  # of the largest friction: where the iteration ends
 SLOW = 1e-2  # of the miss: a round of Newton's method that leaves more has another matrix after it
 STUBBORN = 20  # rounds of Newton's method: a lane that takes more goes back and forth between the sides of a kink
-COMPILED_ROUNDS = 3  # of Newton's method where the numbers have no values to tell when to end; one more beyond FEW
-FEW = 3  # contacts of a dyad
 
 
 class Reacting(Protocol):
@@ -84,7 +82,7 @@ class Settled(NamedTuple):
 def settle(
     group: Reacting, pose: object, loads: Sequence[Any], contacts: Sequence[Contact], method: FrictionMethod
 ) -> Settled:
-    """Reactions and friction forces of one module under `loads` (about the link origins, friction not included)."""
+    """Reactions and friction forces of one module under `loads`, friction not included."""
     start = group.reactions(pose, loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
@@ -96,7 +94,7 @@ def settle(
         return _successive(problem, method)
     if problem.one_way:
         return _at_once(problem)
-    return _unrolled(problem, method) if problem.compiled else _newton(problem, method)
+    return _newton(problem, method)
 
 
 def _times(multiple: Number, contact: Contact) -> Contact:
@@ -121,7 +119,8 @@ def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
 
     So are certain lanes that kinks keep from settling: their continuation leads to the same, only solution. The rounds
-    counted are Newton's. A followed lane gets as many as it needs to obey its laws, as the others do.
+    counted are Newton's. A followed lane gets as many as it needs to obey its laws, as the others do. Lanes that cannot
+    be treated apart stay as they are, for whoever compiles to compute again.
     """
     real = primal_of(problem)
     none: list[Number] = [0.0] * len(real.contacts)
@@ -129,58 +128,72 @@ def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     state = real.state(none)
     bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
     certain = ~(bound >= 1.0)
-    found = _iterated(real, _Iterate(none, ~certain, state, real.gaps(state, none)), method)
+    rounds = min(method.limit, STUBBORN)
+    at = _round(real, _Iterate(none, state.normals, real.gaps(state, none)), method)
+    # one without the certificate goes no further by itself
+    at = at._replace(done=np.where(certain, at.done, 1.0), rounds=np.where(certain, 1.0, 0.0))
+    at = _iterated(real, at, rounds - 1, method)
     shares: Number = 1.0
     left = ~certain
     if method.limit >= STUBBORN:
-        left = left | ~(found.done | _obeyed(real, found))
-    if np.any(left):
-        forces, shares = _follow(real, found.forces, left)
+        left = left | ~((at.done > 0) | _obeyed(real, at))
+    if apart(left):
+        forces, shares = _follow(real, at.forces, left)
         state = real.state(forces)
-        again = _Iterate(forces, ~left, state, real.gaps(state, forces), found.rows, found.inverse, found.rounds)
-        found = _iterated(real, again, method)
-    state, rows, inverse = found.state, found.rows, found.inverse
+        again, gaps = np.where(left, 1.0, 0.0), real.gaps(state, forces)
+        at = at._replace(forces=forces, normals=state.normals, gaps=gaps, excess=np.inf, slow=again, done=1.0 - again)
+        at = _iterated(real, at, rounds, method)
+    forces = at.forces
+    state = real.state(forces, at.normals)
     depth = _depth(problem)
-    forces = found.forces
-    if depth:  # the ε parts need the matrix of the solution, not that of the way there
-        rows = real.map_derivative(state)
-        inverse = linalg.quick_inverse(identity_minus(rows))
+    inverse = linalg.quick_inverse(identity_minus(real.map_derivative(state))) if depth else []  # at the solution
     for _ in range(depth):
         forces = _corrected(forces, problem.gaps(problem.state(forces), forces), inverse)
         state = problem.state(forces)
-    # of no lanes at all nothing is known
-    contraction = largest([total([np.abs(entry) for entry in row]) for row in rows]) if rows else 0.0
-    converged = found.done if method.criterion is not None else _obeyed(real, found)
+    converged = (at.done > 0) if method.criterion is not None else _obeyed(real, at)
     return Settled(
         reactions=problem.reactions(forces, state),
         forces=forces,
-        iterations=found.rounds,
-        change=found.change,
-        contraction=contraction,
+        iterations=at.rounds,
+        change=at.change,
+        contraction=at.contraction,
         converged=converged & (shares >= 1.0),
-        residual=real.misfit(found.gaps),
+        residual=real.misfit(at.gaps),
         share=shares,
         certain=certain,
         problem=real,
     )
 
 
-@dataclass(frozen=True)
-class _Iterate:
-    """Where Newton's method is: forces and, by lane, whether it is done there.
+class _Iterate(NamedTuple):
+    """Where Newton's method is: forces, and normal loads and law − force under them.
 
-    state, gaps: reactions and law − force under these forces; rows, inverse: A and (1 − A)⁻¹ as last needed; rounds,
-    change: how many it took and the last change of a normal load, N.
+    inverse: (1 − A)⁻¹ as last needed; excess: miss of the worst law; change: of a normal load in the last round, N;
+    contraction: ∞-norm of that A; slow: 1 where the next round has another A; done: 1 where there is none; rounds: so
+    many were made.
     """
 
     forces: list[Number]
-    done: Number
-    state: State
+    normals: list[Number]
     gaps: list[Number]
-    rows: Sequence[Sequence[Number]] = ()
     inverse: Sequence[Sequence[Number]] = ()
-    rounds: Number = 0
+    excess: Number = 1.0  # of no friction at all
     change: Number = np.inf
+    contraction: Number = 0.0
+    slow: Number = 1.0
+    done: Number = 0.0
+    rounds: Number = 0.0
+
+    def in_row(self) -> list[Number]:
+        """Its numbers, as `looped` has them."""
+        rows = (self.forces, self.normals, self.gaps, *self.inverse)
+        return [*(number for row in rows for number in row), *self[4:]]
+
+    def of_row(self, row: Sequence[Number]) -> _Iterate:
+        """Such a one with other numbers."""
+        n = len(self.forces)
+        lists = [list(row[k : k + n]) for k in range(0, len(row) - 6, n)]
+        return _Iterate(lists[0], lists[1], lists[2], lists[3:], *row[-6:])
 
 
 def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
@@ -188,95 +201,46 @@ def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
     return ~(real.excess(at.gaps, at.forces) > OBEYED)
 
 
-def _iterated(real: FrictionProblem, start: _Iterate, method: FrictionMethod) -> _Iterate:
-    """Newton's method from a start, in the lanes that are not done; those that are stay as they are.
+def _iterated(real: FrictionProblem, start: _Iterate, rounds: int, method: FrictionMethod) -> _Iterate:
+    """At most so many rounds of Newton's method, in the lanes that are not done; those that are stay as they are."""
+
+    def step(row: list[Number]) -> list[Number]:
+        return _round(real, start.of_row(row), method).in_row()
+
+    return start.of_row(looped(step, start.in_row(), rounds, lambda row: row[-2] > 0))
+
+
+def _round(real: FrictionProblem, at: _Iterate, method: FrictionMethod) -> _Iterate:
+    """One round of Newton's method.
 
     A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
     hundredth of the residual, which in all but the worst cases is always; a lane that crosses a kink leaves more and
     gets the A of its new side. So what a lane comes to does not depend on the lanes beside it. It is done when every
     friction is what its law says for the load, whatever the last round changed.
     """
-    forces, done, state, gaps = start.forces, start.done, start.state, start.gaps
-    rows, inverse, rounds, change = start.rows, start.inverse, start.rounds, start.change
-    excess: Number = 1.0  # of no friction at all
-    slow: Number = ~done
-    for _ in range(min(method.limit, STUBBORN)):
-        going = ~done
-        if not np.any(going):
-            break
-        rounds = rounds + going
-        if np.any(slow):
-            fresh = real.map_derivative(state)
-            rows = _chosen(slow, fresh, rows)
-            inverse = _chosen(slow, linalg.quick_inverse(identity_minus(fresh)), inverse)
-        (forces,) = _chosen(going, [_corrected(forces, gaps, inverse)], [forces])
-        before, state = state, real.state(forces)
-        gaps = real.gaps(state, forces)
-        previous, excess = excess, real.excess(gaps, forces)
-        here = _changed(state, before)
-        change = np.where(going, here, change)
-        # a lane of NaN has nothing to wait for
-        ends = ~(excess > SETTLED) if method.criterion is None else ~np.greater(here, method.criterion)
-        done = done | ends
-        slow = (excess > SLOW * previous) & ~done
-    return _Iterate(forces, done, state, gaps, rows, inverse, rounds, change)
-
-
-def _chosen(lanes: Number, rows: Sequence[Sequence[Number]], others: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """The rows in the chosen lanes, the others elsewhere; either whole where that is what it comes to."""
-    if not others or np.all(lanes):
-        return [list(row) for row in rows]
-    if not np.any(lanes):
-        return [list(row) for row in others]
-    return [[np.where(lanes, a, b) for a, b in zip(*pair, strict=True)] for pair in zip(rows, others, strict=True)]
-
-
-def _unrolled(problem: FrictionProblem, method: FrictionMethod) -> Settled:
-    """Newton with a fixed number of rounds, for numbers that are compiled; the last one carries the derivatives.
-
-    Lanes that need more, and those without the certificate, are for whoever compiles to compute again; so are those
-    whose margin comes out as NaN.
-    """
-    real = primal_of(problem)
-    forces: list[Number] = [0.0] * len(real.contacts)
+    inverse, contraction, slow = at.inverse, at.contraction, at.slow > 0
+    if np.any(slow):
+        rows = real.map_derivative(real.state(at.forces, at.normals))
+        fresh = linalg.quick_inverse(identity_minus(rows))
+        inverse = [_chosen(slow, *both) for both in zip(fresh, inverse, strict=True)] if inverse else fresh
+        norm = largest([total([np.abs(entry) for entry in row]) for row in rows])
+        (contraction,) = _chosen(slow, [norm], [contraction])
+    stays = at.done > 0
+    forces = _chosen(~stays, _corrected(at.forces, at.gaps, inverse), at.forces)
     state = real.state(forces)
-    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
-    certain = ~(bound >= 1.0)
-    rows = real.map_derivative(state)
-
-    def step(now: list[Number]) -> list[Number]:
-        at = real.state(now)
-        return _corrected(now, real.gaps(at, now), _matrix(real, at))
-
-    if len(forces) <= FEW:  # written out: quicker to run, but not to compile
-        for _ in range(COMPILED_ROUNDS - 2):
-            forces = step(forces)
-    else:
-        forces = looped(step, forces, COMPILED_ROUNDS - 1)
-    forces = step(forces)
-    state = real.state(forces)
-    forces = _corrected(forces, problem.gaps(problem.state(forces), forces), _matrix(real, state))
-    before, state = state, problem.state(forces)
-    plain = [primal(force) for force in forces]
-    gaps = real.gaps(real.state(plain), plain)
-    return Settled(
-        reactions=problem.reactions(forces, state),
-        forces=forces,
-        iterations=COMPILED_ROUNDS,
-        change=_changed(state, before),
-        contraction=largest([total([np.abs(entry) for entry in row]) for row in rows]),
-        converged=certain & ~(real.excess(gaps, plain) > SETTLED),
-        residual=real.misfit(gaps),
-        share=1.0,
-        certain=certain,
-        problem=real,
-    )
+    gaps = real.gaps(state, forces)
+    excess, change = real.excess(gaps, forces), _changed(state.normals, at.normals)
+    # a lane of NaN has nothing to wait for
+    done = stays | ~(excess > SETTLED if method.criterion is None else change > method.criterion)
+    slow = (excess > SLOW * at.excess) & ~done
+    (change,) = _chosen(~stays, [change], [at.change])
+    flags = slow + 0.0, done + 0.0, at.rounds + ~stays
+    return _Iterate(forces, state.normals, gaps, inverse, excess, change, contraction, *flags)
 
 
-def _matrix(problem: FrictionProblem, state: State) -> list[list[Number]]:
-    """(1 − A)⁻¹ at a state where the rows of |A| add up to less than 1: no pivots are needed."""
-    matrix = identity_minus(problem.map_derivative(state))
-    return linalg.quick_inverse(matrix) if len(matrix) <= FEW else linalg.inverse(matrix, pivoting=False)
+def _chosen(lanes: Number, row: Sequence[Number], others: Sequence[Number]) -> list[Number]:
+    """The numbers of the row in the chosen lanes, the others elsewhere."""
+    return list(row) if np.all(lanes) else [np.where(lanes, a, b) for a, b in zip(row, others, strict=True)]
 
 
 def _at_once(problem: FrictionProblem) -> Settled:
@@ -292,9 +256,9 @@ def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequen
     return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
-def _changed(state: State, before: State) -> Number:
+def _changed(normals: Sequence[Number], before: Sequence[Number]) -> Number:
     """Largest change of a normal load, N."""
-    return largest([a - b for a, b in zip(state.normals, before.normals, strict=True)])
+    return largest([a - b for a, b in zip(normals, before, strict=True)])
 
 
 def _successive(problem: FrictionProblem, method: FrictionMethod) -> Settled:
@@ -310,7 +274,7 @@ def _successive(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         forces = problem.target(state.normals)
         before, state = state, problem.state(forces)
         gaps = problem.gaps(state, forces)
-        previous, change = change, _changed(state, before)
+        previous, change = change, _changed(state.normals, before.normals)
         done = ~(problem.excess(gaps, forces) > SETTLED) if method.criterion is None else ~(change > method.criterion)
         if np.all(done):
             break
@@ -349,17 +313,11 @@ def scaled(
     problem: FrictionProblem, weights: Callable[[Number], Sequence[Number]] | None = None
 ) -> continuation.System:
     """Residual φ − w(s) law(N(φ)) and its Jacobian. weights: multiple of each contact's friction at a share, or s."""
-    last: list[Any] = [(), (), ()]  # forces, and what follows from them: the next share begins where one ended
-
-    def laws(forces: Sequence[Number]) -> tuple[list[Number], list[list[Number]]]:
-        if problem.compiled or not last[0] or not all(map(np.array_equal, forces, last[0])):
-            state = problem.state(forces)
-            last[:] = forces, problem.target(state.normals), problem.map_derivative(state)
-        return last[1], last[2]
 
     def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
         multiples = [share] * len(problem.contacts) if weights is None else weights(share)
-        return balance(problem, forces, *laws(forces), multiples)
+        state = problem.state(forces)
+        return balance(problem, forces, problem.target(state.normals), problem.map_derivative(state), multiples)
 
     return system
 
@@ -395,4 +353,4 @@ def _depth(problem: FrictionProblem) -> int:
 
 def primal_of(problem: FrictionProblem) -> FrictionProblem:
     """The problem without derivatives."""
-    return problem.mapped(primal) if _depth(problem) or problem.compiled else problem
+    return problem.mapped(primal) if _depth(problem) else problem

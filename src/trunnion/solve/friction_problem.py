@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero, less, plus
-from trunnion.algebra.namespace import Number, compiled
+from trunnion.algebra.namespace import Number, apart
+from trunnion.algebra.nested import replaced
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
@@ -121,10 +122,14 @@ class FrictionProblem:
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
-    @cached_property
-    def compiled(self) -> bool:
-        """Whether its numbers have no values yet."""
-        return compiled(self.numbers)
+    def in_lanes(self, function: Callable[[FrictionProblem, Number], Number], lanes: Number, others: Number) -> Number:
+        """function(problem, lanes that count) in some lanes, computed apart where that can be; `others` elsewhere."""
+        if not np.any(lanes):
+            return others
+        if not apart(lanes):
+            return np.where(lanes, function(self, lanes), others)
+        part, chosen = self.picked(lanes)
+        return replaced(others, chosen, function(part, True))
 
     @cached_property
     def felt(self) -> list[Felt]:
@@ -169,14 +174,16 @@ class FrictionProblem:
                 found[joint] = start if still else added(start, _changes([c[joint] for c in self.influence], forces))
         return [found[joint] for joint in range(len(self.start))]
 
-    def state(self, forces: Sequence[Number]) -> State:
-        """Reactions and normal loads at the contacts under friction forces."""
+    def state(self, forces: Sequence[Number], normals: list[Number] | None = None) -> State:
+        """Reactions and normal loads at the contacts under friction forces. normals: where they are known."""
         if all(is_zero(force) for force in forces):
             at = [one.start for one in self.felt]
         else:
             changes = {k: _combined(self._crossed[k], forces) for k in set(self._alike)}
             at = [added(one.start, changes[k]) for one, k in zip(self.felt, self._alike, strict=True)]
-        return State(at, [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)])
+        if normals is None:
+            normals = [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)]
+        return State(at, normals)
 
     @cached_property
     def slopes(self) -> list[Number]:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import ZERO_LOAD, Wrench, about, added, moved, power
-from trunnion.groups.gear import GearPair, Mesh, ToothForces, actions, apart, mesh
+from trunnion.algebra.plane import ZERO_LOAD, Wrench, added, power
+from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh
 from trunnion.groups.general import General
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import PlanarContactLoad
@@ -31,9 +31,8 @@ def gears_of(group: object) -> tuple[GearPair, ...]:
 
 def _mesh(walk: Forward, number: int, i: int) -> tuple[GearPair, Mesh]:
     """A gear pair of a module and where its gears touch."""
-    pose = walk.poses[number]
-    gear = gears_of(walk.system.groups[number])[i]
-    return gear, mesh(gear, (pose.elements[gear.first], pose.elements[gear.second]), pose.ratios[i])
+    pose, gear = walk.poses[number], gears_of(walk.system.groups[number])[i]
+    return gear, mesh(gear, pose.elements, pose.ratios[i])
 
 
 def teeth(walk: Forward, number: int) -> Iterator[Contact]:
@@ -44,11 +43,10 @@ def teeth(walk: Forward, number: int) -> Iterator[Contact]:
             continue
         gear, touch = _mesh(walk, number, i)
         units = dict.fromkeys(module.links, ZERO_LOAD)
-        for joint, side, wrench, at in apart(gear, touch, 1.0):
+        for joint, side, wrench in apart(gear, touch, 1.0):
             link = places[joint].links[side]
             if link in units:
-                frame = walk.motions[link].frame
-                units[link] = added(units[link], about(wrench, frame.x - at.x, frame.y - at.y))
+                units[link] = added(units[link], wrench)
         angle = walk.values[f"gears.{name}.pressure_angle"]
         # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
         load = PlanarContactLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
@@ -63,7 +61,7 @@ def _separation(normal: Number, slip: Number, **parameters: Number) -> Number:
 SEPARATION = FrictionLaw(_separation)
 
 
-def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[ToothForces]:
+def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[ToothForce]:
     """What a gear pair of a module does with a torque in its second joint; parting: by tooth forces, not torques alone.
 
     Torques alone are what moves with the play of joints: the ratio holds between rotations, which no offset of a pin
@@ -75,7 +73,7 @@ def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = T
 
 def gear_load(
     walk: Forward, number: int, i: int, torque: Number, separation: Number
-) -> tuple[GearLoad, list[ToothForces]]:
+) -> tuple[GearLoad, list[ToothForce]]:
     """What a gear pair does in the file's sense, and to which links. separation: the force that parts its gears, N."""
     done = acting(walk, number, i, torque)
     force: tuple[Number, Number] = (0.0, 0.0)
@@ -89,19 +87,17 @@ def gear_load(
     return GearLoad(-torque * walk.poses[number].ratios[i], (-force[0], -force[1])), done
 
 
-def power_of(walk: Forward, number: int, done: Sequence[ToothForces]) -> Number:
+def power_of(walk: Forward, number: int, done: Sequence[ToothForce]) -> Number:
     """Power of a gear pair on the way of its wheels' centres, W; without travel of their pins there is none."""
     total: Number = 0.0
-    for joint, side, wrench, at in done:
-        frame, twist, _ = walk.motions[walk.system.places[number][joint].links[side]]
-        total = total + power(wrench, moved(twist, at.x - frame.x, at.y - frame.y))
+    for joint, side, wrench in done:
+        total = total + power(wrench, walk.motions[walk.system.places[number][joint].links[side]].twist)
     return total
 
 
-def on_links(walk: Forward, number: int, done: Sequence[ToothForces]) -> Iterator[tuple[str, Wrench]]:
-    """What gear pairs do to the known links of a module, about their origins."""
-    for joint, side, wrench, at in done:
+def on_links(walk: Forward, number: int, done: Sequence[ToothForce]) -> Iterator[tuple[str, Wrench]]:
+    """What gear pairs do to the known links of a module."""
+    for joint, side, wrench in done:
         place = walk.system.places[number][joint]
         if place.outer[side]:
-            frame = walk.motions[place.links[side]].frame
-            yield place.links[side], about(wrench, frame.x - at.x, frame.y - at.y)
+            yield place.links[side], wrench

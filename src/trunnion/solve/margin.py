@@ -22,7 +22,6 @@ from trunnion.solve.friction import (
     with_own,
 )
 from trunnion.solve.friction_method import peak
-from trunnion.solve.friction_problem import largest
 
 __all__ = ["locking_margin"]
 
@@ -43,11 +42,6 @@ def _found(back: Backward) -> Number:
     iterated = [(k, problem) for k, problem in known if not problem.one_way]
     if most <= 0 or not iterated:
         return np.inf
-    if iterated[0][1].compiled:
-        last = iterated[-1][0]
-        problem = iterated[0][1] if _alone(back, last) else _together(back, last + 1)
-        # of a triangular row the certificates of its modules are enough
-        return _compiled(problem, largest([one.bound() for _, one in known]), most)
     margin: Number = np.inf
     left: Number = np.True_
     for k, own in reversed(iterated):  # a module without a certificate is followed with those that load it
@@ -91,24 +85,12 @@ def _together(back: Backward, count: int) -> FrictionProblem:
 def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: Number) -> Number:
     """The multiple for each lane. shares: those at which lanes are known to lock, 1 of the others."""
     known = np.asarray(shares) < 1.0
-    margin = np.where(known, shares, np.inf)
-    doubtful = doubtful & ~known & _loaded(problem)
-    if not np.any(doubtful):
-        return margin
-    part, chosen = problem.picked(doubtful)
-    _, reached = continuation.follow(scaled(part), frictionless(part), most)
-    margin = np.broadcast_to(margin, chosen.shape).copy()
-    margin[chosen] = np.where(reached >= most, np.inf, reached)
-    return margin
 
+    def reached(part: FrictionProblem, wanted: Number) -> Number:
+        _, share = continuation.follow(scaled(part), frictionless(part), most, wanted)
+        return np.where(share >= most, np.inf, share)
 
-def _compiled(problem: FrictionProblem, bound: Number, most: float) -> Number:
-    """The same of numbers that are compiled; lanes whose bound is 1 or more are NumPy's."""
-
-    bound = np.where(_loaded(problem), bound, 0.0)
-    wanted = (bound * most >= 1.0) & (bound < 1.0)
-    _, reached = continuation.follow(scaled(problem), frictionless(problem), most, wanted)
-    return np.where(reached >= most, np.inf, reached)
+    return problem.in_lanes(reached, doubtful & ~known & _loaded(problem), np.where(known, shares, np.inf))
 
 
 def _loaded(problem: FrictionProblem) -> Number:

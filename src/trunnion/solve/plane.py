@@ -1,11 +1,12 @@
 """What a joint does in the plane: its rates, its contact with friction, its wrench; the rest is in `solve.forward`.
 
-Twists, accelerations and wrenches of a link are about its origin, those of a joint about its point on its second link.
+Twists and wrenches of a link are about the origin of the global frame, those of a joint about its point on its second
+link, where a pin carries no moment.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from trunnion.algebra import plane
 from trunnion.algebra.dual import primal
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import Acceleration, Frame, Twist, Wrench, about, accelerated, moved
+from trunnion.algebra.plane import Frame, Twist, Wrench, about, acceleration_at, moment_at, place_of, velocity_at
 from trunnion.joints.pairs import PlanarContactLoad, Reaction
 from trunnion.solve.forward import Forward, rate_of
 from trunnion.solve.friction_problem import Rubbing
@@ -34,7 +35,7 @@ class PlaneWalk(Forward):
         """Turn in (−π, π] rad, or slide, m, of a joint."""
         first, second = self.ends(joint)
         if self.system.turns(joint):
-            c, s = plane.turned(first.c, -first.s, second.c, second.s)
+            c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
             return namespace(s, c).arctan2(s, c), 0.0
         return 0.0, first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
@@ -44,37 +45,23 @@ class PlaneWalk(Forward):
             return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
         return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
-    def against(self, joint: str) -> Twist:
-        """Velocity of a joint's point on its second link and spin of that link, against the first."""
-        one, two = (moved(self.motions[link].twist, *self._arm(link, joint)) for link in self.system.joints[joint][1])
-        return Twist(two.x - one.x, two.y - one.y, two.w - one.w)
-
-    def _arm(self, link: str, joint: str) -> tuple[Number, Number]:
-        """From the origin of a link to a joint's point on its second link."""
-        at, frame = self.ends(joint)[1], self.motions[link].frame
-        return at.x - frame.x, at.y - frame.y
-
     def rates(self, joint: str) -> tuple[Number, Number]:
         """Rate of the turn or of the slide."""
-        first, second = self.system.joints[joint][1]
         if self.system.turns(joint):
+            first, second = self.system.joints[joint][1]
             return self.motions[second].twist.w - self.motions[first].twist.w, 0.0
-        return 0.0, self._along(joint, self.against(joint))
+        axis, at = self.ends(joint)
+        x, y = velocity_at(self.against(joint), place_of(at))
+        return 0.0, axis.c * x + axis.s * y
 
     def second_rates(self, joint: str) -> tuple[Number, Number]:
         """Its derivative; the Coriolis part 2 ω × ṡ lies across the slide."""
-        first, second = self.system.joints[joint][1]
+        first, second = (self.motions[link] for link in self.system.joints[joint][1])
         if self.system.turns(joint):
-            return self.motions[second].acceleration.w - self.motions[first].acceleration.w, 0.0
-        one, two = (
-            accelerated(self.motions[link].acceleration, self.motions[link].twist.w, *self._arm(link, joint))
-            for link in (first, second)
-        )
-        return 0.0, self._along(joint, Acceleration(two.x - one.x, two.y - one.y, 0.0))
-
-    def _along(self, joint: str, change: Twist | Acceleration) -> Number:
-        axis = self.ends(joint)[0]
-        return axis.c * change.x + axis.s * change.y
+            return second.acceleration.w - first.acceleration.w, 0.0
+        axis, at = self.ends(joint)
+        one, two = (acceleration_at(link.twist, link.acceleration, place_of(at)) for link in (first, second))
+        return 0.0, axis.c * (two[0] - one[0]) + axis.s * (two[1] - one[1])
 
     def slip_motion(self, joint: str) -> tuple[Number, Number]:
         """Slip of a joint's contact, second link against first, and its rate; m/s, m/s²."""
@@ -92,13 +79,13 @@ class PlaneWalk(Forward):
 
     def hole_spin(self, joint: str) -> tuple[Number, ...]:
         """Angular velocity of the hole of a joint against its pin, rad/s."""
-        first, second = self.system.joints[joint][1]
-        return (self.motions[second].twist.w - self.motions[first].twist.w,)
+        return (self.against(joint).w,)
 
     def in_hole(self, joint: str, wrench: Wrench) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
         hole, at = self.hole(joint), self.ends(joint)[1]
-        x, y, moment = about(wrench, hole.x - at.x, hole.y - at.y)
+        x, y, _ = wrench
+        moment = moment_at(wrench, (hole.x - at.x, hole.y - at.y))
         return (x * hole.c + y * hole.s, y * hole.c - x * hole.s), (moment,)
 
     # ---- the walk ---------------------------------------------------------------------------------------------
@@ -106,27 +93,8 @@ class PlaneWalk(Forward):
     def frame_rate(self, frame: Frame) -> Twist:
         """Twist of a link whose frame has the rates of its numbers as ε parts."""
         spin = primal(frame.c) * rate_of(frame.s) - primal(frame.s) * rate_of(frame.c)
-        return Twist(rate_of(frame.x), rate_of(frame.y), spin)
-
-    def outside(self, place: Place) -> tuple[Twist | None, Acceleration | None]:
-        """Motion of a joint's element on its known link; of a witness its relative motion, which gear pairs see."""
-        if place.witness:
-            one, two = (self.motions[link] for link in place.links)
-            twist = Twist(0.0, 0.0, two.twist.w - one.twist.w)
-            return twist, Acceleration(0.0, 0.0, two.acceleration.w - one.acceleration.w)
-        link = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
-        if link is None:
-            return None, None
-        (frame, twist, acceleration), element = self.motions[link], self.element(link, place.joint)
-        arm = element.x - frame.x, element.y - frame.y
-        return moved(twist, *arm), accelerated(acceleration, twist.w, *arm)
-
-    def moved(
-        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
-    ) -> tuple[Sequence[Twist], Sequence[Acceleration]]:
-        """Velocities and accelerations of a module's links."""
-        found = group.velocity(pose, twists, rates)
-        return found, group.acceleration(pose, found, twists, accelerations, seconds, rates)
+        x, y = primal(frame.x), primal(frame.y)
+        return Twist(rate_of(frame.x) + spin * y, rate_of(frame.y) - spin * x, spin)
 
     # ---- forces -----------------------------------------------------------------------------------------------
 
@@ -138,9 +106,8 @@ class PlaneWalk(Forward):
         return Twist(along.c, along.s, 0.0), Wrench(along.c, along.s, 0.0)
 
     def on_link(self, link: str, wrench: Wrench, joint: str) -> Wrench:
-        """A joint's wrench about the origin of a link."""
-        dx, dy = self._arm(link, joint)
-        return about(wrench, -dx, -dy)
+        """A joint's wrench about the origin."""
+        return about(wrench[:2], wrench.m, place_of(self.ends(joint)[1]))
 
     def reacting(self, group: Any) -> Any:
         """A module whose reactions are flat tuples."""
@@ -155,12 +122,13 @@ class PlaneWalk(Forward):
         if self.system.turns(place.joint):
             return found
         here, there = self.ends(place.joint)  # the module's second point is the file's first
-        return about(found, there.x - here.x, there.y - here.y)
+        return Wrench(found.x, found.y, moment_at(found, (there.x - here.x, there.y - here.y)))
 
     def bare(self, joint: str, wrench: Wrench) -> Wrench:
         """A reaction without what acts along the freedom of its joint: rounding, and of a pin exactly nothing."""
         motion, unit = self.freedom(joint, self.system.turns(joint))
-        return plane.minus(wrench, plane.times(plane.power(wrench, motion), unit))
+        rest: Wrench = plane.minus(wrench, plane.times(plane.power(wrench, motion), unit))
+        return rest
 
     def inertia_moment(self, link: str) -> Number | None:
         """−J α about the mass centre, N m; None of a link without inertia.  [D 2-5]"""

@@ -16,9 +16,10 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Frame
 from trunnion.errors import Finding, MechanismError
-from trunnion.groups import GROUPS, Group
+from trunnion.groups import GROUPS
 from trunnion.groups.gear import GearPair
-from trunnion.groups.general import OUTER, General, GroupJoint
+from trunnion.groups.general import General
+from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
 from trunnion.joints.pairs import PAIRS
@@ -121,9 +122,9 @@ class System:
     axes: ClassVar[str] = "xy"
 
     @cached_property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[Any, ...]:
         """The module that computes each entry of the plan."""
-        return tuple(self._group(module) for module in self.plan.modules)
+        return tuple(self._group(*both) for both in zip(self.plan.modules, self.places, strict=True))
 
     @cached_property
     def places(self) -> tuple[tuple[Place, ...], ...]:
@@ -163,17 +164,13 @@ class System:
         outer = (links[0] not in module.links, links[1] not in module.links)
         return Place(name, kind, links, outer, reversed_)
 
-    def _group(self, module: Module) -> Group:
+    def _group(self, module: Module, places: Sequence[Place]) -> Any:
         if module.kind in GROUPS:
             return GROUPS[module.kind]
-        number = {link: i for i, link in enumerate(module.links)}
-        names = (*module.joints, *module.witnesses)
-        joints = tuple(
-            GroupJoint(kind, (number.get(first, OUTER), number.get(second, OUTER)))
-            for kind, (first, second) in (self.joints[name] for name in names)
-        )
+        names = [place.joint for place in places]
         driven = tuple(names.index(name) for name in module.driven)
-        return General(len(module.links), joints, driven, tuple(self._gear(name, names) for name in module.gears))
+        gears = tuple(self._gear(name, names) for name in module.gears)
+        return General(len(module.links), group_joints(module, places), driven, gears=gears)
 
     def _gear(self, name: str, names: Sequence[str]) -> GearPair:
         first, second = (names.index(joint) for joint in self.gear_joints(name))
@@ -419,6 +416,13 @@ class System:
         """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
         revolute = self.turns(driver)
         return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
+
+
+def group_joints(module: Module, places: Sequence[Place]) -> tuple[GroupJoint, ...]:
+    """The joints of a module by the numbers of its links."""
+    number = {link: i for i, link in enumerate(module.links)}
+    sides = ((number.get(first, OUTER), number.get(second, OUTER)) for first, second in (p.links for p in places))
+    return tuple(GroupJoint(place.kind, pair) for place, pair in zip(places, sides, strict=True))
 
 
 def freed(values: Values, motions: Mapping[str, tuple[Number, Number, Number]]) -> dict[str, Number]:

@@ -202,11 +202,8 @@ def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array
     """Point (x, y), m, where two links have the same velocity; at infinity (±inf or NaN) where they turn alike."""
     one, two = walk.motions[first], walk.motions[second]
     w = two.twist.w - one.twist.w
-    # velocities at the origin of the drawing: v − ω × place
-    x1, y1 = one.twist.x + one.twist.w * one.frame.y, one.twist.y - one.twist.w * one.frame.x
-    x2, y2 = two.twist.x + two.twist.w * two.frame.y, two.twist.y - two.twist.w * two.frame.x
     with np.errstate(all="ignore"):
-        return -(y2 - y1) / w, (x2 - x1) / w
+        return -(two.twist.y - one.twist.y) / w, (two.twist.x - one.twist.x) / w
 
 
 def curvature(walk: Forward, link: str, point: str) -> Array:

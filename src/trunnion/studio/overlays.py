@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.groups import prp, rpp, rpr, rrp, rrr
+from trunnion.algebra import plane
+from trunnion.algebra.literal import is_zero
+from trunnion.groups.dyad import DyadPose
 from trunnion.solve.forward import Forward
 from trunnion.studies.design import instant_centre
 from trunnion.studio.placed import column
@@ -26,7 +28,6 @@ MOST_LINKS = 12  # whose centres against each other are told; of more only those
 MOTION = ("position", "velocity", "acceleration")
 RATES = ("", "_velocity", "_acceleration")
 FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
-DYADS = (rrr.RRRPose, rrp.RRPPose, rpr.RPRPose, prp.PRPPose, rpp.RPPPose)
 AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
 
 
@@ -100,10 +101,7 @@ def _centre(walk: Forward, first: str, second: str, steps: int) -> dict[str, Any
     one, two = walk.motions[first], walk.motions[second]
     x, y = (column(part, steps) for part in instant_centre(walk, first, second))
     # velocity of the second against the first at the second's origin; the centre lies across it
-    w = column(one.twist.w, steps)
-    dx, dy = column(two.frame.x - one.frame.x, steps), column(two.frame.y - one.frame.y, steps)
-    vx = column(two.twist.x - one.twist.x, steps) + w * dy
-    vy = column(two.twist.y - one.twist.y, steps) - w * dx
+    vx, vy = (column(part, steps) for part in plane.velocity_at(plane.minus(two.twist, one.twist), two.frame[:2]))
     size, pace = column(walk.size, steps), column(walk.pace, steps)
     turn = np.abs(column(two.twist.w - one.twist.w, steps))
     speed = np.hypot(vx, vy)
@@ -164,15 +162,15 @@ def transmission(walk: Forward, steps: int) -> list[dict[str, Any]]:
 
 def _lines(walk: Forward, joints: Collection[str], pose: Any) -> tuple[Any, Any, Any] | None:
     """Where a dyad's transmission angle is drawn, and directions of the force's line and the normal of the path."""
-    if not isinstance(pose, DYADS):
+    if not isinstance(pose, DyadPose):
         return None
     b, c, d = (walk.ends(joint)[0] for joint in joints)
-    match pose:
-        case rrr.RRRPose():
-            return (c.x, c.y), (b.x - c.x, b.y - c.y), (d.x - c.x, d.y - c.y)
-        case rrp.RRPPose():
-            return (c.x, c.y), (b.x - c.x, b.y - c.y), (-pose.u[1], pose.u[0])
-        case rpr.RPRPose():
-            return (b.x, b.y), (d.x - b.x, d.y - b.y), (-pose.u[1], pose.u[0])
-        case _:
-            return (c.x, c.y), pose.u, pose.v
+    slides = [joint for joint, screw in zip((b, c, d), pose.screws, strict=True) if is_zero(screw.w)]
+    if not slides:
+        return (c.x, c.y), (b.x - c.x, b.y - c.y), (d.x - c.x, d.y - c.y)
+    if len(slides) == 2:
+        return (c.x, c.y), (slides[0].c, slides[0].s), (slides[1].c, slides[1].s)
+    normal = (-slides[0].s, slides[0].c)
+    if slides[0] is d:
+        return (c.x, c.y), (b.x - c.x, b.y - c.y), normal
+    return (b.x, b.y), (d.x - b.x, d.y - b.y), normal

@@ -22,7 +22,8 @@ from trunnion.algebra.space import ZERO, Screw, moment_at
 from trunnion.algebra.vector import dot, minus
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.groups.redundant import RANK, stacked
-from trunnion.groups.spatial import SpatialGroup, SpatialPose
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.tree import Pose
 from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Given, backward
 from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
@@ -144,7 +145,7 @@ def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> li
     return [ModuleDeterminacy(number, 0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
 
 
-def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> SpatialPose | None:
+def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:
     """A module that Newton's method does not close because J is singular, at the start, solved all the same."""
     module, places = system.plan.modules[number], system.places[number]
     free = SpatialGroup(group.links, group.joints, group.driven, group.spinning, redundant=True)
@@ -162,12 +163,12 @@ def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGrou
         return free.position(elements, [lane_of(pose.q[i], best) for i in free.kept], drive)
 
 
-def _stress(group: SpatialGroup, pose: SpatialPose, null: Array) -> Array:
+def _stress(group: SpatialGroup, pose: Pose, null: Array) -> Array:
     """(joint, 6, lane): the wrenches of a self-stress. null: (lane, row)."""
     return _table(group.link_by_link(pose, [ZERO] * group.links, list(null.T)), len(null))
 
 
-def _motion(group: SpatialGroup, pose: SpatialPose, null: Array) -> Array:
+def _motion(group: SpatialGroup, pose: Pose, null: Array) -> Array:
     """(link, 6, lane): the twists of a motion that nothing determines, J q̇ = 0. null: (lane, column)."""
     rates: list[list[Number]] = [[0.0] * len(screws) for screws in pose.screws]
     for (k, i), rate in zip(group.free, null.T, strict=True):

@@ -23,7 +23,7 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.groups.redundant import stacked
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.spatial_tree import Element
+from trunnion.groups.tree import Element
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
 from trunnion.joints.spatial import MOTIONS
@@ -102,7 +102,8 @@ class Loops:
     @cached_property
     def group(self) -> SpatialGroup:
         """The module."""
-        return self.system.groups[0]
+        group: SpatialGroup = self.system.groups[0]
+        return group
 
     @cached_property
     def components(self) -> list[str]:

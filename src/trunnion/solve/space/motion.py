@@ -18,7 +18,7 @@ from trunnion.algebra.nested import each
 from trunnion.algebra.space import Frame, Screw, compose, line_of, minus, moment_at, rotated, times, vector_minus
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, plus, scaled, transpose
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.spatial_tree import Element
+from trunnion.groups.tree import Element
 from trunnion.joints.pairs import Reaction
 from trunnion.joints.spatial_load import halves
 from trunnion.model.parts import InertiaTensor
@@ -79,11 +79,6 @@ class SpatialWalk(Forward):
         if f"links.{link}.points.{name}.z" not in self.values:
             return self._stated[link, name].place
         return cast(Vector3, super().local_place(link, name))
-
-    def against(self, joint: str) -> Screw:
-        """Twist of the second link of a joint against the first."""
-        first, second = self.system.joints[joint][1]
-        return minus(self.motions[second].twist, self.motions[first].twist)
 
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis: θ and s of its dual angle."""
@@ -151,19 +146,6 @@ class SpatialWalk(Forward):
 
     def _pair(self, place: Place) -> Any:
         return Element(self._side(place, 0), self._side(place, 1), self.space.lead(self.values, place.joint))
-
-    def outside(self, place: Place) -> tuple[Screw | None, Screw | None]:
-        """Twist of the known link of a joint and its derivative."""
-        link = next((link for link, outer in zip(place.links, place.outer, strict=True) if outer), None)
-        return (None, None) if link is None else self.motions[link][1:]
-
-    def moved(
-        self, group: Any, pose: Any, twists: list[Any], accelerations: list[Any], rates: list[Any], seconds: list[Any]
-    ) -> tuple[Sequence[Screw], Sequence[Screw]]:
-        """Twists of a module's links and their derivatives."""
-        speeds = group.rates(pose, twists, rates)
-        found = group.twists(pose, twists, speeds)
-        return found, group.acceleration(pose, found, twists, accelerations, seconds, speeds)
 
     # ---- forces -----------------------------------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import ClassVar, cast
 
@@ -15,9 +15,8 @@ from trunnion.algebra.space import ORIGIN, Frame, element, relative, slid, turne
 from trunnion.algebra.vector import Vector3, dot
 from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.pairs import PAIRS
-from trunnion.solve.system import Place, System, Values
+from trunnion.solve.system import Place, System, Values, group_joints
 from trunnion.structure.decompose import Module
 
 __all__ = ["SpatialSystem"]
@@ -30,21 +29,12 @@ class SpatialSystem(System):
 
     axes: ClassVar[str] = "xyz"
 
-    @cached_property
-    def groups(self) -> tuple[SpatialGroup, ...]:  # type: ignore[override]
-        """The module that computes each entry of the plan."""
-        return tuple(self._spatial_group(module) for module in self.plan.modules)
-
-    def _spatial_group(self, module: Module) -> SpatialGroup:
-        number = {link: i for i, link in enumerate(module.links)}
-        joints = tuple(
-            GroupJoint(kind, (number.get(first, OUTER), number.get(second, OUTER)))
-            for kind, (first, second) in (self.joints[name] for name in module.joints)
-        )
+    def _group(self, module: Module, places: Sequence[Place]) -> SpatialGroup:
+        joints = group_joints(module, places)
         if module.kind == "CCC" and not self._parallel(module):
-            return CylindricalDyad(2, joints, BRANCHES=(1, -1))
-        driven = tuple(module.joints.index(name) for name in module.driven)
-        spins = tuple((number[link], module.joints.index(a), module.joints.index(b)) for link, a, b in module.spinning)
+            return CylindricalDyad(2, joints)
+        driven, number = tuple(module.joints.index(name) for name in module.driven), module.links.index
+        spins = tuple((number(link), module.joints.index(a), module.joints.index(b)) for link, a, b in module.spinning)
         return SpatialGroup(len(module.links), joints, driven, spins, module.redundant)
 
     def _place(self, module: Module, name: str) -> Place:

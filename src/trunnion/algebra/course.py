@@ -158,6 +158,22 @@ class Courses:
         """Share of the time that some panels take."""
         return float(np.sum(self.half[panels]) / np.sum(self.half))
 
+    def parted(self, times: Array) -> Courses:
+        """The same rows with edges at some times, s, too, as where a part of them begins or ends."""
+        edges = np.union1d(self.edges, times[(times > self.edges[0]) & (times < self.edges[-1])])
+        low, half = edges[:-1], np.diff(edges) / 2
+        panel = np.searchsorted(self.edges, low, side="right") - 1
+        spots = (low + half)[:, None] + half[:, None] * POINTS
+        spots = (spots - self.edges[panel][:, None]) / self.half[panel][:, None] - 1.0
+        basis = np.moveaxis(chebyshev.chebvander(spots, ORDER - 1), 2, 1)
+        coefficients = (self.coefficients[panel] @ basis) @ FIT.T
+        return Courses(edges, coefficients, self.states[panel], self.breaks, self.sizes, self.asked)
+
+    def panels_of(self, time: Array) -> Labels:
+        """Numbers of the panels at times, s; at an edge, or next to it, of the one after it."""
+        panels = np.searchsorted(self.edges, time + BESIDE * self.span, side="right") - 1
+        return np.asarray(np.clip(panels, 0, len(self.half) - 1))
+
     # ---- means ------------------------------------------------------------------------------------------------
 
     def mean(self, of: Callable[[Array], Array] | None = None) -> Array:

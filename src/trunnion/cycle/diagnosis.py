@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.cycle.locking_states import LockingState
 from trunnion.errors import Finding, Status
 from trunnion.groups import rpr, rrp, rrr
 from trunnion.results.scales import Scales
@@ -19,7 +20,7 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
 
 if TYPE_CHECKING:
-    from trunnion.cycle.near_locking import Locking
+    from trunnion.cycle.locking_course import LockingCourse
 
 __all__ = ["Causes", "findings"]
 
@@ -155,7 +156,7 @@ def findings(
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
     margin: NDArray[np.float64],
     scales: Scales,
-    near: Locking | None = None,
+    near: LockingCourse | None = None,
     felt: Sequence[str] | None = None,
 ) -> list[Finding]:
     """One finding for each cause. efforts: least and largest effort and unit of every driver; margin: multiple of all
@@ -255,7 +256,7 @@ def _locked(
     positions: Positions,
     share: NDArray[np.float64],
     whole: float,
-    near: Locking | None,
+    near: LockingCourse | None,
     felt: Sequence[str],
 ) -> Finding:
     """How far it is from running, the joint that decides, and whether it locks the other way too."""
@@ -263,8 +264,9 @@ def _locked(
     joints = [name for name in module.joints if name in felt]
     reverse, decides, multiple = "", "", None
     if near is not None:
-        both = near.ahead.locked & near.back.locked
-        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.ahead.locked) else "some"
+        states = near.found()
+        jammed, locked = LockingState.JAMMED in states, LockingState.LOCKED in states
+        reverse = "" if not jammed else "some" if locked else "all"
         responsible = near.responsible()
         if responsible and responsible[0] in module.joints:
             decides, multiple = responsible

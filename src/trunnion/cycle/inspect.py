@@ -71,7 +71,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    found, _ = summary.findings(run, positions(run, steps, progress=progress, averaged=False))
+    found = summary.findings(run, positions(run, steps, progress=progress, averaged=False))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis, moved_jumps, near_locking, uncounted
-from trunnion.cycle.course import CycleCourse, Rows, margin_of
-from trunnion.cycle.holding import reverse_figure
+from trunnion.cycle import contact_loss, diagnosis, moved_jumps, uncounted
+from trunnion.cycle.course import CycleCourse, Rows
 from trunnion.cycle.kept import ALL, Kept
-from trunnion.cycle.locking_states import cells, in_order, ranges_of
+from trunnion.cycle.locking_course import LockingCourse, critical_figure, locking_course
 from trunnion.cycle.model_measures import Watched, watched
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import peak, scales_of
@@ -31,14 +30,12 @@ from trunnion.model.units import KINDS, Dimension, si_unit
 from trunnion.results import variables as results
 from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, driven
-from trunnion.results.figure import MORE_THAN, Figure
+from trunnion.results.figure import Figure
 from trunnion.results.quantities import quantity
 from trunnion.results.result import Result
 from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
-from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated, stated_walk, useful_loads
-from trunnion.solve.margin import locking_margin
 from trunnion.solve.system import Dial, System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -59,7 +56,6 @@ __all__ = [
 
 Arrays = Mapping[str, NDArray[np.float64]]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
-TIMES = "times the friction"  # what a locking margin is
 ALIKE = 1e-9  # sizes of errors that are equal
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
@@ -85,7 +81,7 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
     """What the result says: formula, findings, summary, input data, drawing data, provenance; and the measures."""
     mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
     method = found_positions.method
-    found, near = findings(run, found_positions)
+    found, near = findings(run, found_positions), _near_locking(run, found_positions)
     measured = watched(run, time, method, arrays["status"])
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
     drawn = drawn | _courses(run, time)
@@ -96,7 +92,7 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
             **cited(references(mechanism)),
             "findings": finding_rows([*found, *measured.findings]),
             **scales_of(run).summary([*figures(run, found_positions, near), *measured.summary()]),
-            **_ranges(run, found_positions, near),
+            **({"locking_ranges": near.told(time)} if near and found_positions.course and near.pushed() else {}),
             **drawn,
             "periodic": int(run.cycle.periodic),
             **({} if kept.variables is None else {KEPT: kept.variables}),
@@ -115,9 +111,9 @@ def dataset_of(
     return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
 
 
-def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locking | None]:
-    """What is to be known of a mechanism at some positions of its cycle, and how near to locking it is."""
-    near, units, scales = _near_locking(run, at), effort_units(run.system), scales_of(run)
+def findings(run: Run, at: Positions) -> list[Finding]:
+    """What is to be known of a mechanism at some positions of its cycle."""
+    units, scales = effort_units(run.system), scales_of(run)
     efforts = {
         name: np.array([scales.zeroed(row, unit) for row, unit in zip(at.arrays[name], units, strict=True)])
         for name in at.arrays
@@ -129,12 +125,12 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *run.chosen.findings,
         *run.once("far hints", lambda: list(_far_hints(run))),
         *(run.determinacy.findings() if run.determinacy else []),
-        *_over_the_cycle(run, at, near),
+        *_over_the_cycle(run, at),
         *_beside_gaps(run.system, at.course),
         *(moved_jumps.findings(at.course, units) if at.course and run.erring else ()),
         *uncounted.findings(run, at.means),
         *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
-    ], near
+    ]
 
 
 def _far_hints(run: Run) -> Iterator[Finding]:
@@ -211,7 +207,7 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     return notes
 
 
-def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) -> list[Finding]:
+def _over_the_cycle(run: Run, at: Positions) -> list[Finding]:
     arrays, units = at.arrays, effort_units(run.system)
     efforts = {
         name: (arrays["drive_effort_lower"][i], arrays["drive_effort_upper"][i], units[i])
@@ -219,9 +215,8 @@ def _over_the_cycle(run: Run, at: Positions, near: near_locking.Locking | None) 
     }
     found = diagnosis.findings(
         at.causes, at.dial, arrays["status"], arrays["condition"], efforts, arrays["locking_margin"],
-        scales_of(run), near, felt(run.system, run.values),
+        scales_of(run), _near_locking(run, at), felt(run.system, run.values),
     )  # fmt: skip
-    found += near_locking.findings(near, _dial_of(near, run, at)) if near else []
     spans = [run.system.span(run.values, name) for name in run.system.mechanism.drivers]
     several = len(spans) > 1 or run.system.mechanism.gears
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
@@ -294,14 +289,14 @@ def references(mechanism: Mechanism) -> list[str]:
     return [method, *(f"{law}: {FRICTION_LAWS[law].source}" for law in sorted(laws)), *mechanism.references]
 
 
-def figures(run: Run, found: Positions, near: near_locking.Locking | None = None) -> Iterator[Figure]:
+def figures(run: Run, found: Positions, near: LockingCourse | None = None) -> Iterator[Figure]:
     """The figures one looks at first. Those of the cycle are read of its course, whatever the positions are."""
     arrays, status = found.arrays, found.arrays["status"]
     counted = status < Status.NOT_CONVERGED
     with np.errstate(all="ignore"):
         if found.course is not None:
             yield from _cycle_figures(run, found, near, found.course)
-        if near and (back := reverse_figure(run)):
+        if near and found.course is not None and (back := near.reverse_figure()):
             yield back
         residual = balance(arrays, scales_of(run).floor("W")) if np.any(counted) else None
         yield Figure("power_residual", "power balance residual", residual, aspect="maximum, of peak power")
@@ -316,9 +311,7 @@ def figures(run: Run, found: Positions, near: near_locking.Locking | None = None
         yield Figure("positions_lost", "positions not valid (a pin loses contact or bears no load)", lost)
 
 
-def _cycle_figures(
-    run: Run, found: Positions, near: near_locking.Locking | None, course: CycleCourse
-) -> Iterator[Figure]:
+def _cycle_figures(run: Run, found: Positions, near: LockingCourse | None, course: CycleCourse) -> Iterator[Figure]:
     """Efforts, reactions, friction and efficiency over the cycle, and what errors change."""
     yield from _effort_figures(run.system, course)
     yield from _reaction_figures(run.system, course, scales_of(run))
@@ -343,14 +336,12 @@ def _effort_figures(system: System, course: CycleCourse) -> Iterator[Figure]:
         yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
 
 
-def _friction_figures(
-    run: Run, found: Positions, near: near_locking.Locking | None, course: CycleCourse
-) -> Iterator[Figure]:
+def _friction_figures(run: Run, found: Positions, near: LockingCourse | None, course: CycleCourse) -> Iterator[Figure]:
     """How near to locking it is, and what friction takes."""
-    if found.method.margin_up_to:
-        margin = _least_margin(run, found.method)
+    if near and (margin := near.margin_figure()):
         yield margin
-        yield from near.figures(run, margin.place) if near else ()
+        decides = near.responsible()
+        yield from [] if decides is None else [critical_figure(run, *decides, margin.place)]
     means = course.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
     if means.supposed > 0:
@@ -359,17 +350,6 @@ def _friction_figures(
     lost = course.top(lambda rows: np.sum(rows["friction_power"], axis=0), unit="W")
     if lost is not None:
         yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
-
-
-def _least_margin(run: Run, method: FrictionMethod) -> Figure:
-    """The least multiple of all friction at which it locks; `margin_up_to` is as far as that is looked for."""
-    name, subject, margins = "locking_margin", "locking margin", margin_of(run, method)
-    least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
-    if least is not None:
-        return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=TIMES)
-    if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
-        return Figure(name, subject, method.margin_up_to, aspect=MORE_THAN, note=TIMES)
-    return Figure(name, subject, None, note=TIMES)
 
 
 def _reaction_figures(system: System, course: CycleCourse, scales: Scales) -> Iterator[Figure]:
@@ -436,47 +416,9 @@ def _error_figures(run: Run, course: CycleCourse) -> Iterator[Figure]:
             yield Figure(name, subject, change.value, unit, "largest magnitude", course.told(change))
 
 
-def _near_locking(run: Run, at: Positions) -> near_locking.Locking | None:
-    """What is to know of locking, if there is friction and a driver."""
-    if not rubbing(run.system) or not run.system.mechanism.drivers:
-        return None
-    with np.errstate(all="ignore"):
-        worst = None
-        if at.course is not None and at.method.margin_up_to:
-            margins = margin_of(run, at.method)
-            least = margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
-            worst = None if least is None else margins.side(least, "locking_margin", -1.0)
-        return near_locking.look(run, at.time, at.arrays["locking_margin"], at.method, at.walked, worst)
-
-
-def _dial_of(near: near_locking.Locking, run: Run, found: Positions) -> Dial:
-    """Names of the positions that were looked at: most often all."""
-    return found.dial if len(near.times) == len(found.time) else run.system.dial(run.values, near.times)
-
-
-def _ranges(run: Run, found: Positions, near: near_locking.Locking | None) -> dict[str, Any]:
-    """Where it holds itself, for the report: the ranges of `locking` with their share of the positions looked at."""
-    if near is None or not np.any(np.abs(near.back.acting) > 0):
-        return {}
-    margin = found.arrays["locking_margin"]
-    if len(near.times) != len(found.time):
-        with np.errstate(all="ignore"):
-            margin = np.zeros(len(near.times)) + locking_margin(run.solve(near.times, method=found.method))
-    dial = _dial_of(near, run, found)
-    rows = [
-        {"state": "" if one.state is None else one.state.name.lower(), "cells": cells(one, dial),
-         "first": one.first, "count": one.last - one.first + 1}
-        for one in ranges_of(_states(found, near), margin)
-    ]  # fmt: skip
-    return {"locking_ranges": {"of": dial.of, "positions": len(near.times), "rows": rows}}
-
-
-def _states(found: Positions, near: near_locking.Locking) -> NDArray[np.int8]:
-    """The codes of `LockingState` of the positions looked at."""
-    known, status = np.isfinite(near.back.acting), found.arrays["status"]
-    if len(near.times) == len(found.time):
-        known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
-    return in_order(near.ahead, near.back, known)
+def _near_locking(run: Run, at: Positions) -> LockingCourse | None:
+    """Locking over the cycle, if there is friction and a driver."""
+    return locking_course(run, at.method) if rubbing(run.system) else None
 
 
 # the power balance: what is left over, and what that is held against

@@ -13,7 +13,7 @@ chebfuns, IMA J. Numer. Anal. 30 (2010) 898-916, doi:10.1093/imanum/drp008.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -158,6 +158,10 @@ class Courses:
         """Share of the time that some panels take."""
         return float(np.sum(self.half[panels]) / np.sum(self.half))
 
+    def picked(self, rows: Labels) -> Courses:
+        """Some of the rows."""
+        return replace(self, coefficients=self.coefficients[:, rows], sizes=self.sizes[rows])
+
     def parted(self, times: Array) -> Courses:
         """The same rows with edges at some times, s, too, as where a part of them begins or ends."""
         edges = np.union1d(self.edges, times[(times > self.edges[0]) & (times < self.edges[-1])])
@@ -167,7 +171,7 @@ class Courses:
         spots = (spots - self.edges[panel][:, None]) / self.half[panel][:, None] - 1.0
         basis = np.moveaxis(chebyshev.chebvander(spots, ORDER - 1), 2, 1)
         coefficients = (self.coefficients[panel] @ basis) @ FIT.T
-        return Courses(edges, coefficients, self.states[panel], self.breaks, self.sizes, self.asked)
+        return replace(self, edges=edges, coefficients=coefficients, states=self.states[panel])
 
     def panels_of(self, time: Array) -> Labels:
         """Numbers of the panels at times, s; at an edge, or next to it, of the one after it."""

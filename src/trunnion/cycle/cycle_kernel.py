@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.course import COMPARED_ROWS, FOLLOWED, CycleCourse, like, stacked
+from trunnion.cycle.course import CycleCourse, followed, like, stacked
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.diagnosis import Causes
 from trunnion.cycle.means import IDEAL
@@ -236,7 +236,7 @@ class Many:
 
     def courses(self, of: Mechanisms, ideal: Values | None, method: FrictionMethod) -> list[CycleCourse]:
         """The courses of some mechanisms over their cycles. ideal: their numbers without errors, if any has some."""
-        names = [*FOLLOWED, *(COMPARED_ROWS if ideal is not None else ())]
+        names = followed(self.run.system, ideal is not None)
         shapes: dict[str, tuple[int, ...]] = {}
         without = None if ideal is None else replace(of, values=ideal)
 

@@ -157,7 +157,7 @@ class LockingCourse:
             sense = np.sign(primal(run.system.drive(run.values, name, middles)[1])) * np.ones(len(middles))
             tops = []
             for way in (1.0, -1.0):
-                top = self.course.extreme(lambda rows, i=i: rows["effort"][i], -way, sense == way, unit)  # type: ignore[misc]
+                top = self.course.extreme("effort", i, sign=-way, panels=sense == way, unit=unit)
                 tops += [] if top is None else [(-way * top.value, top)]
             supplied, top = max(tops, key=lambda pair: pair[0], default=(0.0, None))
             if top is not None and supplied > scales.floor(unit):
@@ -195,7 +195,7 @@ class LockingCourse:
         cut = replace(self.margins, courses=self.margins.courses.parted(np.array([low, high])))
         middles = cut.courses.edges[:-1] + cut.courses.half
         inside = (middles > low) & (middles < high) & cut.valid
-        least = cut.extreme(lambda rows: rows["locking_margin"], -1.0, inside)
+        least = cut.extreme("locking_margin", sign=-1.0, panels=inside)
         if least is not None:
             return least.value, cut.told(least).removeprefix("at ")
         return (np.inf if np.any(inside & (cut.status < Status.LOAD_UNDEFINED)) else np.nan), ""
@@ -238,7 +238,7 @@ class LockingCourse:
         name, margins = "locking_margin", self.margins
         if margins is None:
             return None
-        least = margins.extreme(lambda rows: rows[name], -1.0, margins.valid)
+        least = margins.extreme(name, sign=-1.0, panels=margins.valid)
         if least is not None:
             return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=note)
         if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
@@ -262,7 +262,7 @@ class LockingCourse:
     def _critical(self) -> dict[str, float]:
         """The critical multiples of the joints at the place of the least margin."""
         margins = self.margins
-        least = None if margins is None else margins.extreme(lambda rows: rows["locking_margin"], -1.0, margins.valid)
+        least = None if margins is None else margins.extreme("locking_margin", sign=-1.0, panels=margins.valid)
         if margins is None or least is None:
             return {}
         time = np.array([margins.side(least, "locking_margin", -1.0)])
@@ -293,7 +293,7 @@ class LockingCourse:
         every = np.ones(len(courses.half), bool)
         for i, joint in enumerate(joints):
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
-            least = course.extreme(lambda rows, i=i: rows["multiple"][i], -1.0, every)  # type: ignore[misc]
+            least = course.extreme("multiple", i, sign=-1.0, panels=every)
             if least is None:
                 bounded = np.any(np.isinf(tables[joint]))
                 yield Figure(name, subject, MARGIN if bounded else None, aspect=MORE_THAN * bool(bounded))
@@ -328,7 +328,7 @@ class LockingCourse:
             courses = Courses.of(look, breaks, None, accuracy_of(run.cycle, MARGINS._replace(tolerance=1e-9)))
             course = CycleCourse(run, {"multiple": ()}, courses)
             every = np.ones(len(courses.half), bool)
-            top = course.extreme(lambda rows: rows["multiple"], 1.0, every)
+            top = course.extreme("multiple", panels=every)
             multiple, place = (0.0, "") if top is None else (top.value, course.told(top))
         else:
             multiple = float(holding_multiples(run, np.array([duration]))[0])

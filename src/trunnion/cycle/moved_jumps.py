@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
-from trunnion.cycle.course import CycleCourse
+from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
 
@@ -32,12 +32,12 @@ def findings(course: CycleCourse, units: list[str]) -> Iterator[Finding]:
             between = _between(built, meant, len(left))
             left[between] = False
             inside = np.isin(np.arange(len(left)), between) & course.sound
-            top = course.extreme(lambda rows, i=i: np.abs(rows["drive_effort_change"][i]), 1.0, inside)  # type: ignore[misc]
+            top = course.extreme("drive_effort_change", i, of=magnitude, panels=inside)
             if top is not None:
                 tops.append((top, built, meant))
         if tops:
             top, built, meant = max(tops, key=lambda one: one[0].value)
-            rest = course.extreme(lambda rows, i=i: np.abs(rows["drive_effort_change"][i]), 1.0, left)  # type: ignore[misc]
+            rest = course.extreme("drive_effort_change", i, of=magnitude, panels=left)
             places = [course.told(Place(0.0, float(edges[k + 1]))) for k in (built, meant)]
             yield finding_for(
                 "errors.jump_moved", f"drivers.{name}", at=course.told(top).removeprefix("at "), built=places[0],

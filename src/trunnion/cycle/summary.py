@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Place
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss, diagnosis, moved_jumps, uncounted
-from trunnion.cycle.course import CycleCourse, Rows
+from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_course import LockingCourse, critical_figure, locking_course
 from trunnion.cycle.model_measures import Watched, watched
@@ -229,7 +228,7 @@ def _beside_gaps(system: System, course: CycleCourse | None) -> Iterator[Finding
     """Efforts that are largest next to where pins cross their play, and nearer to it are not known."""
     for i, name in enumerate(system.mechanism.drivers if course else ()):
         assert course is not None
-        largest = course.extreme(lambda rows, i=i: np.abs(rows["drive_effort"][i]))  # type: ignore[misc]
+        largest = course.extreme("drive_effort", i, of=magnitude)
         if largest is not None and course.beside(largest, Status.CONTACT_LOST):
             yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))
 
@@ -330,7 +329,7 @@ def _effort_figures(system: System, course: CycleCourse) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
         for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)):
-            top = course.top(lambda rows, i=i: rows["drive_effort"][i], sign, unit)  # type: ignore[misc]
+            top = course.top("drive_effort", i, sign=sign, unit=unit)
             if top is not None:
                 yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, top.place)
         yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
@@ -347,7 +346,7 @@ def _friction_figures(run: Run, found: Positions, near: LockingCourse | None, co
     if means.supposed > 0:
         off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
-    lost = course.top(lambda rows: np.sum(rows["friction_power"], axis=0), unit="W")
+    lost = course.top("friction_power", of=lambda rows: np.sum(rows, axis=0), unit="W")
     if lost is not None:
         yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
 
@@ -360,20 +359,14 @@ def _reaction_figures(system: System, course: CycleCourse, scales: Scales) -> It
     planar = system.mechanism.space == "planar"
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         for what, variable, unit in loads:
-            top = course.top(
-                lambda rows, of=variable, i=i: np.sqrt(np.sum(rows[of][i] ** 2, axis=0)),  # type: ignore[misc]
-                unit=unit,
-            )
+            top = course.top(variable, i, of=magnitude, unit=unit)
             if top is None:
                 continue
             if planar or top.value > scales.floor(unit):
                 key = f"{name}.{what.replace(' ', '_')}_max"
                 yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", top.place)
         if PAIRS[kind].guided:
-            ends = [
-                course.extreme(lambda rows, i=i: rows["joint_slide"][i], sign, course.valid)  # type: ignore[misc]
-                for sign in (1.0, -1.0)
-            ]
+            ends = [course.extreme("joint_slide", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
                 stroke, note = ends[0].value - ends[1].value, course.note
                 yield Figure(f"{name}.stroke", f"stroke of {name}", stroke, "m", note=note)
@@ -381,25 +374,21 @@ def _reaction_figures(system: System, course: CycleCourse, scales: Scales) -> It
 
 def _error_figures(run: Run, course: CycleCourse) -> Iterator[Figure]:
     """What the errors do, in the figures one looks at first; where no pin loses contact."""
-
-    def top(of: Callable[[Rows], NDArray[np.float64]]) -> Place | None:
-        return course.extreme(of, 1.0, course.valid)
-
     points = [
         (found.value, k, found)
         for k in range(len(run.system.points))
-        if (found := top(lambda rows, k=k: np.sqrt(np.sum(rows["point_error"][k] ** 2, axis=0)))) is not None  # type: ignore[misc]
+        if (found := course.extreme("point_error", k, of=magnitude, panels=course.valid)) is not None
     ]
     if points:
         highest = max(points)[0] * (1 - ALIKE)
-        size, k, found = next(one for one in points if one[0] >= highest)  # of equal ones the first
+        error, k, found = next(one for one in points if one[0] >= highest)  # of equal ones the first
         most = f"largest: {'.'.join(run.system.points[k])}"
-        yield Figure("point_error_max", "position error", size, "m", most, course.told(found))
+        yield Figure("point_error_max", "position error", error, "m", most, course.told(found))
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
-        error = top(lambda rows, of=f"joint_{what}_error", i=i: np.abs(rows[of][i]))  # type: ignore[misc]
+        error = course.extreme(f"joint_{what}_error", i, of=magnitude, panels=course.valid)
         if error is not None:
             name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
             yield Figure(name, subject, error.value, unit, "largest magnitude", course.told(error))
@@ -409,7 +398,7 @@ def _error_figures(run: Run, course: CycleCourse) -> Iterator[Figure]:
         ends = [
             found
             for sign in (1.0, -1.0)
-            if (found := course.extreme(lambda rows, i=i: rows["drive_effort_change"][i], sign, course.valid))  # type: ignore[misc]
+            if (found := course.extreme("drive_effort_change", i, sign=sign, panels=course.valid))
         ]
         if ends:
             change = max(ends, key=lambda one: abs(one.value))

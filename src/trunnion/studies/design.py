@@ -5,7 +5,6 @@ Everything is read off one run over the cycle: the poses of the dyads, the twist
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -124,9 +123,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
     steps = len(time)
     driver = next(iter(mechanism.drivers), "")
     rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
-    asked = motor(run, driver, steps) if driver else Motor()
-    if not math.isfinite(asked.peak_power):  # of the positions that have an answer
-        asked = asked._replace(peak_power=_largest(back.efforts[driver] * rate))
+    asked = motor(run, driver) if driver else Motor()
     return Design(
         grashof(mechanism, run),
         {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},

@@ -37,6 +37,7 @@ from trunnion.errors import Status
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import has_useful_work, useful_loads, useful_springs
+from trunnion.solve.memory import in_blocks
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS, accuracy_of, breaks_between
 from trunnion.solve.system import felt, law_of
@@ -102,7 +103,8 @@ class LockingCourse:
         bends = bends if seated is None else [*bends, *seated.courses.breaks]
         breaks = breaks_between(run.cycle, np.array(bends)) if run.cycle.duration > 0 else np.array([0.0, 1.0])
         with np.errstate(all="ignore"):
-            return Courses.of(look, breaks, like, accuracy_of(run.cycle, BACK))
+            in_parts = in_blocks(look, len(run.system.joints))
+            return Courses.of(in_parts, breaks, like, accuracy_of(run.cycle, BACK))
 
     def found(self) -> set[LockingState]:
         """The states that there are."""
@@ -288,7 +290,8 @@ class LockingCourse:
         if not joints:
             return
         with np.errstate(all="ignore"):
-            courses = Courses.of(look, self.courses.breaks, None, accuracy_of(run.cycle, MARGINS))
+            in_parts = in_blocks(look, len(run.system.joints) * len(joints))
+            courses = Courses.of(in_parts, self.courses.breaks, None, accuracy_of(run.cycle, MARGINS))
         course = CycleCourse(run, {"multiple": (len(joints),)}, courses)
         every = np.ones(len(courses.half), bool)
         for i, joint in enumerate(joints):

@@ -21,7 +21,7 @@ from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.eccentricity_rate import Lanes, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.memory import CHUNK
+from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import Seated, settle
 from trunnion.solve.system import Dial, Values
@@ -105,8 +105,7 @@ def stretch(
     compiled = compiles(engine, run, steps, method) and _fill_compiled(
         arrays, ideal, run, time, method, causes, engine == "auto"
     )
-    for low in range(0, 0 if compiled else steps, CHUNK):
-        window = slice(low, min(low + CHUNK, steps))
+    for window in blocks(0 if compiled else steps, len(run.system.joints)):
         if run.erring:
             _fill_as_built(arrays, ideal, run, time, window, method, causes)
         else:

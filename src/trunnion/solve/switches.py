@@ -30,8 +30,8 @@ from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
-    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "nearly_passed",
-    "parted", "stated_bends", "tracked",
+    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "knots_of",
+    "nearly_passed", "parted", "stated_bends", "tracked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -191,7 +191,7 @@ def _scans(system: System) -> tuple[_Scan, _Scan]:
 
 
 def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
-    yield from ((row, Bend(moment)) for row, moment in _knots(of))
+    yield from ((row, Bend(moment)) for row, moment in knots_of(of))
     for k, scan in enumerate(_scans(of.system)):
         yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
 
@@ -228,7 +228,7 @@ def accuracy_of(cycle: Cycle, accuracy: Accuracy) -> Accuracy:
     return accuracy._replace(widest=1.0 / min(PANELS * turns, MOST_EDGES))
 
 
-def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
+def knots_of(of: Mechanisms) -> Iterator[tuple[int, float]]:
     """Times at which a motion law goes from one function to the next."""
     for name in of.system.mechanism.drivers:
         knots, span = of.system.knots(of.values, name), of.system.span(of.values, name)

@@ -48,4 +48,4 @@ def test_many_legs_ask_for_as_many_times_the_effort_in_bounded_memory() -> None:
     tracemalloc.stop()
     assert peak < MOST
     for name in ("energy_swing", "shaking_force", "mean_power"):
-        assert many[name] == pytest.approx(LEGS * one[name], rel=0.02)  # but for the one crank
+        assert many[name] == pytest.approx(LEGS * one[name], rel=0.05)  # but for the one crank

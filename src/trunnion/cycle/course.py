@@ -88,18 +88,41 @@ class CycleCourse:
 
         Where a pin loses contact it is taken to stay in a seat that would jump: forces there are no answer.
         """
-        solved = self.status == Status.SOLVED
-        return np.asarray(solved if np.any(solved) else self.status == Status.ZERO_SLIP)
+        solved = (self.status == Status.SOLVED) & self.reached
+        return np.asarray(solved if np.any(solved) else (self.status == Status.ZERO_SLIP) & self.reached)
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
         """Panels where no pin loses contact."""
-        return np.asarray(self.status != Status.CONTACT_LOST)
+        return np.asarray((self.status != Status.CONTACT_LOST) & self.reached)
+
+    @cached_property
+    def ranges(self) -> list[tuple[float, float, bool]]:
+        """Begin and end, s, of the ranges that can be assembled, and whether each holds the start.
+
+        In a motion that comes again the last may go on at the start: then it ends before it begins.
+        """
+        edges, open_ = self.courses.edges, np.concatenate([[1], self.status == Status.NOT_ASSEMBLED, [1]])
+        changes = np.flatnonzero(np.diff(open_))
+        found = [(float(edges[a]), float(edges[b]), a == 0) for a, b in changes.reshape(-1, 2)]
+        if len(found) > 1 and self.run.cycle.periodic and not (open_[1] or open_[-2]):
+            found = [(found[-1][0], found[0][1], True), *found[1:-1]]
+        return found
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Panels that are reached from the start without a gap; all if it cannot be assembled there."""
+        start = next((ends for *ends, holds in self.ranges if holds), None)
+        if start is None:
+            return np.ones(len(self.courses.half), bool)
+        middles, (low, high) = self.courses.edges[:-1] + self.courses.half, start
+        return np.asarray((middles > low) & (middles < high) if low < high else (middles > low) | (middles < high))
 
     @property
     def note(self) -> str:
         """Of how much of the cycle a figure is, where a pin loses contact in the rest; empty where it does nowhere."""
-        return "" if np.all(self.valid) else f"without {self.courses.share(~self.valid):.2g} of the cycle"
+        lost = self.status == Status.CONTACT_LOST
+        return f"without {self.courses.share(lost):.2g} of the cycle" if np.any(lost) else ""
 
     def largest(self, name: str) -> float:
         """The largest magnitude of a variable in sound panels, or a little more."""
@@ -188,7 +211,7 @@ class CycleCourse:
         """Means over the cycle; NaN where a part of it has no answer."""
 
         def total(rows: Array) -> Array:
-            return np.sum(rows, axis=0)
+            return np.asarray(np.sum(rows, axis=0))
 
         parts = [self.picked(name) for name in ("drive_power", "useful_power", "friction_power")]
         with np.errstate(all="ignore"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,17 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
 
-if TYPE_CHECKING:
-    from trunnion.cycle.locking_course import LockingCourse
-
 __all__ = ["Causes", "findings"]
 
 CLASS_TWO = 2
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
+
+
+class Locking(Protocol):
+    """What is known of locking over the cycle: its states, and the joint that decides with the multiple of it."""
+
+    def found(self) -> set[LockingState]: ...
+    def responsible(self) -> tuple[str, float] | None: ...
 
 
 class _Open(NamedTuple):
@@ -156,7 +160,7 @@ def findings(
     efforts: dict[str, tuple[NDArray[np.float64], NDArray[np.float64], str]],
     margin: NDArray[np.float64],
     scales: Scales,
-    near: LockingCourse | None = None,
+    near: Locking | None = None,
     felt: Sequence[str] | None = None,
 ) -> list[Finding]:
     """One finding for each cause. efforts: least and largest effort and unit of every driver; margin: multiple of all
@@ -256,7 +260,7 @@ def _locked(
     positions: Positions,
     share: NDArray[np.float64],
     whole: float,
-    near: LockingCourse | None,
+    near: Locking | None,
     felt: Sequence[str],
 ) -> Finding:
     """How far it is from running, the joint that decides, and whether it locks the other way too."""

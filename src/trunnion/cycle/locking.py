@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle.analyse import analyse_run
+from trunnion.cycle.findings import beside_the_drive
 from trunnion.cycle.locking_course import LockingCourse, holding_multiples, locking_course
 from trunnion.cycle.locking_states import HELD_AND_DRIVEN, NEAR, LockingRange, LockingState
 from trunnion.cycle.passage import Passage, critical_multiples, reverse
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
-from trunnion.cycle.uncounted import beside_the_drive
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords

@@ -132,7 +132,7 @@ class LockingCourse:
         delivered, given, beside = np.where(np.abs(means) <= error, 0.0, means)
         if np.isfinite(given) and not given > 0:
             return None
-        if (locked := courses.share(np.isin(courses.states, BACK_LOCKED))) > 0:
+        if (locked := courses.share(np.isin(courses.states, BACK_LOCKED))) > SHORT:
             return Figure(name, subject, None, place=f"in {locked:.2%} of the cycle", note="it locks")
         if LockingState.UNSOLVED in self.found() or not np.isfinite(delivered + given):
             return Figure(name, subject, None, note="not every position is solved")

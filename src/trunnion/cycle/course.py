@@ -19,14 +19,13 @@ from trunnion.algebra.course import Accuracy, Courses, Place
 from trunnion.algebra.quadrature import CANCELLED
 from trunnion.cycle import contact_loss
 from trunnion.cycle.deviations import COMPARED, fill_errors
+from trunnion.cycle.fill import allocate
 from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.unanswered import blank
-from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
-from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import around
 from trunnion.solve.friction_method import FrictionMethod
@@ -332,10 +331,8 @@ class _Looking:
 
     def _filled(self, back: Backward, time: Array) -> Arrays:
         """The variables of a walk at times, s."""
-        system, fill = self.run.system, fill_of(self.run.system)
-        labels, absent = fill.labels(system), fill.absent(system)
         wanted = {*self._names, "status", *(COMPARED if self.errs else ())}
-        arrays = results.allocate(labels, len(time), absent, ["errors"] if self.errs else [], wanted)
+        arrays = allocate(self.run.system, len(time), ["errors"] if self.errs else [], wanted)
         fill_chunk(arrays, back, time, slice(None))
         return arrays
 

@@ -17,13 +17,12 @@ from trunnion.algebra.namespace import Number
 from trunnion.cycle.course import CycleCourse, followed, like, stacked
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.diagnosis import Causes
+from trunnion.cycle.fill import allocate
 from trunnion.cycle.means import IDEAL
 from trunnion.cycle.unanswered import blank
-from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import CONDITIONS, Arrays, fill_chunk, fill_lanes, link_numbers, write
 from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.results import variables as results
 from trunnion.results.variables import VARIABLES
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
@@ -274,7 +273,6 @@ class Many:
 
 def _allocated(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
     """Arrays to be filled, (…, mechanism, position)."""
-    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-    flat = results.allocate(labels, shape[0] * shape[1], absent, parts, wanted)
+    flat = allocate(system, shape[0] * shape[1], parts, wanted)
     found = {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
     return found | {CONDITIONS: np.zeros((len(system.plan.modules), *shape))}

@@ -16,8 +16,7 @@ from trunnion.cycle.means import MOST_SUPPOSED, Means
 from trunnion.cycle.model_measures import Watched, watched
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import peak, scales_of
-from trunnion.cycle.scene import COURSE, DRAWN, courses
-from trunnion.cycle.variables import fill_of
+from trunnion.cycle.scene import COURSE, DRAWN, courses, planar, spatial
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -322,5 +321,5 @@ def scene_of(run: Run) -> dict[str, Any]:
     """What a drawing needs to know beside the positions of the points."""
     system = run.system
     walk = stated_walk(system, run.values, run.chosen.assembly, run.cycle.times(DRAWN))
-    found: dict[str, Any] = fill_of(system).scene(system, run.values, walk, useful_loads(system.mechanism))
-    return found
+    scene = spatial if system.mechanism.space == "spatial" else planar
+    return scene(system, run.values, walk, useful_loads(system.mechanism))

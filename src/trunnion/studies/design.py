@@ -307,7 +307,7 @@ def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:
         around = passages[:, None] + beside
         around = around % duration if run.cycle.periodic else np.clip(around, 0.0, courses.span)
         before, after = courses.picked(np.array([row])).at(around.ravel()).reshape(-1, 2).T
-        places = [round(_coordinate(run, time), 12) for time in passages[before * after < 0].tolist()]
+        places = [round(_coordinate(run, time), 12) + 0.0 for time in passages[before * after < 0].tolist()]
         found[joint] = tuple(sorted(set(places)))
     return found
 

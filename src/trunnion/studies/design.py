@@ -314,7 +314,7 @@ def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:
 
 def _coordinate(run: Run, moment: float) -> float:
     """Coordinate of the first driver at a time; the time itself if there is none."""
-    driver = next(iter(run.system.mechanism.drivers), "")
+    driver, moment = next(iter(run.system.mechanism.drivers), ""), moment if run.cycle.duration > 0 else 0.0
     return float(run.system.drive(run.values, driver, moment)[0]) if driver else moment
 
 

@@ -302,7 +302,7 @@ def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:
     for row, joint in enumerate(joints):
         passages = courses.passages(row)
         if run.cycle.periodic:  # its end is its start
-            passages = np.sort(np.where(passages > duration * (1 - BESIDE), 0.0, passages))
+            passages = np.sort(np.append(np.where(passages > duration * (1 - BESIDE), 0.0, passages), 0.0))
             passages = passages[np.diff(passages, prepend=-duration) > BESIDE * duration]
         around = passages[:, None] + beside
         around = around % duration if run.cycle.periodic else np.clip(around, 0.0, courses.span)

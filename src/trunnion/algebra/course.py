@@ -40,7 +40,7 @@ ENDS = np.array([(-1.0) ** np.arange(ORDER), np.ones(ORDER)]).T
 INTEGRAL = ON_GAUSS @ GAUSS_WEIGHTS  # of every Chebyshev polynomial over a panel
 CHECKED, TORN = 5, 1e3  # times that edges are looked at; of what is small: a row that changes by more at one jumps
 TOSSED = 1e-3  # of the whole: width of panels whose state may be the gravest that they have
-CROWDED, CROWD = 1e-6, 4  # of the whole: in one place; panels of mixed states there: a break has one or two
+CROWDED, CROWD = 1e-7, 4  # of the whole: in one place; panels of mixed states there: a break has one or two
 HALVED = 2  # rounds in which a panel is halved; then it is parted about the place where a row bends most
 NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
 FLAT = 1e-9  # of its size: a course that changes less is constant, and of tops that differ less the first counts
@@ -353,8 +353,7 @@ class _Resolving:
             values = np.moveaxis(rows, 0, 1)  # (lane, row, node)
             coefficients, labels = values @ FIT.T, _labelled(states, values)
             mixed = np.any(labels != labels[:, :1], axis=1)
-            tossed = self._tossed(mechanism, mixed, low, high)
-            self._break(np.repeat(mechanism[tossed], 2), np.stack([low[tossed], high[tossed]], axis=1).ravel())
+            tossed = self._tossed(mechanism, mixed, high - low)
             labels[tossed] = np.max(labels[tossed], axis=1, keepdims=True, initial=0)
             coefficients[tossed] = np.nan
             mixed &= ~tossed
@@ -363,6 +362,7 @@ class _Resolving:
             rough, worst = self._rough(mechanism, values, coefficients)
             unresolved = mixed | rough
             tiny = high - low <= self._accuracy.shortest * self._span[mechanism]
+            tiny |= self._crowded(mechanism, mixed, low, high)
             self._break(mechanism[unresolved & tiny], high[unresolved & tiny])
             done = ~unresolved if round_ < self._accuracy.rounds else ~mixed
             panels = _Panels(mechanism, low, high, coefficients, labels[:, 0])
@@ -378,17 +378,20 @@ class _Resolving:
             left = np.concatenate([even, changing])
             mechanism, low, high = _between(edges, mechanism[left])
 
-    def _tossed(self, mechanism: Labels, mixed: NDArray[np.bool_], low: Array, high: Array) -> NDArray[np.bool_]:
-        """Narrow panels of mixed states where there are many in one mechanism, or several in one place of it: their
-        states toss as rounding will, and have no breaks."""
-        span, many = self._span[mechanism], np.bincount(mechanism[mixed], minlength=len(self._asked))
-        tossed = mixed & (many > self._accuracy.most)[mechanism] & (high - low < TOSSED * span)
+    def _tossed(self, mechanism: Labels, mixed: NDArray[np.bool_], width: Array) -> NDArray[np.bool_]:
+        """Narrow panels of mechanisms with many of mixed states: these toss as rounding will, and have no breaks."""
+        many = np.bincount(mechanism[mixed], minlength=len(self._asked)) > self._accuracy.most
+        return mixed & many[mechanism] & (width < TOSSED * self._span[mechanism])
+
+    def _crowded(self, mechanism: Labels, mixed: NDArray[np.bool_], low: Array, high: Array) -> NDArray[np.bool_]:
+        """Panels of mixed states of which there are several in one place, too narrow for so many breaks."""
+        span, crowded = self._span[mechanism], np.zeros(len(mixed), bool)
         close = np.flatnonzero(mixed & (high - low < CROWDED * span))
         close = close[np.lexsort((low[close], mechanism[close]))]
         apart = (np.diff(low[close]) > CROWDED * span[close[1:]]) | (np.diff(mechanism[close]) != 0)
         place = np.cumsum(np.append(0, apart))[: len(close)]
-        tossed[close] |= np.bincount(place, minlength=1)[place] > CROWD
-        return np.asarray(tossed)
+        crowded[close] = np.bincount(place, minlength=1)[place] > CROWD
+        return crowded
 
     def _scale(self, mechanism: Labels, values: Array, labels: Labels) -> None:
         """How large every row is, and what is like it, (row, mechanism): in the least state that there is."""

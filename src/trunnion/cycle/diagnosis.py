@@ -28,7 +28,7 @@ NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effor
 class Locking(Protocol):
     """What is known of locking over the cycle: its states, and the joint that decides with the multiple of it."""
 
-    def found(self) -> set[LockingState]: ...
+    def all_states(self) -> set[LockingState]: ...
     def responsible(self) -> tuple[str, float] | None: ...
 
 
@@ -268,7 +268,7 @@ def _locked(
     joints = [name for name in module.joints if name in felt]
     reverse, decides, multiple = "", "", None
     if near is not None:
-        states = near.found()
+        states = near.all_states()
         jammed, locked = LockingState.JAMMED in states, LockingState.LOCKED in states
         reverse = "" if not jammed else "some" if locked else "all"
         responsible = near.responsible()

@@ -32,6 +32,7 @@ from trunnion.results.quantities import quantity, readable
 from trunnion.results.sentences import finding_for
 from trunnion.solve import loads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
+from trunnion.solve.memory import in_blocks
 from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import System, felt, rubbing
 
@@ -86,7 +87,8 @@ class Cycle:
         bends = np.array([bend.time for bend in run.bends])
         breaks = breaks_between(run.cycle, bends) if run.cycle.duration > 0 else np.array([0.0, 1.0])
         with np.errstate(all="ignore"):
-            return Courses.of(rows, breaks, None, accuracy_of(run.cycle, Accuracy()))
+            in_parts = in_blocks(rows, len(run.system.joints))
+            return Courses.of(in_parts, breaks, None, accuracy_of(run.cycle, Accuracy()))
 
     def place(self, *times: float) -> str:
         """One time, s, or the range between two, on the dial of the drive."""
@@ -279,7 +281,7 @@ def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
     every = _work(cycle, means)
     work = {name: value for name, value in every.items() if value > LEAST * abs(drive)}
     if above:
-        work = work or dict([max(every.items(), key=lambda one: one[1])])
+        work = work or dict([max(every.items(), key=lambda item: item[1])])
         supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
         yield finding_for(
             "efficiency.above_one", efficiency=means.efficiency, drive=drive, work=work, phrases={"supplies": supplies}
@@ -346,7 +348,7 @@ def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
             if top is not None:
                 tops.append((top, built, meant))
         if tops:
-            top, built, meant = max(tops, key=lambda one: one[0].value)
+            top, built, meant = max(tops, key=lambda top: top[0].value)
             rest = course.extreme("drive_effort_change", i, of=magnitude, panels=left)
             places = [course.told(Place(0.0, float(edges[k + 1]))) for k in (built, meant)]
             yield finding_for(

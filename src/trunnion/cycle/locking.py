@@ -106,7 +106,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     found["locking_state"].attrs.update(codes("flag", LockingState))
     said = finding_rows(_notes(run))
     findings = {"findings": [*attribute(found, "findings"), *said]} if said else {}
-    ranges = {} if course is None else {"locking_ranges": course.told(time, near)}
+    ranges = {} if course is None else {"locking_ranges": course.attribute(time, near)}
     return found.assign_attrs(encoded({**ranges, **findings}))
 
 

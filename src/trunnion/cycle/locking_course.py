@@ -91,10 +91,10 @@ class LockingCourse:
             if seated is not None:  # where it locks pins are in their seats
                 status = seated.status[seated.courses.panels_of(time)]
                 ahead = ahead._replace(locked=status == Status.LOCKED)
-            known = ((status < Status.NOT_CONVERGED) | (status == Status.LOCKED)) & np.isfinite(other.acting)
+            answered = ((status < Status.NOT_CONVERGED) | (status == Status.LOCKED)) & np.isfinite(other.acting)
             efforts = [other.efforts[name] for name in run.system.mechanism.drivers]
             powers = [other.delivered, other.given, other.acting - other.given]
-            return np.stack([*powers, *efforts]), states(ahead, other, known, least)
+            return np.stack([*powers, *efforts]), states(ahead, other, answered, least)
 
         def like(sizes: Array) -> Array:
             return np.concatenate([np.full(3, np.max(sizes[:3])), np.full(len(sizes) - 3, np.max(sizes[3:]))])
@@ -106,7 +106,7 @@ class LockingCourse:
             in_parts = in_blocks(look, len(run.system.joints))
             return Courses.of(in_parts, breaks, like, accuracy_of(run.cycle, BACK))
 
-    def found(self) -> set[LockingState]:
+    def all_states(self) -> set[LockingState]:
         """The states that there are."""
         return {STATES[code] for code in np.unique(self.courses.states)}
 
@@ -129,17 +129,17 @@ class LockingCourse:
             return None
         error = np.maximum(courses.error(), CANCELLED * courses.mean(np.abs))[:3]
         means = courses.mean()[:3]
-        delivered, given, beside = np.where(np.abs(means) <= error, 0.0, means)
-        if np.isfinite(given) and not given > 0:
+        delivered, useful, others = np.where(np.abs(means) <= error, 0.0, means)
+        if np.isfinite(useful) and not useful > 0:
             return None
         if (locked := courses.share(np.isin(courses.states, BACK_LOCKED))) > SHORT:
             return Figure(name, subject, None, place=f"in {locked:.2%} of the cycle", note="it locks")
-        if LockingState.UNSOLVED in self.found() or not np.isfinite(delivered + given):
+        if LockingState.UNSOLVED in self.all_states() or not np.isfinite(delivered + useful):
             return Figure(name, subject, None, note="not every position is solved")
-        if beside > max(np.sum(error[:2]), LITTLE * given):
+        if others > max(np.sum(error[:2]), LITTLE * useful):
             return Figure(name, subject, None, note=_beside(run))
-        pushes = self.found() & PUSHES
-        value = min(float(delivered / given), 1.0)
+        pushes = self.all_states() & PUSHES
+        value = min(float(delivered / useful), 1.0)
         if value <= 0 and pushes <= {LockingState.SELF_LOCKING}:
             return Figure(name, subject, value, note="self-locking")
         if value <= 0:
@@ -158,9 +158,9 @@ class LockingCourse:
             middles = self.courses.edges[:-1] + self.courses.half
             sense = np.sign(primal(run.system.drive(run.values, name, middles)[1])) * np.ones(len(middles))
             tops = []
-            for way in (1.0, -1.0):
-                top = self.course.extreme("effort", i, sign=-way, panels=sense == way, unit=unit)
-                tops += [] if top is None else [(-way * top.value, top)]
+            for sign in (1.0, -1.0):
+                top = self.course.extreme("effort", i, sign=-sign, panels=sense == sign, unit=unit)
+                tops += [] if top is None else [(-sign * top.value, top)]
             supplied, top = max(tops, key=lambda pair: pair[0], default=(0.0, None))
             if top is not None and supplied > scales.floor(unit):
                 subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} to reverse the motion"
@@ -180,15 +180,15 @@ class LockingCourse:
         a margin below `near`."""
         edges, code = self.courses.edges, self.courses.states
         parts = _merged(edges, code, SHORT * self.courses.span)
-        found = [LockingRange(STATES[state], low, high, *self._least(low, high)) for state, low, high in parts]
+        ranges = [LockingRange(STATES[state], low, high, *self._least(low, high)) for state, low, high in parts]
         if self.margins is None:
-            return found
+            return ranges
         margins = self.margins.courses
         cut = margins.parted(np.concatenate([edges, margins.passages(0, near)]))
         middles = cut.edges[:-1] + cut.half
         close = (cut.at(middles)[0] < near) & ~np.isin(self.states_at(middles), NO_MARGIN)
         parts = _merged(cut.edges, close.astype(int), SHORT * cut.span)
-        return found + [LockingRange(None, low, high, *self._least(low, high)) for below, low, high in parts if below]
+        return ranges + [LockingRange(None, low, high, *self._least(low, high)) for below, low, high in parts if below]
 
     def _least(self, low: float, high: float) -> tuple[float, str]:
         """The smallest margin between two times, s, and where."""
@@ -202,7 +202,7 @@ class LockingCourse:
             return least.value, cut.told(least).removeprefix("at ")
         return (np.inf if np.any(inside & (cut.status < Status.LOAD_UNDEFINED)) else np.nan), ""
 
-    def told(self, time: Array, near: float = NEAR) -> dict[str, Any]:
+    def attribute(self, time: Array, near: float = NEAR) -> dict[str, Any]:
         """The ranges for the attribute `locking_ranges` of a result: see `docs/reference/results.md`."""
         dial, duration = self.run.system.dial(self.run.values, time), self.run.cycle.duration or 1.0
         rows, margin = [], BESIDE * duration
@@ -316,7 +316,7 @@ class LockingCourse:
 
         None where it holds even without, as where masses take more than the loads give.
         """
-        run, pushes = self.run, self.found() & PUSHES
+        run, pushes = self.run, self.all_states() & PUSHES
         everywhere = bool(pushes) and pushes <= HELD
         if not everywhere and run.cycle.periodic:
             return []
@@ -341,13 +341,13 @@ class LockingCourse:
         aspect, subject = "maximum" * everywhere, "down to which it is self-locking" + centred(run)
         forward = self.states_at(np.array([duration]))[0] == LockingState.SELF_LOCKING_FORWARD
         note = "below it the loads drive it on, onto a stop there" * bool(forward and not run.cycle.periodic)
-        told = ("1", aspect, place, note)
-        figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, *told)]
+        more = ("1", aspect, place, note)
+        figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, *more)]
         paths = {f"joints.{joint}.friction.{law_of(run.system, joint).scale}" for joint in felt(run.system, run.values)}
         same = {float(np.ravel(primal(run.values[path]))[0]) if path in run.values else np.nan for path in paths}
         if len(same) == 1 and np.isfinite(value := same.pop()):
             subject = f"friction coefficient {subject}"
-            figures.append(Figure("holding_coefficient", subject, multiple * value, *told))
+            figures.append(Figure("holding_coefficient", subject, multiple * value, *more))
         return figures
 
 
@@ -357,30 +357,30 @@ def holding_multiples(run: Run, time: Array) -> Array:
     There the power delivered to the drivers, in the direction in which the loads push, rises from 0. 0 where it is
     held without the friction that follows loads.
     """
-    found, least = np.full(len(time), np.nan), scales_of(run).floor("W")
+    multiples, least = np.full(len(time), np.nan), scales_of(run).floor("W")
     walk = run.walk(time)
-    for way in (walk, walk.backward()):
-        full = passed(run, way, FrictionMethod())
-        held = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
-        if not len(held):
+    for direction in (walk, walk.backward()):
+        full = passed(run, direction, FrictionMethod())
+        holding = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
+        if not len(holding):
             continue
 
         def released(
-            lane: NDArray[np.intp], multiple: Array, times: Array = time[held], back: bool = way.direction < 0
+            lane: NDArray[np.intp], multiple: Array, times: Array = time[holding], back: bool = direction.direction < 0
         ) -> tuple[Array, NDArray[np.intp]]:
             """Power delivered to the drivers for multiples of all friction; below 0 where it locks."""
             part = run.walk(np.repeat(times[lane], multiple.shape[1]))
-            there = passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
-            power = np.where(there.locked, -np.abs(there.acting), there.delivered)
-            return power.reshape(1, *multiple.shape), there.locked.reshape(multiple.shape).astype(np.intp)
+            through = passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
+            power = np.where(through.locked, -np.abs(through.acting), through.delivered)
+            return power.reshape(1, *multiple.shape), through.locked.reshape(multiple.shape).astype(np.intp)
 
         with np.errstate(all="ignore"):
-            each = Courses.many(released, [np.array([0.0, 1.0])] * len(held), None, HOLDING)
-        for lane, course in zip(held, each, strict=True):
+            each = Courses.many(released, [np.array([0.0, 1.0])] * len(holding), None, HOLDING)
+        for lane, course in zip(holding, each, strict=True):
             passages = course.passages(0)
             none = course.ends(0)[1][0] <= 0.0
-            found[lane] = 0.0 if none or not len(passages) else passages[0]
-    return found
+            multiples[lane] = 0.0 if none or not len(passages) else passages[0]
+    return multiples
 
 
 # ---- words ----------------------------------------------------------------------------------------------------
@@ -414,13 +414,13 @@ def _beside(run: Run) -> str:
         "springs": any(name not in springs for name in mechanism.springs),
         "loads that are not useful": any(name not in loads for name in mechanism.loads),
     }
-    others = [source for source, there in sources.items() if there]
+    others = [source for source, supplies in sources.items() if supplies]
     return f"{', '.join(others)} supply work too" if others else "more than 1: not solved accurately enough"
 
 
 def _merged(edges: Array, codes: NDArray[np.integer], shortest: float) -> list[tuple[int, float, float]]:
     """Code, begin and end of the stretches of one code; what is shorter than `shortest` is of what follows."""
-    found: list[tuple[int, float, float]] = []
+    stretches: list[tuple[int, float, float]] = []
     low = float(edges[0])
     for k, code in enumerate(codes.tolist()):
         high = float(edges[k + 1])
@@ -428,9 +428,9 @@ def _merged(edges: Array, codes: NDArray[np.integer], shortest: float) -> list[t
             continue
         if high - low <= shortest and k + 1 < len(codes):
             continue  # the next begins here
-        if found and (found[-1][0] == code or high - low <= shortest):
-            found[-1] = (found[-1][0], found[-1][1], high)
+        if stretches and (stretches[-1][0] == code or high - low <= shortest):
+            stretches[-1] = (*stretches[-1][:2], high)
         else:
-            found.append((code, low, high))
+            stretches.append((code, low, high))
         low = high
-    return found
+    return stretches

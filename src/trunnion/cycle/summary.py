@@ -74,7 +74,7 @@ def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[
             **cited(references(mechanism)),
             "findings": finding_rows([*findings(cycle), *measured.findings]),
             **scales_of(run).summary([*figures(cycle), *measured.summary()]),
-            **({"locking_ranges": near.told(time)} if near and near.pushed() else {}),
+            **({"locking_ranges": near.attribute(time)} if near and near.pushed() else {}),
             **drawn,
             "periodic": int(run.cycle.periodic),
             **({} if kept.variables is None else {KEPT: kept.variables}),

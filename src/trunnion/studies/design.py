@@ -403,8 +403,9 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
             figures.append(Figure(f"{name}.dead_centres", f"dead centres of {name}", text, f"{unit} of {driver}"))
     text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in found.limits) or "no position"
     within = "" if run.cycle.periodic else "within the stated motion"
+    start = f"it starts at {_coordinate(run, 0.0) * scale:.6g}{unit}" * (len(found.limits) > 1 and bool(driver))
     figures += [
-        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else "", within),
+        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else "", within, note=start),
         Figure("shaking_force", "shaking force", found.shaking_force, "N", "maximum"),
         Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "maximum"),
         Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),

@@ -217,9 +217,9 @@ _CYCLE = (
     ),
     Fault(
         "mean-effort-for-rms",
-        "cycle/means.py",
-        "np.sqrt(value[4 : 4 + drivers])",
-        "value[4 : 4 + drivers]",
+        "cycle/course.py",
+        "lost, np.sqrt(squares),",
+        "lost, squares,",
         ("tests/reference/test_means.py",),
     ),
     Fault(

@@ -126,6 +126,28 @@ def test_states_that_toss_take_bounded_work() -> None:
     assert top(found, panels=found.states == 0).value == pytest.approx(1.0)
 
 
+def test_states_that_toss_in_one_place_take_little_work() -> None:
+    """As beside a singular position: a break has one panel of mixed states in every round, or two, and no crowd."""
+    noise = np.random.default_rng(1)
+
+    def state(t: Any) -> Any:
+        return np.where((np.abs(t - 1.0) < 1e-7) & (noise.uniform(size=np.shape(t)) < 0.5), 5, np.where(t < 1.0, 0, 1))
+
+    found = course(lambda t: np.cos(t), state=state)
+    assert found.asked < 1500
+    assert np.sum(found.half[found.states == 5]) < 1e-6
+
+
+def test_an_edge_more_changes_nothing() -> None:
+    found = course(lambda t: np.cos(t), lambda t: np.where(t < 2.0, t, 7.0), breaks=(0.0, 2.0, TURN))
+    cut, time = found.parted(np.array([-1.0, 0.3, 1.7, TURN, 9.0])), np.linspace(0.1, 6.0, 101)
+    assert {0.3, 1.7} == set(cut.edges) - set(found.edges)
+    assert cut.at(time) == pytest.approx(found.at(time), abs=1e-13)
+    assert cut.mean() == pytest.approx(found.mean(), abs=1e-13)
+    assert cut.picked(np.array([1])).at(time)[0] == pytest.approx(found.at(time)[1], abs=1e-13)
+    assert found.panels_of(np.array([2.0 - 1e-9, 2.0])).tolist() == [np.flatnonzero(found.edges == 2.0)[0]] * 2
+
+
 def test_of_equal_tops_the_first_counts() -> None:
     found = course(lambda t: np.cos(2 * t - 1))
     assert top(found).time == pytest.approx(0.5, abs=1e-6)

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import trunnion
-from trunnion.cycle import near_locking
-from trunnion.cycle.positions import positions
 from trunnion.errors import Severity
 from trunnion.model.checks.values import check_values
 from trunnion.model.numbers import ParameterSet
@@ -43,29 +41,6 @@ def test_an_analysis_again_is_that_of_a_mechanism_read_anew(name: str) -> None:
     trunnion.analyse(mechanism, 12)
     again, anew = trunnion.analyse(mechanism, 36), trunnion.analyse(example(name), 36)
     assert again.identical(anew)
-
-
-@pytest.mark.parametrize("name", ["durango-fourbar", "pezzuti-cardan", "misaligned-fourbar"])
-def test_how_near_it_is_to_locking_is_read_off_the_walk_of_the_analysis(name: str) -> None:
-    run = prepare(example(name))
-    found = positions(run, 36)
-    margin = found.arrays["locking_margin"]
-    assert found.walked is not None
-    taken = near_locking.look(run, found.time, margin, found.method, found.walked)
-    run = prepare(example(name))  # what was found once is not there
-    again = near_locking.look(run, found.time, margin, found.method)
-    assert taken.critical == again.critical
-    for one, other in zip(taken.back, again.back, strict=True):
-        np.testing.assert_equal(one, other)
-    for one, other in zip(taken.ahead, again.ahead, strict=True):
-        np.testing.assert_equal(one, other)
-    assert np.array_equal(taken.others, again.others)
-
-
-def test_no_walk_is_kept_of_pins_in_seats_or_many_positions() -> None:
-    assert positions(prepare(example("fourbar-with-play")), 12, margin=False, averaged=False).walked is None
-    many = near_locking.LOOKED + 1
-    assert positions(prepare(example("durango-fourbar")), many, margin=False, averaged=False).walked is None
 
 
 WRONG: list[dict[str, Any]] = [

@@ -47,6 +47,21 @@ def test_not_assembled_over_part_of_the_turn() -> None:
     assert np.isnan(float(result["efficiency"]))
 
 
+@pytest.mark.parametrize("start", ["0 deg", "90 deg", "270 deg"])
+def test_extremes_are_of_the_range_that_holds_the_start_and_the_others_are_named(start: str) -> None:
+    """A rocker of 4, coupler 6, output 3 and ground 5.5 closes for |BD| from 3 to 9: in two ranges of a turn."""
+    data = model(four_bar(4.0, 6.0, 3.0, 5.5), friction=None)
+    data["drivers"]["A"] = {"speed": 1.0, "start": start}
+    result = trunnion.analyse(Mechanism(**data), 36)
+    (told,) = [row for row in findings(result) if row["code"] == "assembly.ranges"]
+    low, high = (np.degrees(np.arccos((16 + 5.5**2 - bd**2) / 44)) for bd in (3.0, 9.0))
+    assert ("extremes are of the one" in told["what"]) == (start != "0 deg")
+    own = {"90 deg": (low, high), "270 deg": (360 - high, 360 - low)}.get(start, (low, 360 - low))
+    places = [row.place.strip("at °") for row in result.trunnion.summary if row.name.startswith("A.effort_m")]
+    assert len(places) == 2
+    assert all(own[0] - 0.1 <= float(place) % 360 <= own[1] + 0.1 for place in places)
+
+
 def test_not_assembled_because_too_near() -> None:
     """Rocker and coupler differ by more than the pins' least distance."""
     result = analyse(four_bar(0.8, 1.5, 0.5, 1.0), 90)
@@ -196,7 +211,7 @@ def test_chunks_are_invisible(name: str, method: FrictionMethod | None, monkeypa
     """Solved 7 at a time or all together: every variable the same, condition included."""
 
     whole = analyse(MODELS[name](), 60, method)
-    monkeypatch.setattr(sys.modules["trunnion.cycle.positions"], "CHUNK", 7)
+    monkeypatch.setattr(sys.modules["trunnion.solve.memory"], "CHUNK", 7)
     parts = analyse(MODELS[name](), 60, method)
     for variable in whole.data_vars:
         a, b = np.asarray(parts[variable], float), np.asarray(whole[variable], float)

@@ -192,5 +192,5 @@ def test_a_link_at_rest_does_not_turn_back() -> None:
     data = slider_crank()
     (driver,), (slide,) = data["drivers"], (n for n, one in data["joints"].items() if one["type"] == "prismatic")
     data["drivers"][driver] = {"law": "modified-sine", "range": [0.4, 1.2], "duration": 0.2, "dwell": 0.1}
-    found = figures.dead_centres(prepare(build(data)), 60)
+    found = figures.dead_centres(prepare(build(data)))
     assert found[slide] == ()

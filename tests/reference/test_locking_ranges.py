@@ -15,11 +15,13 @@ from mechanisms import eccentric_press
 from mechanisms_parts import Data, plunger, revolute
 from mechanisms_space import rssr
 from trunnion import Mechanism, Status
-from trunnion.cycle.locking import LockingState, locking, look, ranges, report_figures
-from trunnion.cycle.locking_ends import ends
+from trunnion.cycle.locking import LockingState, locking, look, report_figures
+from trunnion.cycle.locking_course import LockingCourse, locking_course
 from trunnion.cycle.locking_states import NO_MARGIN
 from trunnion.results.attributes import attribute, summary_of
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
+from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import prepare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -37,6 +39,12 @@ def hoist(friction: float = FRICTION) -> Mechanism:
     return Mechanism(trunnion=1, **data)
 
 
+def course(mechanism: Mechanism) -> LockingCourse:
+    found = locking_course(prepare(mechanism), FrictionMethod(margin_up_to=MARGIN))
+    assert found is not None
+    return found
+
+
 def states(found: xr.Dataset) -> np.ndarray:
     return np.asarray(found["locking_state"].values)
 
@@ -52,16 +60,14 @@ def test_a_crank_holds_its_load_inside_the_friction_circle() -> None:
     efficiency = found["efficiency_reverse_instant"].values
     np.testing.assert_allclose(efficiency[pushed], 1 - FRICTION * RADIUS / arm[pushed], rtol=1e-9)
     assert np.all(np.isnan(efficiency[~pushed]))
-    first, second, third, fourth = ranges(found)
-    assert [one.state for one in (first, second, third, fourth)] == [
+    ranges = course(hoist()).ranges()
+    assert [part.state for part in ranges] == [
         LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON,
     ]  # fmt: skip
-    angle = found["drive"].values
-    limit = np.degrees(np.arccos(FRICTION * RADIUS / ARM))
-    assert angle[first.last] < limit < angle[second.first]
-    assert second.last + 1 == third.first
-    assert angle[third.last] < 180 - limit < angle[fourth.first]
-    assert fourth.last == 400
+    limit = np.arccos(FRICTION * RADIUS / ARM)
+    ends = [0.0, limit, np.pi / 2, np.pi - limit, 2.5]  # s, at 1 rad/s
+    np.testing.assert_allclose([part.low for part in ranges], ends[:-1], atol=1e-7)
+    np.testing.assert_allclose([part.high for part in ranges], ends[1:], atol=1e-7)
 
 
 def test_friction_that_holds_the_load_is_that_whose_circle_its_arm_touches() -> None:
@@ -82,7 +88,7 @@ def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: 
     if not told:
         assert not rows
         return
-    arms = np.abs(ARM * np.cos(np.linspace(first, last, 41)))
+    arms = np.abs(ARM * np.cos([first, last]))
     arm = np.max(arms) if told == "all" else arms[-1]
     assert rows["holding_multiple"].value == pytest.approx(arm / (FRICTION * RADIUS), rel=1e-9)
     assert rows["holding_coefficient"].value == pytest.approx(arm / RADIUS, rel=1e-9)
@@ -147,15 +153,13 @@ def test_where_the_drive_effort_changes_sign_is_told_and_kept_in_the_result() ->
         "driven_on",
     ]
     np.testing.assert_allclose(kept["rows"][-1]["ends"][0], limit, atol=0.01)
-    assert kept["rows"][-1]["ends"][1] is None  # the last position
+    assert kept["rows"][-1]["ends"][1] == pytest.approx(np.degrees(2.5), abs=1e-3)
 
 
 def test_an_end_at_zero_is_zero() -> None:
     """Of a slide that drives the crank over its top, where its coordinate is 0: rounded to what it is known to."""
-    for steps in (31, 40, 57):
-        run = prepare(slide_hoist())
-        found = look(run, steps)
-        assert "0 mm" in [low for low, _ in ends(run, found, ranges(found), 1.5)]
+    run = prepare(slide_hoist())
+    assert "0 mm" in [part.ends(run)[1][0] for part in course(slide_hoist()).ranges()]
 
 
 def slide_hoist() -> Mechanism:
@@ -183,20 +187,18 @@ def test_without_friction_every_load_drives_back() -> None:
     np.testing.assert_allclose(found["efficiency_reverse_instant"].values[pushed], 1.0, rtol=1e-9)
 
 
-@pytest.mark.parametrize("steps", [90, 360, 720])
-def test_an_analysis_has_the_ranges_of_the_positions_that_it_looks_at(steps: int) -> None:
-    """At most 360 positions; the report shows them."""
+@pytest.mark.parametrize("steps", [2, 360, 720])
+def test_an_analysis_has_the_ranges_of_the_cycle_whatever_its_steps(steps: int) -> None:
+    """Those that are shorter than a step too; the report shows them."""
     run = trunnion.analyse(hoist(), steps)
-    own = locking(hoist(), min(steps, 360))
-    known, told = ranges(own, 0.0), attribute(run, "locking_ranges")
-    assert told["positions"] == min(steps, 360)
-    found = [(row["state"], row["first"], row["count"]) for row in told["rows"]]
-    assert found == [(one.state.name.lower(), one.first, one.last - one.first + 1) for one in known]
-    margins = [row["cells"][3:] for row in attribute(own, "locking_ranges")["rows"] if row["state"]]
-    assert [row["cells"][3:] for row in told["rows"]] == margins  # and where each is smallest
+    told, own = (attribute(result, "locking_ranges") for result in (run, locking(hoist(), 30)))
+    assert told["positions"] == steps
+    assert sum(row["count"] for row in told["rows"]) == steps
+    for name in ("state", "ends", "times", "cells"):
+        assert [row[name] for row in told["rows"]] == [row[name] for row in own["rows"]]
     page = run.trunnion.report()
     assert 'id="locking"' in page
-    assert all(f'<rect class="{state}"' in page for state, _, _ in found)
+    assert all(f'<rect class="{row["state"]}"' in page for row in told["rows"])
 
 
 def test_an_analysis_without_friction_or_without_loads_has_no_ranges() -> None:
@@ -207,26 +209,27 @@ def test_an_analysis_without_friction_or_without_loads_has_no_ranges() -> None:
         assert 'id="locking"' not in run.trunnion.report()
 
 
-@pytest.mark.parametrize("steps", [12, 141, 401])
-def test_ends_of_ranges_are_those_of_the_friction_circle(steps: int) -> None:
-    """To 0.01°, however many positions there are."""
+def test_ends_of_ranges_are_those_of_the_friction_circle() -> None:
+    """To 0.01°."""
     run = prepare(hoist())
-    found = look(run, steps)
-    told = ends(run, found, ranges(found), 1.5)
     limit = f"{np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
     behind = f"{180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
-    assert told == [("0°", limit), (limit, "90°"), ("90°", behind), (behind, "143.2°")]
+    told = [tuple(part.ends(run)[1]) for part in course(hoist()).ranges()]
+    assert told == [("0°", limit), (limit, "90°"), ("90°", behind), (behind, "143.24°")]
 
 
 def test_ends_of_a_range_near_locking_are_where_the_margin_passes_it() -> None:
-    """Linear between positions: they hardly depend on the step, and the margin passes 7 at no position."""
-    run, places = prepare(eccentric_press()), []
-    for steps in (180, 360):
-        found = look(run, steps)
-        assert np.nanmin(np.abs(found["locking_margin"].values - 7.0)) > 1e-3
-        of = [one for one in ranges(found, 7.0) if one.state is None]
-        places.append([[float(end.strip("°")) for end in pair] for pair in ends(run, found, of, 7.0)])
-    np.testing.assert_allclose(places[0], places[1], atol=0.05)
+    """Of positions very near an end the margin is below 7 on one side only."""
+    mechanism = eccentric_press()
+    run = prepare(mechanism)
+    near = [part for part in course(mechanism).ranges(7.0) if part.state is None]
+    assert near
+    duration = run.cycle.duration
+    for end, inward in [(part.low, 1.0) for part in near] + [(part.high, -1.0) for part in near]:
+        if 1e-3 < end / duration < 1 - 1e-3:
+            time = end + inward * 1e-4 * duration * np.array([-1.0, 1.0])
+            margin = locking_margin(run.solve(time, method=FrictionMethod(margin_up_to=MARGIN)))
+            np.testing.assert_array_equal(np.asarray(margin) < 7.0, [False, True])
 
 
 def spring_hoist(**spring: object) -> Mechanism:
@@ -377,23 +380,27 @@ def test_locked_forward_and_jammed(load: float) -> None:
     np.testing.assert_array_equal(states(found) == LockingState.JAMMED, ahead & behind)
     np.testing.assert_array_equal(states(found) == LockingState.LOCKED, ahead & ~behind)
     assert np.any(ahead | behind)
-    assert not [one for one in ranges(found, 1e9) if one.state is None and ahead[one.first]]
+    near = [part for part in course(pushed_slider(1.3 * CRITICAL, load)).ranges(1e9) if part.state is None]
+    time = found["time"].values[ahead]
+    assert not [part for part in near if np.any((part.low < time) & (time < part.high))]
 
 
-def test_ranges_cover_every_position_once_and_near_ones_are_below_the_margin() -> None:
-    found = locking(eccentric_press(), 90)
-    margin = found["locking_margin"].values
-    near = float(np.nanquantile(margin, 0.3))
-    every = ranges(found, near)
-    covered = np.concatenate([np.arange(one.first, one.last + 1) for one in every if one.state is not None])
-    np.testing.assert_array_equal(covered, np.arange(90))
-    close = np.concatenate([np.arange(one.first, one.last + 1) for one in every if one.state is None])
+def test_ranges_cover_the_cycle_once_and_near_ones_are_below_the_margin() -> None:
+    mechanism = eccentric_press()
+    found = locking(mechanism, 90)
+    margin, time = found["locking_margin"].values, found["time"].values
+    near = float(np.nanquantile(margin, 0.3)) + 1e-6
+    every = course(mechanism).ranges(near)
+    whole = [part for part in every if part.state is not None]
+    assert [part.low for part in whole[1:]] == [part.high for part in whole[:-1]]
+    assert (whole[0].low, whole[-1].high) == (0.0, prepare(mechanism).cycle.duration)
+    close = np.zeros(90, bool)
+    for part in every:
+        inside = (time >= part.low) & (time < part.high)
+        close |= inside & (part.state is None)
+        assert part.margin <= np.nanmin(margin[inside], initial=np.inf) * (1 + 1e-6)
     running = ~np.isin(states(found), NO_MARGIN)
-    np.testing.assert_array_equal(close, np.flatnonzero((margin < near) & running))
-    for one in every:
-        own = margin[one.first : one.last + 1]
-        assert one.margin == pytest.approx(np.nanmin(own), nan_ok=True)
-        assert one.first <= one.at <= one.last
+    np.testing.assert_array_equal(close, (margin < near) & running)
 
 
 def test_states_are_flags_with_meanings() -> None:

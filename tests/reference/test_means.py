@@ -11,7 +11,6 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism
-from trunnion.algebra.quadrature import Effort, integrals
 from trunnion.cycle import contact_loss
 from trunnion.cycle.summary import balance
 from trunnion.errors import Status
@@ -237,25 +236,6 @@ def test_a_lost_contact_matters_to_the_extremes_of_this_example() -> None:
 
 
 # ---- the rule -------------------------------------------------------------------------------------------------
-
-
-def test_the_rule_is_exact_for_polynomials_and_tells_its_error() -> None:
-    def functions(rows: Any, time: Any) -> Any:
-        return np.stack([time**20 + rows[:, None], np.abs(time - 0.3), np.where(time < 0.61, 1.0, 3.0)])
-
-    found = integrals(functions, [np.array([0.0, 0.4, 1.0]), np.array([0.0, 2.0])])
-    exact = np.array([[1 / 21, 2 + 2**21 / 21], [(0.3**2 + 0.7**2) / 2, (0.3**2 + 1.7**2) / 2], [1.78, 4.78]])
-    assert np.all(np.abs(found.value - exact) <= np.maximum(3 * found.error, 1e-14 * exact))
-    np.testing.assert_allclose(found.value[0], exact[0], rtol=1e-14)
-    np.testing.assert_allclose(found.value, exact, rtol=1e-5)
-
-
-def test_what_has_no_answer_has_no_integral_and_leaves_the_others_theirs() -> None:
-    found = integrals(
-        lambda rows, time: np.where(rows[:, None] == 1, np.nan, time)[None], [np.array([0.0, 1.0])] * 3, effort=Effort()
-    )
-    assert np.isnan(found.value[0, 1])
-    np.testing.assert_allclose(found.value[0, [0, 2]], 0.5, rtol=1e-15)
 
 
 def test_useful_work_is_that_of_the_loads_marked_so() -> None:

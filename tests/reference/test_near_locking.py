@@ -1,22 +1,15 @@
-"""Which joint locks a mechanism, other solutions of friction, and driving backward: closed forms and consistency."""
+"""Which joint locks a mechanism, and driving backward: closed forms and consistency."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import trunnion
 from brief import brief
 from mechanisms import Data, analyse, build, findings, five_bar, four_bar, model, slider_crank
 from trunnion import Mechanism, Status, locking
-from trunnion.algebra.plane import Wrench
-from trunnion.cycle.near_locking import _count
-from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.results.attributes import summary_of
-from trunnion.solve.friction import Contact, FrictionProblem
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.solve.status import status_of
@@ -109,33 +102,6 @@ def test_joint_without_which_it_still_locks() -> None:
     assert np.any(multiple == 0)
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.floats(0.2, 3.0), st.floats(-2, 2), st.floats(-2, 2), st.floats(0.1, 3.0), st.sampled_from([-1.0, 1.0]))
-def test_all_solutions_of_one_pin(coefficient: float, x: float, y: float, gain: float, sense: float) -> None:
-    """φ = ∓f |R + g φ e|: a quadratic, whose roots of the right sign are all there are."""
-    if np.hypot(x, y) < 0.1:
-        return
-    law = FRICTION_LAWS["coulomb"]
-    contact = Contact(
-        0, [], PlanarContactLoad(), law, {"coefficient": coefficient, "pair_factor": 1.0}, np.array([sense])
-    )
-    lane = np.ones(1)
-    problem = FrictionProblem([contact], [Wrench(x * lane, y * lane, 0.0)], [[Wrench(gain * lane, 0.0 * lane, 0.0)]])
-    # φ² = f² (R² + 2 g x φ + g² φ²), φ against the slip
-    roots = np.roots(
-        [1 - (coefficient * gain) ** 2, -2 * coefficient**2 * gain * x, -(coefficient**2) * (x * x + y * y)]
-    )
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    right = real[(real * sense < 0) & (np.abs(real) < 1e6)]
-    if len(right) == 2 and abs(right[0] - right[1]) < 1e-3 * np.abs(right).max():
-        return
-    if abs(abs(coefficient * gain) - 1) < 1e-3 or (len(roots) == 2 and abs(roots[0] - roots[1]) < 1e-3):
-        return
-    assert _count(problem, np.full((1, 1), np.nan)) == len(right)
-    for known in right:
-        assert _count(problem, np.array([[known]])) == len(right) - 1
-
-
 @pytest.mark.slow
 def test_locked_findings_name_the_joint_that_decides() -> None:
     data, options = CASES["slider-crank"]
@@ -175,11 +141,11 @@ def test_successive_approximation_has_the_same_margin() -> None:
 
 
 def test_locking_says_nothing_where_there_is_no_answer() -> None:
-    """Positions that cannot be assembled have no margin, no multiple, no count."""
+    """Positions that cannot be assembled have no margin and no multiple."""
     found = locking(build(four_bar(2.0, 1.5, 1.5, 4.0)), 36)
     gone = found["status"].values == Status.NOT_ASSEMBLED
     assert np.any(gone)
     assert np.any(~gone)
-    for name in ("locking_margin", "other_solutions", "critical_multiple"):
+    for name in ("locking_margin", "critical_multiple"):
         assert np.all(np.isnan(found[name].values[..., gone]))
         assert not np.any(np.isnan(found[name].values[..., found["status"].values < Status.NOT_CONVERGED]))

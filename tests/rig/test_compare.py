@@ -13,7 +13,7 @@ import pytest
 import trunnion
 from rig_measurements import course, exact, measured, rocker
 from trunnion import MechanismError, Status
-from trunnion.cycle.summary import model_notes
+from trunnion.cycle.findings import model_notes
 from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
 from trunnion.rig.comparison.assessment import Verdict, expanded, independent, judge, uncertainty_of

@@ -13,7 +13,7 @@ chebfuns, IMA J. Numer. Anal. 30 (2010) 898-916, doi:10.1093/imanum/drp008.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -40,6 +40,7 @@ ENDS = np.array([(-1.0) ** np.arange(ORDER), np.ones(ORDER)]).T
 INTEGRAL = ON_GAUSS @ GAUSS_WEIGHTS  # of every Chebyshev polynomial over a panel
 CHECKED, TORN = 5, 1e3  # times that edges are looked at; of what is small: a row that changes by more at one jumps
 TOSSED = 1e-3  # of the whole: width of panels whose state may be the gravest that they have
+CROWDED, CROWD = 1e-7, 4  # of the whole: in one place; panels of mixed states there: a break has one or two
 HALVED = 2  # rounds in which a panel is halved; then it is parted about the place where a row bends most
 NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
 FLAT = 1e-9  # of its size: a course that changes less is constant, and of tops that differ less the first counts
@@ -157,6 +158,26 @@ class Courses:
     def share(self, panels: NDArray[np.bool_]) -> float:
         """Share of the time that some panels take."""
         return float(np.sum(self.half[panels]) / np.sum(self.half))
+
+    def picked(self, rows: Labels) -> Courses:
+        """Some of the rows."""
+        return replace(self, coefficients=self.coefficients[:, rows], sizes=self.sizes[rows])
+
+    def parted(self, times: Array) -> Courses:
+        """The same rows with edges at some times, s, too, as where a part of them begins or ends."""
+        edges = np.union1d(self.edges, times[(times > self.edges[0]) & (times < self.edges[-1])])
+        low, half = edges[:-1], np.diff(edges) / 2
+        panel = np.searchsorted(self.edges, low, side="right") - 1
+        spots = (low + half)[:, None] + half[:, None] * POINTS
+        spots = (spots - self.edges[panel][:, None]) / self.half[panel][:, None] - 1.0
+        basis = np.moveaxis(chebyshev.chebvander(spots, ORDER - 1), 2, 1)
+        coefficients = (self.coefficients[panel] @ basis) @ FIT.T
+        return replace(self, edges=edges, coefficients=coefficients, states=self.states[panel])
+
+    def panels_of(self, time: Array) -> Labels:
+        """Numbers of the panels at times, s; at an edge, or next to it, of the one after it."""
+        panels = np.searchsorted(self.edges, time + BESIDE * self.span, side="right") - 1
+        return np.asarray(np.clip(panels, 0, len(self.half) - 1))
 
     # ---- means ------------------------------------------------------------------------------------------------
 
@@ -341,6 +362,7 @@ class _Resolving:
             rough, worst = self._rough(mechanism, values, coefficients)
             unresolved = mixed | rough
             tiny = high - low <= self._accuracy.shortest * self._span[mechanism]
+            tiny |= self._crowded(mechanism, mixed, low, high)
             self._break(mechanism[unresolved & tiny], high[unresolved & tiny])
             done = ~unresolved if round_ < self._accuracy.rounds else ~mixed
             panels = _Panels(mechanism, low, high, coefficients, labels[:, 0])
@@ -360,6 +382,16 @@ class _Resolving:
         """Narrow panels of mechanisms with many of mixed states: these toss as rounding will, and have no breaks."""
         many = np.bincount(mechanism[mixed], minlength=len(self._asked)) > self._accuracy.most
         return mixed & many[mechanism] & (width < TOSSED * self._span[mechanism])
+
+    def _crowded(self, mechanism: Labels, mixed: NDArray[np.bool_], low: Array, high: Array) -> NDArray[np.bool_]:
+        """Panels of mixed states of which there are several in one place, too narrow for so many breaks."""
+        span, crowded = self._span[mechanism], np.zeros(len(mixed), bool)
+        close = np.flatnonzero(mixed & (high - low < CROWDED * span))
+        close = close[np.lexsort((low[close], mechanism[close]))]
+        apart = (np.diff(low[close]) > CROWDED * span[close[1:]]) | (np.diff(mechanism[close]) != 0)
+        place = np.cumsum(np.append(0, apart))[: len(close)]
+        crowded[close] = np.bincount(place, minlength=1)[place] > CROWD
+        return crowded
 
     def _scale(self, mechanism: Labels, values: Array, labels: Labels) -> None:
         """How large every row is, and what is like it, (row, mechanism): in the least state that there is."""

@@ -46,8 +46,8 @@ def locking(
 ) -> None:
     """Margin against locking by friction; backdriving.
 
-    The margin for the friction of all joints and of each joint alone, other solutions of the friction equations, and
-    the ranges of the drive in which the mechanism locks, is near locking, is self-locking or can be backdriven.
+    The margin for the friction of all joints and of each joint alone, and the ranges of the drive in which the
+    mechanism locks, is near locking, is self-locking or can be backdriven.
     """
     from trunnion.cycle.locking import look, report_figures
     from trunnion.results.attributes import attribute
@@ -60,7 +60,7 @@ def locking(
         with bar("positions", steps, least=200_000) as progress:
             found = look(run, steps, progress, near)
     figures = report_figures(run, found)
-    every = attribute(found, "locking_ranges")
+    every = attribute(found, "locking_ranges", "{}")
 
     def show() -> None:
         show_figures(mechanism.name or str(file), figures)

@@ -19,33 +19,33 @@ from trunnion.algebra.course import Accuracy, Courses, Place
 from trunnion.algebra.quadrature import CANCELLED
 from trunnion.cycle import contact_loss
 from trunnion.cycle.deviations import COMPARED, fill_errors
+from trunnion.cycle.fill import allocate
 from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.unanswered import blank
-from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Status
-from trunnion.results import variables as results
+from trunnion.joints.pairs import PAIRS
 from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import around
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.margin import locking_margin
+from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import settle
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS, SEATED, Mechanisms, accuracy_of, breaks_between, stated_bends
+from trunnion.solve.system import System
 
 __all__ = [
-    "COMPARED_ROWS", "FOLLOWED", "CycleCourse", "Rows", "Top", "course_of", "like",
-    "margin_of", "stacked",
+    "CycleCourse", "Top", "course_of", "followed", "like", "magnitude", "margin_of", "stacked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-Rows = Mapping[str, Array]  # the numbers of each variable, (…, panel, place)
 POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
 FORCES = ("drive_effort", "reaction_force", "reaction_moment", "drive_effort_change")
-FOLLOWED = ("drive_effort", *POWERS, "reaction_force", "reaction_moment", "joint_slide")
+FOLLOWED = ("drive_effort", *POWERS, "reaction_force")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
 HELD = 16  # beside the status of panels in which accelerations leave out the travel of seats
 SIDE = 1e-7  # of the cycle: beside a break
@@ -76,16 +76,6 @@ class CycleCourse:
         ends = np.cumsum([0, *(int(np.prod(shape)) for shape in self.shapes.values())])
         return {name: slice(*ends[k : k + 2]) for k, name in enumerate(self.shapes)}
 
-    def _named(self, of: Callable[[Rows], Array]) -> Callable[[Array], Array]:
-        """A function of the variables as one of the rows."""
-
-        def from_rows(rows: Array) -> Array:
-            return of(
-                {name: rows[self._places[name]].reshape(*shape, *rows.shape[1:]) for name, shape in self.shapes.items()}
-            )
-
-        return from_rows
-
     @cached_property
     def status(self) -> NDArray[np.intp]:
         """Of every panel."""
@@ -97,28 +87,47 @@ class CycleCourse:
 
         Where a pin loses contact it is taken to stay in a seat that would jump: forces there are no answer.
         """
-        solved = self.status == Status.SOLVED
-        return np.asarray(solved if np.any(solved) else self.status == Status.ZERO_SLIP)
+        solved = (self.status == Status.SOLVED) & self.reached
+        return np.asarray(solved if np.any(solved) else (self.status == Status.ZERO_SLIP) & self.reached)
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
         """Panels where no pin loses contact."""
-        return np.asarray(self.status != Status.CONTACT_LOST)
+        return np.asarray((self.status != Status.CONTACT_LOST) & self.reached)
+
+    @cached_property
+    def ranges(self) -> list[tuple[float, float, bool]]:
+        """Begin and end, s, of the ranges that can be assembled, and whether each holds the start.
+
+        In a motion that comes again the last may go on at the start: then it ends before it begins.
+        """
+        edges, open_ = self.courses.edges, np.concatenate([[1], self.status == Status.NOT_ASSEMBLED, [1]])
+        changes = np.flatnonzero(np.diff(open_))
+        found = [(float(edges[a]), float(edges[b]), a == 0) for a, b in changes.reshape(-1, 2)]
+        if len(found) > 1 and self.run.cycle.periodic and not (open_[1] or open_[-2]):
+            found = [(found[-1][0], found[0][1], True), *found[1:-1]]
+        return found
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Panels that are reached from the start without a gap; all if it cannot be assembled there."""
+        start = next((ends for *ends, holds in self.ranges if holds), None)
+        if start is None:
+            return np.ones(len(self.courses.half), bool)
+        middles, (low, high) = self.courses.edges[:-1] + self.courses.half, start
+        return np.asarray((middles > low) & (middles < high) if low < high else (middles > low) | (middles < high))
 
     @property
     def note(self) -> str:
         """Of how much of the cycle a figure is, where a pin loses contact in the rest; empty where it does nowhere."""
-        return "" if np.all(self.valid) else f"without {self.courses.share(~self.valid):.2g} of the cycle"
-
-    @cached_property
-    def _largest(self) -> Array:
-        """The largest magnitude of every row in sound panels."""
-        size: Array = np.max(np.sum(np.abs(self.courses.coefficients[self.sound]), axis=-1), axis=0, initial=0.0)
-        return size
+        lost = self.status == Status.CONTACT_LOST
+        return f"without {self.courses.share(lost):.2g} of the cycle" if np.any(lost) else ""
 
     def largest(self, name: str) -> float:
         """The largest magnitude of a variable in sound panels, or a little more."""
-        return float(np.max(self._largest[self._places[name]], initial=0.0)) if name in self.shapes else 0.0
+        if name not in self.shapes:
+            return 0.0
+        return float(np.max(np.sum(np.abs(self.picked(name).coefficients[self.sound]), axis=-1), initial=0.0))
 
     def jumps(self, name: str, *which: int) -> Array:
         """By how much a number of a variable changes at the end of every panel; to the first one in a period."""
@@ -134,23 +143,44 @@ class CycleCourse:
         away = np.minimum(np.abs(self.courses.edges[:-1] - place.time), np.abs(self.courses.edges[1:] - place.time))
         return bool(np.any((away <= NEXT * self.courses.span) & (self.status == status)))
 
+    def picked(self, name: str, *which: int) -> Courses:
+        """The rows of a variable, or of one of its joints, links, drivers alone."""
+        places = self._places[name]
+        return self.courses.picked(np.arange(places.start, places.stop).reshape(self.shapes[name])[which].ravel())
+
     def extreme(
         self,
-        of: Callable[[Rows], Array],
+        name: str,
+        *which: int,
+        of: Callable[[Array], Array] = lambda rows: rows[0],
         sign: float = 1.0,
         panels: NDArray[np.bool_] | None = None,
         unit: str = "",
     ) -> Place | None:
-        """The largest or least value of a number made of the variables, in sound panels if no others are given.
+        """The largest or least value of a number, in sound panels if no others are given.
 
-        unit: of the number, so that rounding is told from change.
+        Parameters
+        ----------
+        name, which
+            Variable, and which of its joints, links, drivers.
+        of
+            What is made of its rows, (row, panel, place), the only one itself if not given.
+        unit
+            Of the number, so that rounding is told from change.
         """
         chosen = self.sound if panels is None else panels
-        return self.courses.extreme(self._named(of), sign, chosen, scales_of(self.run).floor(unit))
+        return self.picked(name, *which).extreme(of, sign, chosen, scales_of(self.run).floor(unit))
 
-    def top(self, of: Callable[[Rows], Array], sign: float = 1.0, unit: str = "") -> Top | None:
+    def top(
+        self,
+        name: str,
+        *which: int,
+        of: Callable[[Array], Array] = lambda rows: rows[0],
+        sign: float = 1.0,
+        unit: str = "",
+    ) -> Top | None:
         """The same with its place in words."""
-        found = self.extreme(of, sign, None, unit)
+        found = self.extreme(name, *which, of=of, sign=sign, unit=unit)
         return None if found is None else Top(found.value, self.told(found))
 
     def told(self, place: Place) -> str:
@@ -179,37 +209,55 @@ class CycleCourse:
     def means(self) -> Means:
         """Means over the cycle; NaN where a part of it has no answer."""
 
-        def powers(rows: Rows) -> Array:
-            driven, lost = np.sum(rows["drive_power"], axis=0), np.sum(rows["friction_power"], axis=0)
-            return np.stack([driven, rows["useful_power"], lost])
+        def total(rows: Array) -> Array:
+            return np.asarray(np.sum(rows, axis=0))
 
+        parts = [self.picked(name) for name in ("drive_power", "useful_power", "friction_power")]
         with np.errstate(all="ignore"):
-            errors = self.courses.error()
-            values = self.courses.mean(self._named(powers))
-            sizes = self.courses.mean(self._named(lambda rows: np.abs(powers(rows))))
-            residual = self.courses.mean(self._named(lambda rows: np.abs(rows["power_residual"])))
-            squares = self.courses.mean(self._named(lambda rows: rows["drive_effort"] ** 2))
-        each = [np.sum(errors[self._places[name]]) for name in ("drive_power", "useful_power", "friction_power")]
+            values = np.array([part.mean(total) for part in parts])
+            sizes = np.array([part.mean(lambda rows: np.abs(total(rows))) for part in parts])
+            residual = self.picked("power_residual").mean(np.abs)[0]
+            squares = self.picked("drive_effort").mean(np.square)
+        each = [np.sum(part.error()) for part in parts]
         rounding = np.maximum(CANCELLED * sizes, RESIDUALS * residual)
         rounding[2] = max(rounding[2], CANCELLED * np.max(sizes))
         driven, useful, rubbed = (Mean(*(float(part[k]) for part in (values, each, sizes, rounding))) for k in range(3))
-        lost = self.courses.mean()[self._places["friction_power"]]
-        supposed = float(self.courses.mean()[self._places[SUPPOSED]][0] / sizes[0]) if SUPPOSED in self.shapes else 0.0
+        lost = parts[2].mean()
+        supposed = float(self.picked(SUPPOSED).mean()[0] / sizes[0]) if SUPPOSED in self.shapes else 0.0
         useful_work = has_useful_work(self.run.system.mechanism)
         means = Means(driven, useful, rubbed, lost, np.sqrt(squares), supposed, useful_work)
         return unknown(means) if supposed > MOST_SUPPOSED else means
 
 
-def course_of(run: Run, method: FrictionMethod, ideal: bool = False) -> CycleCourse:
-    """The course of a run over its cycle, found once. ideal: of the mechanism without errors."""
-    return run.once(("course", method, ideal), lambda: _course(run, method, ideal))
+def magnitude(rows: Array) -> Array:
+    """Of a number or a vector, (component, panel, place)."""
+    return np.asarray(np.sqrt(np.sum(rows**2, axis=0)))
 
 
-def _course(run: Run, method: FrictionMethod, ideal: bool) -> CycleCourse:
-    looking = _Looking(run, method, ideal)
+def followed(system: System, errs: bool) -> tuple[str, ...]:
+    """The variables that the summary of a cycle is made of."""
+    in_space = ("reaction_moment",) * (system.mechanism.space == "spatial")
+    slides = ("joint_slide",) * any(PAIRS[kind].guided for kind, _ in system.joints.values())
+    return (*FOLLOWED, *in_space, *slides, *(COMPARED_ROWS if errs else ()))
+
+
+def course_of(
+    run: Run, method: FrictionMethod, ideal: bool = False, names: tuple[str, ...] | None = None
+) -> CycleCourse:
+    """The course of a run over its cycle, found once.
+
+    ideal: of the mechanism without errors; names: of the variables, those of the summary if not given.
+    """
+    names = names or followed(run.system, run.erring and not ideal)
+    return run.once(("course", method, ideal, names), lambda: _course(run, method, ideal, names))
+
+
+def _course(run: Run, method: FrictionMethod, ideal: bool, names: tuple[str, ...]) -> CycleCourse:
+    looking = _Looking(run, method, ideal, names)
     accuracy = accuracy_of(run.cycle, SEATED if looking.seats else Accuracy())
     with np.errstate(all="ignore"):
-        courses = Courses.of(looking, looking.breaks(), lambda sizes: like(run, looking.shapes, sizes), accuracy)
+        look = in_blocks(looking, len(run.system.joints))
+        courses = Courses.of(look, looking.breaks(), lambda sizes: like(run, looking.shapes, sizes), accuracy)
     return CycleCourse(run, looking.shapes, courses)
 
 
@@ -220,14 +268,15 @@ def margin_of(run: Run, method: FrictionMethod) -> CycleCourse:
 
 @np.errstate(all="ignore")
 def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
-    looking = _Looking(run, method, ideal=False)
+    looking = _Looking(run, method, ideal=False, names=())
 
     def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
         back, status = looking.walked(time)
         margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
         return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
 
-    courses = Courses.of(look, looking.breaks(), None, accuracy_of(run.cycle, MARGINS))
+    in_parts = in_blocks(look, len(run.system.joints))
+    courses = Courses.of(in_parts, looking.breaks(), None, accuracy_of(run.cycle, MARGINS))
     return CycleCourse(run, {"locking_margin": ()}, courses)
 
 
@@ -237,13 +286,13 @@ class _Looking:
     shapes: of each variable, known from the first look on.
     """
 
-    def __init__(self, run: Run, method: FrictionMethod, ideal: bool) -> None:
+    def __init__(self, run: Run, method: FrictionMethod, ideal: bool, names: tuple[str, ...]) -> None:
         self.run, self.method, self.ideal = run, method, ideal
         self.seats = bool(run.seats) and not ideal
         self.errs = run.erring and not ideal
         self.shapes: dict[str, tuple[int, ...]] = {}
         self._gaps = contact_loss.gaps(run) if self.seats else np.zeros((2, 0))
-        self._names = [*FOLLOWED, *(COMPARED_ROWS if self.errs else ())]
+        self._names = names
 
     def breaks(self) -> Array:
         """Both ends of the cycle and the breaks between them, s, those that are one taken once."""
@@ -282,10 +331,8 @@ class _Looking:
 
     def _filled(self, back: Backward, time: Array) -> Arrays:
         """The variables of a walk at times, s."""
-        system, fill = self.run.system, fill_of(self.run.system)
-        labels, absent = fill.labels(system), fill.absent(system)
         wanted = {*self._names, "status", *(COMPARED if self.errs else ())}
-        arrays = results.allocate(labels, len(time), absent, ["errors"] if self.errs else [], wanted)
+        arrays = allocate(self.run.system, len(time), ["errors"] if self.errs else [], wanted)
         fill_chunk(arrays, back, time, slice(None))
         return arrays
 
@@ -304,8 +351,8 @@ class _Looking:
         powers = [np.sum(one["drive_power"], axis=0) for one in (arrays, meant)]
         apart = np.abs(powers[1] - np.where(np.isfinite(powers[0]), powers[0], 0.0))
         lost = ~valid & (arrays["status"] < Status.NOT_CONVERGED)
-        for name in FOLLOWED:
-            if name in arrays:
+        for name in self._names:
+            if name in meant and name not in COMPARED_ROWS:
                 arrays[name] = np.where(valid, arrays[name], meant[name])
         arrays[SUPPOSED] = np.where(valid, 0.0, apart)
         arrays["status"] = np.where(lost, np.maximum(arrays["status"], Status.CONTACT_LOST), arrays["status"])

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.course import COMPARED_ROWS, FOLLOWED, CycleCourse, like, stacked
+from trunnion.cycle.course import CycleCourse, followed, like, stacked
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.diagnosis import Causes
+from trunnion.cycle.fill import allocate
 from trunnion.cycle.means import IDEAL
 from trunnion.cycle.unanswered import blank
-from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import CONDITIONS, Arrays, fill_chunk, fill_lanes, link_numbers, write
 from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.results import variables as results
 from trunnion.results.variables import VARIABLES
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
@@ -236,7 +235,7 @@ class Many:
 
     def courses(self, of: Mechanisms, ideal: Values | None, method: FrictionMethod) -> list[CycleCourse]:
         """The courses of some mechanisms over their cycles. ideal: their numbers without errors, if any has some."""
-        names = [*FOLLOWED, *(COMPARED_ROWS if ideal is not None else ())]
+        names = followed(self.run.system, ideal is not None)
         shapes: dict[str, tuple[int, ...]] = {}
         without = None if ideal is None else replace(of, values=ideal)
 
@@ -274,7 +273,6 @@ class Many:
 
 def _allocated(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
     """Arrays to be filled, (…, mechanism, position)."""
-    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-    flat = results.allocate(labels, shape[0] * shape[1], absent, parts, wanted)
+    flat = allocate(system, shape[0] * shape[1], parts, wanted)
     found = {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
     return found | {CONDITIONS: np.zeros((len(system.plan.modules), *shape))}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.cycle.locking_states import LockingState
 from trunnion.errors import Finding, Status
 from trunnion.groups.dyad import DyadPose
 from trunnion.results.scales import Scales
@@ -18,13 +19,17 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
 
-if TYPE_CHECKING:
-    from trunnion.cycle.near_locking import Locking
-
 __all__ = ["Causes", "findings"]
 
 CLASS_TWO = 2
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
+
+
+class Locking(Protocol):
+    """What is known of locking over the cycle: its states, and the joint that decides with the multiple of it."""
+
+    def all_states(self) -> set[LockingState]: ...
+    def responsible(self) -> tuple[str, float] | None: ...
 
 
 class _Open(NamedTuple):
@@ -262,8 +267,9 @@ def _locked(
     joints = [name for name in module.joints if name in felt]
     reverse, decides, multiple = "", "", None
     if near is not None:
-        both = near.ahead.locked & near.back.locked
-        reverse = "" if not np.any(both) else "all" if np.array_equal(both, near.ahead.locked) else "some"
+        states = near.all_states()
+        jammed, locked = LockingState.JAMMED in states, LockingState.LOCKED in states
+        reverse = "" if not jammed else "some" if locked else "all"
         responsible = near.responsible()
         if responsible and responsible[0] in module.joints:
             decides, multiple = responsible

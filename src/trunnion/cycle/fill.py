@@ -1,65 +1,85 @@
-"""What a walk in the plane found, written into the arrays of a result."""
+"""What a walk found, written into the arrays of a result: every variable, in the plane and in space."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.space import moment_at, quaternion
 from trunnion.algebra.unwrap import unwrap_row
+from trunnion.algebra.vector import cross, dot, plus, scaled
+from trunnion.joints.pairs import PAIRS
+from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import has_useful_work, useful_powers
+from trunnion.solve.space.contacts import bearing_middle
+from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "Into", "absent", "fill_efforts", "fill_forces", "fill_motion", "fill_points", "fill_power", "labels", "put",
-    "unwrap",
+    "Into", "allocate", "fill_forces", "fill_joint", "fill_motion", "fill_power", "labels", "put", "unwrap",
 ]  # fmt: skip
 
 Arrays = dict[str, NDArray[np.float64]]
 Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
+SLIDES = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force", "reaction_moment"]
 
 
 def labels(system: System) -> dict[str, list[str]]:
     """Names along the dims."""
-    mechanism = system.mechanism
-    springs = {"spring": list(mechanism.springs)} if mechanism.springs else {}
-    gears = {"gear": list(mechanism.gears)} if mechanism.gears else {}
-    return (
-        springs
-        | gears
-        | {
-            "joint": list(system.joints),
-            "link": list(mechanism.links),
-            "point": [f"{link}.{point}" for link, point in system.points],
-            "axis": ["x", "y"],
-            "driver": list(mechanism.drivers),
-        }
-    )
+    mechanism, spatial = system.mechanism, system.mechanism.space == "spatial"
+    members = {"spring": list(mechanism.springs), "gear": list(mechanism.gears)}
+    return {
+        **{dim: names for dim, names in members.items() if names},
+        "joint": list(system.joints),
+        "link": list(mechanism.effective_links if spatial else mechanism.links),
+        "point": [f"{link}.{point}" for link, point in system.points],
+        "axis": ["x", "y", "z"][: mechanism.coordinates],
+        "driver": list(mechanism.drivers),
+        **({"component": ["w", "x", "y", "z"]} if spatial else {}),
+    }
 
 
-def absent(system: System) -> list[str]:
-    """Variables that this mechanism cannot have: zero without taking memory."""
-    if not all(system.turns(joint) for joint in system.joints):
-        return []
-    slides = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force"]
-    return [*slides, "reaction_moment"]
+def allocate(
+    system: System, positions: int, parts: Sequence[str] = (), wanted: Collection[str] | None = None
+) -> Arrays:
+    """Arrays for the variables of a system, see `results.variables.allocate`.
+
+    Of joints in the plane that all turn, slides are zero without taking memory.
+    """
+    still = system.mechanism.space == "planar" and all(system.turns(joint) for joint in system.joints)
+    names = labels(system) | ({"end": ["1", "2"]} if "seats" in parts else {})
+    return results.allocate(names, positions, SLIDES if still else [], parts, wanted)
+
+
+# ---- motion ---------------------------------------------------------------------------------------------------
 
 
 def fill_motion(arrays: Into, back: Backward, window: slice) -> None:
-    """Angles, points and joints of one chunk."""
+    """Angles or frames of links, points and joints of one chunk."""
     walk = back.walk
+    fill_points(arrays, walk, window)
+    if isinstance(walk, SpatialWalk):
+        _frames(arrays, walk, window)
+        for i, joint in enumerate(walk.system.joints):
+            fill_joint(arrays, walk, i, joint, window)
+    else:
+        _angles(arrays, walk, window)
+
+
+def _angles(arrays: Into, walk: Forward, window: slice) -> None:
+    """Angles of links and rates of joints in the plane."""
     for i, link in enumerate(walk.system.mechanism.links):
         if link != walk.system.mechanism.fixed_link:
             motion = walk.motions[link]
             arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
             arrays["link_angle_velocity"][i, window] = motion.twist.w
             arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
-    fill_points(arrays, walk, window)
     for i, joint in enumerate(walk.system.joints):
         both = walk.rates(joint), walk.second_rates(joint)
         for name, rates in zip(("joint_rotation", "joint_slide"), zip(*both, strict=True), strict=True):
@@ -68,6 +88,19 @@ def fill_motion(arrays: Into, back: Backward, window: slice) -> None:
                     arrays[name + suffix][i, window] = rate
         if arrays["joint_slide"].flags.writeable:
             arrays["joint_slide"][i, window] = 0.0 if walk.system.turns(joint) else walk.coordinates(joint)[1]
+
+
+def _frames(arrays: Into, walk: SpatialWalk, window: slice) -> None:
+    """Frames of links in space with their rates."""
+    for i, link in enumerate(walk.system.mechanism.effective_links):
+        frame, twist, second = walk.motions[link]
+        for name, numbers in (
+            ("link_rotation", quaternion(frame)),
+            ("link_position", frame.place),
+            ("link_angular_velocity", twist.u),
+            ("link_angular_acceleration", second.u),
+        ):
+            put(arrays[name], i, numbers, window)
 
 
 def fill_points(arrays: Into, walk: Forward, window: slice) -> None:
@@ -83,21 +116,37 @@ def put(array: Any, i: int, numbers: Sequence[Number], window: slice) -> None:
         array[i, axis, window] = number
 
 
+def fill_joint(arrays: Into, walk: SpatialWalk, i: int, joint: str, window: slice) -> None:
+    """Rotation and slide of one joint with their derivatives; of balls and crosses the angle between their elements."""
+    pair = walk.pair(joint)
+    if pair.one_axis or pair.angle:
+        both = zip(walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint), strict=True)
+        for name, values in zip(("joint_rotation", "joint_slide"), both, strict=True):
+            if pair.one_axis or name == "joint_rotation":
+                for suffix, value in zip(("", "_velocity", "_acceleration"), values, strict=True):
+                    arrays[name + suffix][i, window] = value
+        return
+    (first, second), (one, two) = walk.system.joints[joint][1], walk.ends(joint)
+    turn = scaled(0.5, plus(plus(cross(one.x, two.x), cross(one.y, two.y)), cross(one.z, two.z)))
+    cosine = 0.5 * (dot(one.x, two.x) + dot(one.y, two.y) + dot(one.z, two.z) - 1)
+    spin = walk.against(joint).u
+    change = tuple(
+        b - a for a, b in zip(walk.motions[first].acceleration.u, walk.motions[second].acceleration.u, strict=True)
+    )
+    speed = np.sqrt(dot(spin, spin))
+    arrays["joint_rotation"][i, window] = np.arctan2(np.sqrt(dot(turn, turn)), cosine)
+    arrays["joint_rotation_velocity"][i, window] = speed
+    moves = np.greater(speed, 0)
+    rate = (spin[0] * change[0] + spin[1] * change[1] + spin[2] * change[2]) / np.where(moves, speed, 1.0)
+    arrays["joint_rotation_acceleration"][i, window] = np.where(moves, rate, 0.0)
+
+
+# ---- forces ---------------------------------------------------------------------------------------------------
+
+
 def fill_forces(arrays: Into, back: Backward, window: slice) -> None:
-    """Reactions, friction, and what `fill_efforts` does, of one chunk."""
-    for i, name in enumerate(back.walk.system.joints):
-        *force, moment = back.reactions[name]
-        put(arrays["reaction_force"], i, force, window)
-        turns, friction = back.walk.system.turns(name), back.friction[name]
-        arrays["friction_torque"][i, window] = friction if turns else 0.0
-        if arrays["reaction_moment"].flags.writeable:  # and so is the force
-            arrays["reaction_moment"][i, window] = moment
-            arrays["friction_force"][i, window] = 0.0 if turns else friction
-    fill_efforts(arrays, back, window)
-
-
-def fill_efforts(arrays: Into, back: Backward, window: slice) -> None:
-    """Drive efforts, springs and gear pairs of one chunk."""
+    """Reactions, friction, drive efforts, springs and gear pairs of one chunk."""
+    (_spatial_reactions if isinstance(back.walk, SpatialWalk) else _planar_reactions)(arrays, back, window)
     mechanism = back.walk.system.mechanism
     for i, name in enumerate(mechanism.drivers):
         arrays["drive_effort"][i, window] = back.efforts[name]
@@ -109,24 +158,30 @@ def fill_efforts(arrays: Into, back: Backward, window: slice) -> None:
         put(arrays["gear_force"], i, back.gears[name].force, window)
 
 
-def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.float64]) -> None:
-    """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations.
+def _planar_reactions(arrays: Into, back: Backward, window: slice) -> None:
+    """Reactions and friction of one chunk."""
+    for i, name in enumerate(back.walk.system.joints):
+        *force, moment = back.reactions[name]
+        put(arrays["reaction_force"], i, force, window)
+        turns, friction = back.walk.system.turns(name), back.friction[name]
+        arrays["friction_torque"][i, window] = friction if turns else 0.0
+        if arrays["reaction_moment"].flags.writeable:  # and so is the force
+            arrays["reaction_moment"][i, window] = moment
+            arrays["friction_force"][i, window] = 0.0 if turns else friction
 
-    A driven rotation is the prescribed coordinate itself, whole turns included.
-    """
-    if not arrays["link_angle"].strides[-1]:  # nobody reads them
-        return
-    angles = arrays["link_angle"]
-    order = list(system.mechanism.links)
-    step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    for link, angle, rate in zip(order, angles, arrays["link_angle_velocity"], strict=True):
-        if link != system.mechanism.fixed_link:
-            unwrap_row(angle, rate, step)
-    for i, (name, (_, (first, second))) in enumerate(system.joints.items()):
-        rotation = arrays["joint_rotation"][i]
-        np.subtract(angles[order.index(second)], angles[order.index(first)], out=rotation)
-        if name in system.mechanism.drivers and system.turns(name):
-            rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
+
+def _spatial_reactions(arrays: Into, back: Backward, window: slice) -> None:
+    """Reactions about the middles of the bearings, and friction, of one chunk."""
+    walk = back.walk
+    assert isinstance(walk, SpatialWalk)
+    for i, joint in enumerate(walk.system.joints):
+        middle, reaction, friction = bearing_middle(walk, joint), back.reactions[joint], back.friction_wrenches[joint]
+        put(arrays["reaction_force"], i, reaction.u, window)
+        put(arrays["reaction_moment"], i, moment_at(reaction, middle), window)
+        put(arrays["friction_moment"], i, moment_at(friction, middle), window)
+        arrays["friction_force"][i, window] = dot(friction.u, walk.ends(joint)[1].z)
+        if walk.system.turns(joint):
+            arrays["friction_torque"][i, window] = back.friction[joint]
 
 
 def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> None:
@@ -164,3 +219,32 @@ def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
     for group, pose in zip(system.groups, poses, strict=True):
         worst = np.maximum(worst, getattr(group, figure)(pose))
     return worst
+
+
+# ---- angles that run on ---------------------------------------------------------------------------------------
+
+
+def unwrap(arrays: Arrays, system: System, values: Values, time: NDArray[np.float64]) -> None:
+    """Angles without jumps of a whole turn along each run of solved positions, and the joints' rotations.
+
+    A driven rotation is the prescribed coordinate itself, whole turns included.
+    """
+    spatial = system.mechanism.space == "spatial"
+    if not arrays["joint_rotation" if spatial else "link_angle"].strides[-1]:  # nobody reads them
+        return
+    step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    places = {link: i for i, link in enumerate(labels(system)["link"])}
+    for link, i in places.items():
+        if not spatial and link != system.mechanism.fixed_link:
+            unwrap_row(arrays["link_angle"][i], arrays["link_angle_velocity"][i], step)
+    for i, (name, (kind, (first, second))) in enumerate(system.joints.items()):
+        rotation = arrays["joint_rotation"][i]
+        if not spatial:
+            np.subtract(arrays["link_angle"][places[second]], arrays["link_angle"][places[first]], out=rotation)
+        if name in system.mechanism.drivers and system.turns(name):
+            rotation[:] = np.where(np.isfinite(rotation), system.drive(values, name, time)[0], np.nan)
+        elif spatial and PAIRS[kind].angle:
+            unwrap_row(rotation, arrays["joint_rotation_velocity"][i], step)
+        if PAIRS[kind].threaded:  # its slide follows the whole turns
+            pitch = float(np.ravel(values[f"joints.{name}.pitch"])[0])
+            arrays["joint_slide"][i] = rotation * pitch / (2 * np.pi)

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import shared_dimensions, summary
+from trunnion.cycle import shared_dimensions
+from trunnion.cycle.findings import Cycle, findings
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity
@@ -71,7 +72,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     Raises MechanismError if the structure does not determine the motion.
     """
     run = prepare(mechanism)
-    found, _ = summary.findings(run, positions(run, steps, progress=progress, averaged=False))
+    found = findings(Cycle(run, positions(run, steps, progress=progress, averaged=False)))
     walk = forward(run.system, run.values, run.chosen.assembly, run.cycle.times(steps))
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:

@@ -1,11 +1,9 @@
-"""The states of positions by what friction does forward and backward, and the ranges in which one stays the same."""
+"""The states of locking: what friction does forward and backward, and the ranges in which one stays the same."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
-from math import isfinite, isnan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from math import floor, isfinite, isnan, log10
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,28 +11,18 @@ from numpy.typing import NDArray
 from trunnion.errors import Coded
 from trunnion.results.quantities import readable
 from trunnion.solve.friction_method import MARGIN
-from trunnion.solve.system import Dial
 
 if TYPE_CHECKING:
-    from trunnion.cycle.near_locking import Passage
+    from trunnion.cycle.passage import Passage
+    from trunnion.solve.run import Run
 
-__all__ = [
-    "HEAD",
-    "NEAR",
-    "ROUNDING",
-    "LockingRange",
-    "LockingState",
-    "cells",
-    "in_order",
-    "pushed",
-    "ranges_of",
-    "rounding",
-    "states",
-]
+__all__ = ["HEAD", "NEAR", "LockingRange", "LockingState", "states"]
 
-ROUNDING = 1e-9  # of the largest power: what is less is no power
+Array = NDArray[np.float64]
 NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
 HEAD = ("state", "from", "to", "smallest margin", "at")  # of the table of ranges
+CLOSE = 1e-3  # degrees of the drive to which an end is told: two decimals are shown
+SHARE = 1e-5  # of the drive's travel, where that is not in degrees
 
 
 class LockingState(Coded):
@@ -70,46 +58,61 @@ SHORT = {
     LockingState.SELF_LOCKING_FORWARD: "self-locking, pushed forward",
     LockingState.DRIVEN_ON: "loads drive it on",
 }
-PUSHES = (
+PUSHES = {
     LockingState.BACKDRIVABLE, LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON,
-)  # fmt: skip
+}  # fmt: skip
+HELD = {LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD}
+HELD_AND_DRIVEN = {LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON}
 NO_MARGIN = (LockingState.LOCKED, LockingState.JAMMED, LockingState.UNSOLVED)  # these are not near locking
-PUSHED, HAS_MARGIN = np.isin(list(LockingState), PUSHES), ~np.isin(list(LockingState), NO_MARGIN)  # by code
+BACK_LOCKED = (LockingState.LOCKED_BACKWARD, LockingState.JAMMED)
 
 
 class LockingRange(NamedTuple):
-    """Consecutive positions in one state, or with a margin below the one that counts as near locking.
+    """A part of the cycle in one state, or with a margin below the one that counts as near locking.
 
-    state: None of the latter; first, last: numbers of positions; margin: the smallest locking margin in it, NaN if it
-    is not known; at: its position.
+    state: None of the latter; low, high: its ends, s; margin: the smallest locking margin in it, ∞ beyond what is
+    looked for, NaN if it is not known; at: where, in words.
     """
 
     state: LockingState | None
-    first: int
-    last: int
+    low: float
+    high: float
     margin: float
-    at: int
+    at: str
+
+    def ends(self, run: Run) -> tuple[list[float], list[str]]:
+        """Its ends on the dial of the drive, and as a person reads them."""
+        dial = run.system.dial(run.values, np.array([self.low, self.high]))
+        travel = np.ptp(run.system.dial(run.values, np.array([0.0, run.cycle.duration])).values)
+        accuracy = CLOSE if dial.unit == "°" else SHARE * float(travel)
+        digits = floor(-log10(accuracy)) if accuracy > 0 else 15
+        values = [round(float(value), digits) + 0.0 for value in dial.values]  # so that an end at 0 is 0
+        if dial.unit == "°":
+            return values, [f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".") + "°" for value in values]
+        return values, [f"{value:.5g}{dial.unit}" for value in values]
+
+    def cells(self, run: Run, near: float = NEAR) -> list[str]:
+        """The row of the table with HEAD."""
+        state = f"margin below {near:g}" if self.state is None else self.state.short
+        margin = (
+            "—" if isnan(self.margin) else readable(self.margin) if isfinite(self.margin) else f"more than {MARGIN:g}"
+        )
+        return [state, *self.ends(run)[1], margin, self.at]
 
 
-def pushed(of: Passage, least: float | None = None) -> NDArray[np.bool_]:
-    """Where what acts supplies power to a motion, and no rounding of none: more than the least, W."""
-    least = rounding(of) if least is None else least
-    found: NDArray[np.bool_] = of.acting > least
-    return found
+def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float) -> NDArray[np.int8]:
+    """The code of `LockingState` at some times.
 
-
-def rounding(of: Passage) -> float:
-    """Power that is none, W."""
-    return float(ROUNDING * np.nanmax(np.abs([of.acting, of.delivered]), initial=0.0))
-
-
-def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
-    """The code of `LockingState` of every position. ahead, back: the positions passed forward and backward; known:
-    where the forces or the cause of locking are; least: see `pushed`.
+    Parameters
+    ----------
+    ahead, back
+        The mechanism as it is passed forward and backward.
+    known
+        Where the forces, or the cause of locking, are.
+    least
+        Power, W, that is rounding of none.
     """
-    least = rounding(back) if least is None else least
-    driven = pushed(back, least) & ~back.locked
-    beyond = pushed(ahead, least)
+    driven, beyond = (back.acting > least) & ~back.locked, ahead.acting > least
     cases = [
         (~known, LockingState.UNSOLVED),
         (ahead.locked & back.locked, LockingState.JAMMED),
@@ -120,49 +123,5 @@ def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float
         (driven, LockingState.SELF_LOCKING),
         (beyond, LockingState.SELF_LOCKING_FORWARD),
     ]
-    found = np.full(len(known), int(LockingState.RUNS), np.int8)
-    for where, state in reversed(cases):
-        found[where] = int(state)
-    return found
-
-
-def in_order(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float | None = None) -> NDArray[np.int8]:
-    """`states` of the positions of a cycle in their order. Where the loads have no power at one position alone they
-    turn there from backward to forward: a dead centre, which is of the state of what follows."""
-    found = states(ahead, back, known, least)
-    pushes = PUSHED[found]
-    alone = np.zeros(len(found), bool)
-    alone[1:-1] = (found[1:-1] == LockingState.RUNS) & pushes[:-2] & pushes[2:]
-    held = -ahead.delivered > (rounding(back) if least is None else least)
-    found[alone] = np.where(held, LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON)[alone]
-    return found
-
-
-def ranges_of(state: NDArray[Any], margin: NDArray[np.float64], near: float = NEAR) -> list[LockingRange]:
-    """The intervals in which the state of positions stays the same, in their order; after them those that run, but with
-    a margin below `near`."""
-    known, states = np.where(np.isnan(margin), np.inf, margin), list(LockingState)
-
-    def worst(first: int, beyond: int) -> tuple[int, int, float, int]:
-        at = first + int(np.argmin(known[first:beyond]))
-        return first, beyond - 1, float(margin[at]), at
-
-    runs = [LockingRange(states[state[first]], *worst(first, beyond)) for first, beyond in _runs(state)]
-    close = (margin < near) & HAS_MARGIN[state]
-    return [*runs, *(LockingRange(None, *worst(first, beyond)) for first, beyond in _runs(close) if close[first])]
-
-
-def _runs(values: NDArray[Any]) -> Iterator[tuple[int, int]]:
-    """Consecutive positions of one value: the first one and the one beyond."""
-    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
-    return itertools.pairwise([0, *changes.tolist(), len(values)])
-
-
-def cells(one: LockingRange, dial: Dial, near: float = NEAR, ends: Sequence[str] | None = None) -> list[str]:
-    """A range as a row of the table with HEAD. ends: of the range, if they are not its first and last position."""
-    state = f"margin below {near:g}" if one.state is None else one.state.short
-    ends = ends or [dial.at(one.first), dial.at(one.last)]
-    if isnan(one.margin):
-        return [state, *ends, "—", ""]
-    margin = readable(one.margin) if isfinite(one.margin) else f"more than {MARGIN:g}"
-    return [state, *ends, margin, dial.at(one.at) if isfinite(one.margin) else ""]
+    where, codes = zip(*cases, strict=True)
+    return np.select(where, [int(code) for code in codes], int(LockingState.RUNS)).astype(np.int8)

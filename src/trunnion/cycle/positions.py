@@ -12,18 +12,15 @@ from trunnion.cycle import contact_loss, diagnosis, resting_joints
 from trunnion.cycle.course import CycleCourse, course_of
 from trunnion.cycle.cycle_kernel import CycleKernel, compiles
 from trunnion.cycle.deviations import COMPARED, fill_errors
+from trunnion.cycle.fill import allocate, labels, unwrap
 from trunnion.cycle.kept import needed
 from trunnion.cycle.means import IDEAL, Means, still
-from trunnion.cycle.near_locking import LOOKED
 from trunnion.cycle.unanswered import blank
-from trunnion.cycle.variables import fill_of
 from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.results import variables as results
-from trunnion.solve.backward import Backward
 from trunnion.solve.eccentricity_rate import Lanes, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.memory import CHUNK
+from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import Seated, settle
 from trunnion.solve.system import Dial, Values
@@ -44,9 +41,8 @@ def check_steps(steps: int) -> None:
 class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
-    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
-    one walk that they all came of, where it was one and pins lie in no seats; course: that of the cycle, which does not
-    depend on the positions, if it was looked for.
+    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; course: that
+    of the cycle, which does not depend on the positions, if it was looked for.
     """
 
     arrays: Arrays
@@ -58,7 +54,6 @@ class Positions:
     means: Means
     ideal: Means | None
     losses: list[contact_loss.Loss]
-    walked: Backward | None = None
     course: CycleCourse | None = None
 
 
@@ -101,19 +96,17 @@ def stretch(
 ) -> Positions:
     """The same at some times of the cycle, s, in a row and equally spaced; the means are NaN."""
     steps, wanted = len(time), None if wanted is None else needed(wanted, run.system, run.erring)
-    labels = fill_of(run.system).labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
+    names = labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
     parts = [part for part, there in (("seats", run.seats), ("errors", run.erring)) if there]
-    arrays = results.allocate(labels, steps, fill_of(run.system).absent(run.system), parts, wanted)
+    arrays = allocate(run.system, steps, parts, wanted)
     causes = diagnosis.Causes(run.system)
     ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
     compiled = compiles(engine, run, steps, method) and _fill_compiled(
         arrays, ideal, run, time, method, causes, engine == "auto"
     )
-    back = None
-    for low in range(0, 0 if compiled else steps, CHUNK):
-        window = slice(low, min(low + CHUNK, steps))
+    for window in blocks(0 if compiled else steps, len(run.system.joints)):
         if run.erring:
-            back = _fill_as_built(arrays, ideal, run, time, window, method, causes)
+            _fill_as_built(arrays, ideal, run, time, window, method, causes)
         else:
             back = run.solve(time[window], method=method)
             fill_chunk(arrays, back, time[window], window, causes)
@@ -122,12 +115,11 @@ def stretch(
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
     losses = contact_loss.find(arrays, run, time) if run.seats else []
-    fill_of(run.system).unwrap(arrays, run.system, run.values, time)
-    walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
+    unwrap(arrays, run.system, run.values, time)
     means = still(arrays, run.system.mechanism)
     meant = still(ideal, run.system.mechanism) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, means, meant, losses, walked)
+    return Positions(arrays, names, time, dial, method, causes, means, meant, losses)
 
 
 def _refuse_seats(run: Run) -> None:
@@ -149,14 +141,11 @@ def _fill_as_built(
     window: slice,
     method: FrictionMethod,
     causes: diagnosis.Causes,
-) -> Backward:
-    """One chunk of a mechanism with errors beside the ideal one; the walk it came of."""
+) -> None:
+    """One chunk of a mechanism with errors beside the ideal one."""
     part, quick = time[window], replace(method, margin_up_to=0.0)
-    labels = fill_of(run.system).labels(run.system)
     seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
-    scratch = results.allocate(
-        labels, len(seen.times), fill_of(run.system).absent(run.system), wanted={*IDEAL, *COMPARED}
-    )
+    scratch = allocate(run.system, len(seen.times), wanted={*IDEAL, *COMPARED})
     meant = run.ideal(seen.times, quick)
     fill_chunk(scratch, meant, seen.times, slice(0, len(seen.times)))
     own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
@@ -173,7 +162,6 @@ def _fill_as_built(
         fill_chunk(arrays, back, part, window, causes)
     fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
-    return back
 
 
 def _note_seats(arrays: Arrays, seated: Seated, window: slice, causes: diagnosis.Causes) -> None:
@@ -217,8 +205,7 @@ def _fill_beside_ideal(
 ) -> None:
     """The ideal mechanism at all positions, compiled, and what differs from it."""
     quick, system, everywhere = replace(method, margin_up_to=0.0), run.system, slice(0, len(time))
-    labels, absent = fill_of(system).labels(system), fill_of(system).absent(system)
-    meant = results.allocate(labels, len(time), absent, wanted={*IDEAL, *COMPARED})
+    meant = allocate(system, len(time), wanted={*IDEAL, *COMPARED})
     _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)
     for name, array in ideal.items():
         array[...] = meant[name]

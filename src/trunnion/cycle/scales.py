@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.variables import fill_of
+from trunnion.cycle.fill import allocate
 from trunnion.cycle.written import fill_chunk
 from trunnion.errors import Status
-from trunnion.results import variables as results
 from trunnion.results.scales import Scales
 from trunnion.solve.run import Run
 
@@ -27,8 +26,7 @@ def scales_of(run: Run) -> Scales:
 
 def _looked(run: Run) -> Mapping[str, NDArray[np.float64]]:
     time = run.cycle.times(LOOKED if run.cycle.duration > 0 else 1)
-    filling = fill_of(run.system)
-    arrays = results.allocate(filling.labels(run.system), len(time), filling.absent(run.system))
+    arrays = allocate(run.system, len(time))
     with np.errstate(all="ignore"):
         fill_chunk(arrays, run.solve(time), time, slice(0, len(time)))
     return arrays

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.cycle import diagnosis
 from trunnion.cycle.deviations import fill_seats
-from trunnion.cycle.fill import Into, fill_power
+from trunnion.cycle.fill import Into, fill_forces, fill_motion, fill_power, labels
 from trunnion.cycle.unanswered import blank
-from trunnion.cycle.variables import fill_of
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.margin import locking_margin
@@ -66,9 +65,8 @@ def fill_lanes(
 
 def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
     """Every variable but the status, of one walk."""
-    fill = fill_of(back.walk.system)
-    fill.motion(arrays, back, window)
-    fill.forces(arrays, back, window)
+    fill_motion(arrays, back, window)
+    fill_forces(arrays, back, window)
     _fill_settled(arrays, back, window)
     fill_power(arrays, back, time, window)
     if "seat_offset" in arrays:
@@ -94,5 +92,5 @@ def _fill_settled(arrays: Into, back: Backward, window: slice) -> None:
 
 def link_numbers(system: System) -> list[tuple[int, int]]:
     """Numbers of the links of every joint."""
-    links = fill_of(system).labels(system)["link"]
+    links = labels(system)["link"]
     return [(links.index(first), links.index(second)) for _, (first, second) in system.joints.values()]

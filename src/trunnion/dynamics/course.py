@@ -244,7 +244,9 @@ def starting_time(course: Courses) -> Array:
             max(TURN, gone[max(first - len(NODES), 0)]),
             gone[min(first + len(NODES), len(gone) - 1)],
         )
-    return np.where(slow, course.at(root(longer, low, high), 0), np.nan)
+    ends = longer(low), longer(high)
+    started = np.where(ends[0] <= 0.0, low, root(longer, low, high, *ends, EXACT * np.abs(high)))
+    return np.where(slow, course.at(started, 0), np.nan)
 
 
 def peak_effort(course: Courses) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.variables import fill_of
+from trunnion.cycle import fill
 from trunnion.cycle.written import fill_chunk
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.opened import Opened
@@ -19,7 +19,6 @@ from trunnion.dynamics.solution import Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
-from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.memory import CHUNK
 
@@ -40,9 +39,8 @@ class Filling:
     def books(self) -> Books:
         """Every variable, over the rows up to where the motion ends; NaN after it."""
         motion, system = self.motion, self.motion.system
-        fill = fill_of(system)
         labels = fill.labels(system)
-        arrays = results.allocate(labels, len(self.time), fill.absent(system))
+        arrays = fill.allocate(system, len(self.time))
         rows, which = self.solution.at(self.time)
         layout = self.solution.layout
         seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)

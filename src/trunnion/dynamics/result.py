@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
-from trunnion.cycle.summary import effort_units, inputs, member_units, references, scene_of
+from trunnion.cycle.summary import inputs, member_units, references, scene_of
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.course import OVER_TIME, Courses
 from trunnion.dynamics.energy import kinetic_energy, potential_energy

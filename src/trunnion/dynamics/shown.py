@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.variables import fill_of
+from trunnion.cycle import fill
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.results import variables as results
@@ -100,7 +100,7 @@ def as_stated(
     filled: arrays as stated that have the rows of these joints; None in the plane, where they are filled here.
     """
     system = run.system
-    wanted = fill_of(system).labels(system)
+    wanted = fill.labels(system)
     known = results.variables(system.mechanism.space)
     count = arrays["status"].shape[-1]
     found = results.allocate(wanted, count) if filled is None else filled

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.space import NULL, Screw, about, added, moment_at
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import Vector3, dot, scaled
-from trunnion.cycle.fill import put
-from trunnion.cycle.fill_space import fill_joint
-from trunnion.cycle.variables import fill_of
+from trunnion.cycle.fill import allocate, fill_joint, put
 from trunnion.dynamics.opened import Opened, in_play
 from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.joints.pairs import PAIRS
@@ -40,7 +38,7 @@ class JointsInSpace:
 
     def __post_init__(self) -> None:
         system = self.opened.run.system
-        self.arrays = results.allocate(fill_of(system).labels(system), self.times)
+        self.arrays = allocate(system, self.times)
         self.cut = in_play(system.mechanism)
         self.rows = {joint: k for k, joint in enumerate(system.joints) if joint in (*self.cut, *self.opened.parts)}
         for name, array in self.arrays.items():

@@ -2,15 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["CHUNK", "keep_pages"]
+__all__ = ["CHUNK", "blocks", "in_blocks", "keep_pages"]
+
+Array = NDArray[np.float64]
+Looked = tuple[Array, NDArray[np.integer]]
 
 CHUNK = 8192  # solved at a time: the arrays of a walk stay in cache
+JOINTS = 2**17  # at all the positions that are solved at a time: each takes some 300 bytes
 BLOCK = 30 * 2**20  # bytes; glibc learns from blocks of up to 32 MiB
+
+
+def blocks(count: int, joints: int) -> Iterator[slice]:
+    """Parts of some positions that are solved at a time, so that memory does not grow with how many there are."""
+    some = max(1, min(CHUNK, JOINTS // max(1, joints)))
+    yield from (slice(low, min(low + some, count)) for low in range(0, count, some))
+
+
+def in_blocks(look: Callable[[Array], Looked], joints: int) -> Callable[[Array], Looked]:
+    """What is looked up at times, rows (row, time) and states, a block of them at a time."""
+
+    def looked(time: Array) -> Looked:
+        rows, states = zip(*(look(time[block]) for block in blocks(len(time), joints)), strict=True)
+        return np.concatenate(rows, axis=1), np.concatenate(states)
+
+    return looked
 
 
 @cache

@@ -5,9 +5,6 @@ friction and what resists a joint turn round where its relative speed does; a sp
 length; motion laws go from one function to the next. A number of the motion belongs to each of these, which passes a
 level there. They are looked for on a scan of the cycle - also where such a number only dips through its level between
 two places of it - and located to rounding. What no model states, such as a guide that tilts over, is not looked for.
-
-Roots: T. R. Chandrupatla, A new hybrid quadratic/bisection algorithm, Adv. Eng. Softw. 28 (1997) 145-149,
-doi:10.1016/S0965-9978(96)00051-8.
 """
 
 from __future__ import annotations
@@ -23,6 +20,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Accuracy
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
+from trunnion.algebra.roots import root
 from trunnion.model.parts import Spring
 from trunnion.solve import loads
 from trunnion.solve.forward import Assembly, Forward, forward
@@ -30,8 +28,8 @@ from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
-    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "nearly_passed",
-    "parted", "stated_bends", "tracked",
+    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "knots_of",
+    "nearly_passed", "parted", "stated_bends", "tracked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -47,7 +45,6 @@ NEARLY = 0.1  # of the range of what decides where a load begins
 TRACKED = 72  # of a turn: how far to either side a bend of one mechanism is looked for in others
 SEATED = Accuracy(1e-5, 1e-7, shortest=1e-7, rounds=16)  # pins settle in their seats to 1e-6 of their clearance
 MARGINS = Accuracy(1e-4, 1e-6, shortest=1e-5, rounds=8)  # a margin is followed, which takes long
-ROUNDS = 60
 SETTLED = 1e-11  # of the cycle
 CLOSE = 1e-10  # of the cycle: edges that are one
 NOISE = 1e-9  # of the largest value: zero but for rounding
@@ -191,7 +188,7 @@ def _scans(system: System) -> tuple[_Scan, _Scan]:
 
 
 def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
-    yield from ((row, Bend(moment)) for row, moment in _knots(of))
+    yield from ((row, Bend(moment)) for row, moment in knots_of(of))
     for k, scan in enumerate(_scans(of.system)):
         yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
 
@@ -228,7 +225,7 @@ def accuracy_of(cycle: Cycle, accuracy: Accuracy) -> Accuracy:
     return accuracy._replace(widest=1.0 / min(PANELS * turns, MOST_EDGES))
 
 
-def _knots(of: Mechanisms) -> Iterator[tuple[int, float]]:
+def knots_of(of: Mechanisms) -> Iterator[tuple[int, float]]:
     """Times at which a motion law goes from one function to the next."""
     for name in of.system.mechanism.drivers:
         knots, span = of.system.knots(of.values, name), of.system.span(of.values, name)
@@ -388,29 +385,11 @@ def _dips(
 
 
 def _located(one: _Crossing, values: Callable[[Rows, Array], Array], duration: Array) -> Array:
-    """The times of all crossings, by inverse quadratic interpolation where that is sure to converge, else bisection."""
+    """The times of all crossings."""
     lanes = np.arange(len(one.row))
 
     def off(time: Array) -> Array:
-        found: Array = values(one.row, time[:, None])[one.function, lanes, 0] - one.level
-        return found
+        number: Array = values(one.row, time[:, None])[one.function, lanes, 0] - one.level
+        return number
 
-    a, b = one.low.copy(), one.high.copy()
-    fa, fb = one.at_low - one.level, one.at_high - one.level
-    with np.errstate(all="ignore"):
-        share = np.clip(fa / (fa - fb), 0.0, 1.0)
-        for _ in range(ROUNDS):
-            at = a + share * (b - a)
-            value = off(at)
-            same = np.sign(value) == np.sign(fa)
-            c, fc = np.where(same, a, b), np.where(same, fa, fb)
-            b, fb = np.where(same, b, a), np.where(same, fb, fa)
-            a, fa = at, value
-            if np.all((np.abs(b - a) <= SETTLED * duration) | (fa == 0) | (fb == 0) | np.isnan(fa)):
-                break
-            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
-            sure = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
-            inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-            least = np.minimum(0.5, SETTLED * duration / np.abs(b - c))
-            share = np.clip(np.where(sure & np.isfinite(inverse), inverse, 0.5), least, 1 - least)
-    return np.where(np.abs(fa) <= np.abs(fb), a, b)
+    return root(off, one.low, one.high, one.at_low - one.level, one.at_high - one.level, SETTLED * duration)

@@ -5,8 +5,7 @@ Everything is read off one run over the cycle: the poses of the dyads, the twist
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -14,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
@@ -24,7 +24,9 @@ from trunnion.results.figure import Figure
 from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
+from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.switches import Mechanisms, accuracy_of, breaks_between, knots_of
 from trunnion.studies.motor import Motor, motor
 
 __all__ = [
@@ -47,7 +49,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-ROOT_TOLERANCE = 1e-12  # of the cycle, to which times of dead centres and limits are found
+EXACT = Accuracy(1e-12, 1e-14, shortest=1e-14)  # of the motion alone: dead centres and limits
+BESIDE = 1e-6  # of the cycle: before and after a place at which a link may turn back
 
 
 @dataclass(frozen=True)
@@ -111,8 +114,8 @@ class Design:
 def design(mechanism: Mechanism, steps: int = 720) -> Design:
     """What a designer asks of a planar linkage: transmission, dead centres, range, shaking, balance, motor.
 
-    steps: equally spaced positions of the cycle, at which extremes are taken; dead centres, limits and the largest
-    power are found between them, and the other figures of the drive depend on none (`motor`). Returns a Design, SI and
+    steps: equally spaced positions of the cycle, at which extremes of the motion are taken; dead centres, limits and
+    what concerns the drive depend on none. Returns a Design, SI and
     rad. Source: R. L. Norton, Design of Machinery.
     Raises MechanismError for a mechanism in space, or if the structure does not determine the motion.
     """
@@ -124,15 +127,13 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
     steps = len(time)
     driver = next(iter(mechanism.drivers), "")
     rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
-    asked = motor(run, driver, steps) if driver else Motor()
-    if not math.isfinite(asked.peak_power):  # of the positions that have an answer
-        asked = asked._replace(peak_power=_largest(back.efforts[driver] * rate))
+    asked = motor(run, driver) if driver else Motor()
     return Design(
         grashof(mechanism, run),
         {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},
         {name: _extremes(run, np.broadcast_to(angle, time.shape)) for name, angle in pressure_angles(walk).items()},
-        dead_centres(run, steps),
-        limits(run, steps),
+        dead_centres(run),
+        limits(run),
         _largest(np.hypot(*force)),
         _largest(moment),
         *asked,
@@ -261,95 +262,74 @@ def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
     }[shortest]
 
 
-def dead_centres(run: Run, steps: int = 720) -> dict[str, tuple[float, ...]]:
+def _motion(run: Run) -> tuple[list[str], Courses]:
+    """Joints on the ground that no driver turns, and the course of their speeds; its states say whether it closes.
+
+    The last row is the rate of the first driver.
+    """
+    return run.once("turning", lambda: _moved(run))
+
+
+def _moved(run: Run) -> tuple[list[str], Courses]:
+    system, driver = run.system, next(iter(run.system.mechanism.drivers), "")
+    ground, drivers = system.mechanism.fixed_link, system.mechanism.drivers
+    joints = [name for name, (_, links) in system.joints.items() if ground in links and name not in drivers]
+
+    def look(time: Array) -> tuple[Array, NDArray[np.intp]]:
+        time = time if run.cycle.duration > 0 else 0.0 * time
+        walk = forward(system, run.values, run.chosen.assembly, time)
+        rates = [*(walk.speed(joint) for joint in joints), system.drive(run.values, driver, time)[1] if driver else 1.0]
+        closed = np.ones(time.shape, bool)
+        for motion in walk.motions.values():
+            closed &= np.isfinite(np.broadcast_to(motion.frame.x + motion.frame.c, closed.shape))
+        return np.array([np.broadcast_to(rate, time.shape) for rate in rates]), closed.astype(np.intp)
+
+    of = Mechanisms(system, run.chosen.assembly, run.values, [run.cycle])
+    knots = np.array([time for _, time in knots_of(of)])
+    breaks = breaks_between(run.cycle, knots) if run.cycle.duration > 0 else np.array([0.0, 1.0])
+    accuracy = accuracy_of(run.cycle, EXACT)
+    return joints, Courses.of(in_blocks(look, len(system.joints)), breaks, None, accuracy)
+
+
+def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:
     """Drive coordinates (rad, m) at which each link on the ground turns back; times (s) without a driver."""
-    system = run.system
-    time = np.append(run.cycle.times(steps), run.cycle.duration) if run.cycle.periodic else run.cycle.times(steps)
+    joints, courses = _motion(run)
+    beside, duration = BESIDE * courses.span * np.array([-1.0, 1.0]), run.cycle.duration
     found: dict[str, tuple[float, ...]] = {}
-    for name, (_, links) in system.joints.items():
-        if system.mechanism.fixed_link not in links or name in system.mechanism.drivers:
-            continue
-
-        def speed(moment: Array, joint: str = name) -> Array:
-            return np.asarray(forward(system, run.values, run.chosen.assembly, moment).speed(joint), float)
-
-        values = np.broadcast_to(speed(time), time.shape)
-        turning = np.flatnonzero(values[:-1] * values[1:] < 0)
-        around = np.concatenate([values[-2:-1] if run.cycle.periodic else [0.0], values])
-        exact = time[:-1][(values[:-1] == 0) & (around[:-2] * values[1:] < 0)]  # a link at rest does not turn back
-        roots = [_root(speed, time[k], time[k + 1]) for k in turning]
-        found[name] = tuple(sorted({round(_coordinate(run, moment), 14) for moment in [*roots, *exact]}))
+    for row, joint in enumerate(joints):
+        passages = courses.passages(row)
+        if run.cycle.periodic:  # its end is its start
+            passages = np.sort(np.append(np.where(passages > duration * (1 - BESIDE), 0.0, passages), 0.0))
+            passages = passages[np.diff(passages, prepend=-duration) > BESIDE * duration]
+        around = passages[:, None] + beside
+        around = around % duration if run.cycle.periodic else np.clip(around, 0.0, courses.span)
+        before, after = courses.picked(np.array([row])).at(around.ravel()).reshape(-1, 2).T
+        places = [round(_coordinate(run, time), 12) + 0.0 for time in passages[before * after < 0].tolist()]
+        found[joint] = tuple(sorted(set(places)))
     return found
-
-
-def _root(function: Callable[[Array], Array], low: float, high: float) -> float:
-    """Zero of a function that changes sign in an interval."""
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda t: float(np.ravel(function(np.array([t])))[0]), low, high, xtol=1e-15, rtol=1e-15))
 
 
 def _coordinate(run: Run, moment: float) -> float:
     """Coordinate of the first driver at a time; the time itself if there is none."""
-    driver = next(iter(run.system.mechanism.drivers), "")
+    driver, moment = next(iter(run.system.mechanism.drivers), ""), moment if run.cycle.duration > 0 else 0.0
     return float(run.system.drive(run.values, driver, moment)[0]) if driver else moment
 
 
-def limits(run: Run, steps: int = 720) -> tuple[tuple[float, float], ...]:
-    """Intervals of the drive coordinate (rad, m) over which the linkage can be assembled, ends found by bisection."""
-    time = run.cycle.times(steps)
-    if run.cycle.periodic:
-        time = np.append(time, run.cycle.duration)
-
-    def closed(moments: Array) -> NDArray[np.bool_]:
-        walk = forward(run.system, run.values, run.chosen.assembly, moments)
-        good = np.ones(np.shape(moments), bool)
-        for motion in walk.motions.values():
-            good &= np.isfinite(np.broadcast_to(motion.frame.x + motion.frame.c, good.shape))
-        return good
-
-    good = closed(time)
+def limits(run: Run) -> tuple[tuple[float, float], ...]:
+    """Intervals of the drive coordinate (rad, m) over which the linkage can be assembled."""
+    _, courses = _motion(run)
+    turns = courses.passages(len(courses.sizes) - 1)  # where the drive turns back
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], courses.states, [0]])))
     found: list[tuple[float, float]] = []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     for first, after in zip(edges[::2], edges[1::2], strict=True):
-        low = time[first] if first == 0 else _edge(closed, time[first], time[first - 1])
-        high = time[after - 1] if after == len(time) else _edge(closed, time[after - 1], time[after])
-        reached = _reached(run, low, high)
+        low, high = courses.edges[first], courses.edges[after]
+        inside = turns[(turns > low) & (turns < high)]
+        ends = [_coordinate(run, float(time)) for time in [low, high]]
+        places = [*ends, *(_coordinate(run, float(time)) for time in inside)]
+        reached = (min(places), max(places)) if len(inside) else (ends[0], ends[1])
         if not any(np.allclose(reached, other, rtol=1e-9, atol=0) for other in found):  # there and back again
             found.append(reached)
     return tuple(found)
-
-
-def _reached(run: Run, low: float, high: float) -> tuple[float, float]:
-    """Coordinates of the first driver between which it moves from one time to another; of one way in its sense."""
-    ends = _coordinate(run, low), _coordinate(run, high)
-    driver = next(iter(run.system.mechanism.drivers), "")
-    if not driver:
-        return ends
-
-    def rate(moment: Array) -> Array:
-        return np.broadcast_to(run.system.drive(run.values, driver, moment)[1], np.shape(moment))
-
-    time = np.linspace(low, high, 720)
-    rates = rate(time)
-    if not (np.any(rates > 0) and np.any(rates < 0)):
-        return ends
-    turns = [_root(rate, time[k], time[k + 1]) for k in np.flatnonzero(rates[:-1] * rates[1:] < 0)]
-    places = [*ends, *(_coordinate(run, float(moment)) for moment in [*time, *turns])]
-    return min(places), max(places)
-
-
-def _edge(closed: Callable[[Array], NDArray[np.bool_]], inside: float, outside: float) -> float:
-    """The last time that can be assembled between one that can and one that cannot."""
-    while abs(outside - inside) > ROOT_TOLERANCE * max(abs(inside), abs(outside)):
-        middle = (inside + outside) / 2
-        if middle in (inside, outside):
-            break
-        if closed(np.array([middle]))[0]:
-            inside = middle
-        else:
-            outside = middle
-    return inside
 
 
 def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...], float]:
@@ -420,8 +400,9 @@ def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 
             figures.append(Figure(f"{name}.dead_centres", f"dead centres of {name}", text, f"{unit} of {driver}"))
     text = ", ".join(f"{low * scale:.6g} … {high * scale:.6g}" for low, high in found.limits) or "no position"
     within = "" if run.cycle.periodic else "within the stated motion"
+    start = f"it starts at {_coordinate(run, 0.0) * scale:.6g}{unit}" * (len(found.limits) > 1 and bool(driver))
     figures += [
-        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else "", within),
+        Figure("limits", "range of assembly", text, f"{unit} of {driver}" if driver else "", within, note=start),
         Figure("shaking_force", "shaking force", found.shaking_force, "N", "maximum"),
         Figure("shaking_moment", "shaking moment about the ground's origin", found.shaking_moment, "N m", "maximum"),
         Figure("effort_rms", "drive effort", found.rms_effort, "N m" if turns else "N", "RMS"),

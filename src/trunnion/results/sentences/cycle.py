@@ -191,11 +191,6 @@ CYCLE: dict[str, Sentence] = {
         "a joint with friction reverses {at} while its pin moves within its play: friction may act either way there, "
         "and the seat changes with it",
     ),
-    "friction.other_solutions": Sentence(
-        NOTE,
-        "the friction equations have up to {count} other {count:#solution/solutions} {at}",
-        "the solution that is continuous with the one without friction is given; in another the mechanism may wedge",
-    ),
     "locking.pins_centred": Sentence(
         NOTE,
         "locking takes the seats of {joints} for the margin and for where it locks forward; all else is of pins in the "

@@ -18,6 +18,17 @@ def _gap(at: str, everywhere: bool, gaps: Mapping[str, float]) -> str:
     return f"cannot be assembled {where}: {by or 'an earlier group has no position'}"
 
 
+def _ranges(ranges: Sequence[str], starts: Sequence[str]) -> str:
+    of = f"extremes are of the one that holds the start, {starts[0]}" if starts else "none of them holds the start"
+    return (
+        f"it can be assembled in {len(ranges)} ranges that are not reached from each other: {', '.join(ranges)}; {of}"
+    )
+
+
+def _elsewhere(ranges: Sequence[str], starts: Sequence[str]) -> str:
+    return "start the driver in another range to have the extremes of that" if starts else "start the driver in one"
+
+
 def _open(at: str, everywhere: bool, redundant: bool, errors: bool, start: bool = False) -> str:
     why = "these links do not close" + (" there, where the motion starts" if start and not everywhere else "")
     if not everywhere and not start:
@@ -58,6 +69,7 @@ def _meeting(places: Sequence[str], links: Sequence[str], joint: str) -> str:
 STRUCTURE: dict[str, Sentence] = {
     "assembly.gap": Sentence(ERROR, _gap, "change the lengths or the range of the driver"),
     "assembly.open": Sentence(ERROR, _open, _mend),
+    "assembly.ranges": Sentence(NOTE, _ranges, _elsewhere),
     "assembly.choice": Sentence(
         WARNING, "links {links} have {ways} assembly modes and {why}; the first one is used", "{remedy}"
     ),

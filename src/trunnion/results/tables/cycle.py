@@ -24,7 +24,7 @@ REST = (
     ("friction_power_change", "joint", "friction_power_change"),
     ("contact_loss_number", "joint", "contact_loss_number"),
     *((name, "", name) for name in (
-        "efficiency_instant", "locking_margin", "other_solutions", "power_delivered_reverse", "power_acting_reverse",
+        "efficiency_instant", "locking_margin", "power_delivered_reverse", "power_acting_reverse",
         "power_given_reverse", "efficiency_reverse_instant", "holding_multiple",
         "closure_residual", "condition", "power_residual", "friction_iterations", "friction_change",
         "friction_residual", "friction_contraction", "seat_change", "seat_travel",
@@ -113,7 +113,7 @@ def locking(result: xr.Dataset) -> list[Column]:
     found += [one for one in rest(result) if one[0] == "locking_margin" or one[0].endswith(".critical_multiple")]
     for i, driver in enumerate(result["driver"].values):
         found += [column(result, f"drive_effort{end}", f"{driver}.effort{end}", (i,)) for end in ("", "_reverse")]
-    wanted = ("efficiency_instant", "efficiency_reverse_instant", "other_solutions", "power_delivered_reverse")
+    wanted = ("efficiency_instant", "efficiency_reverse_instant", "power_delivered_reverse")
     more = ("power_acting_reverse", "power_given_reverse", "holding_multiple")
     found += [column(result, name, name, ()) for name in (*wanted, *more) if name in result]
     return [*found, *_locking_state(result), status_column(result)]

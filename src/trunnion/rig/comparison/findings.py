@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle.summary import inputs, model_notes
+from trunnion.cycle.findings import model_notes
+from trunnion.cycle.summary import inputs
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism

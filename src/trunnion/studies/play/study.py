@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
+from trunnion.cycle.findings import model_notes
 from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
-from trunnion.cycle.summary import model_notes
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
 from trunnion.measures.corners import change_by_step, switch, with_corner

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle.course import CycleCourse, Rows
+from trunnion.algebra.course import Place
+from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.cycle.means import Means
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
@@ -76,16 +77,10 @@ def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, sys
     if ideal:
         slides = [PAIRS[kind].guided for kind, _ in system.joints.values()]
         names = [f"joint_{'slide' if slide else 'rotation'}_error" for slide in slides]
-        told["transmission_error_max"] = [
-            _value(course, lambda rows, of=name, i=i: np.abs(rows[of][i]))  # type: ignore[misc]
-            for i, name in enumerate(names)
-        ]
+        told["transmission_error_max"] = [_value(course.extreme(name, i, of=magnitude)) for i, name in enumerate(names)]
     else:  # beside points with errors
         told |= {"efficiency_ideal": means.efficiency, "transmission_error_max": 0.0}
-    ends = [
-        [_value(course, lambda rows, i=i: rows["drive_effort"][i], sign) for i in drivers]  # type: ignore[misc]
-        for sign in (-1.0, 1.0)
-    ]
+    ends = [[_value(course.extreme("drive_effort", i, sign=sign)) for i in drivers] for sign in (-1.0, 1.0)]
     return told | {
         "efficiency": means.efficiency,
         "efficiency_error": means.efficiency_error,
@@ -95,14 +90,10 @@ def reduced(arrays: Arrays, course: CycleCourse | None, ideal: Means | None, sys
         "drive_power_mean": means.drive_power_mean,
         "useful_power_mean": means.useful_power_mean,
         "friction_power_mean": means.friction_power.net,
-        "reaction_max": [
-            _value(course, lambda rows, i=i: np.sqrt(np.sum(rows["reaction_force"][i] ** 2, axis=0)))  # type: ignore[misc]
-            for i in joints
-        ],
+        "reaction_max": [_value(course.extreme("reaction_force", i, of=magnitude)) for i in joints],
     }
 
 
-def _value(course: CycleCourse, of: Callable[[Rows], NDArray[np.float64]], sign: float = 1.0) -> float:
+def _value(found: Place | None) -> float:
     """An extreme; NaN where there is none."""
-    found = course.extreme(of, sign)
     return float("nan") if found is None else found.value

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle import shared_dimensions
+from trunnion.cycle.findings import model_notes
 from trunnion.cycle.scales import scales_of
-from trunnion.cycle.summary import model_notes
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
 from trunnion.measures.figures import RULES, course_of

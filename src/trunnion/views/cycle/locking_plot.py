@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -122,31 +123,24 @@ def _states(axes: Axes, result: xr.Dataset, over: Abscissa, named: bool) -> None
     legend."""
     if "locking_state" not in result:
         return
-    state = result["locking_state"].values
-    ends = _ends(result, over)
-    for one, colour in STATES:
-        inside = state == one
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-        for number, (start, stop) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-            label = one.short if named and number == 0 else None
-            axes.axvspan(ends[start], ends[stop], color=colour, linewidth=0, zorder=0.55, label=label)
-    held = np.isin(state, HELD_AND_DRIVEN)
-    turns = held[:-1] & held[1:] & (state[:-1] != state[1:])
+    rows = [row for row in attribute(result, "locking_ranges", '{"rows": []}')["rows"] if row["state"]]
+    for state, colour in STATES:
+        alike = [row for row in rows if row["state"] == state.name.lower()]
+        for number, row in enumerate(alike):
+            label = state.short if named and number == 0 else None
+            axes.axvspan(*_places(result, over, row["times"]), color=colour, linewidth=0, zorder=0.55, label=label)
+    both = {state.name.lower() for state in HELD_AND_DRIVEN}
     label = "drive effort changes sign" if named else None
-    for place in np.flatnonzero(turns):
-        axes.axvline(ends[place + 1], color=INK, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1.5, label=label)
-        label = None
+    for before, after in pairwise(rows):
+        if {before["state"], after["state"]} == both:
+            place = _places(result, over, after["times"])[0]
+            axes.axvline(place, color=INK, linewidth=1.0, linestyle=(0, (1, 2)), zorder=1.5, label=label)
+            label = None
 
 
-def _ends(result: xr.Dataset, over: Abscissa) -> Array:
-    """Where what is before each position gives way to it, one more than there are: found between positions, or
-    half-way."""
-    x = over.values
-    half = float(x[1] - x[0]) / 2 if x.size > 1 else 0.5
-    ends = np.concatenate([[x[0] - half], (x[1:] + x[:-1]) / 2, [x[-1] + half]])
-    told = attribute(result, "locking_ranges", "{}")
-    if told and told["of"] and told["positions"] == x.size:  # else they are times
-        for row in told["rows"]:
-            if row["state"] and row.get("ends", [None])[0] is not None:
-                ends[row["first"]] = row["ends"][0]
-    return ends
+def _places(result: xr.Dataset, over: Abscissa, times: list[float]) -> Array:
+    """Where times, s, are on the axis, up to a step beyond the last position, as in a motion that comes again."""
+    time, values = result["time"].values, over.values
+    if len(time) > 1:
+        time, values = (np.append(row, 2 * row[-1] - row[-2]) for row in (time, values))
+    return np.interp(times, time, values)

@@ -1,0 +1,385 @@
+"""What is to be known of a mechanism over its cycle: a list of questions, each of them a small function.
+
+What concerns the cycle is read of courses, so that it does not depend on which positions were asked for; causes of
+positions without an answer are those of the positions (`diagnosis`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.dual import primal
+from trunnion.cycle import contact_loss, diagnosis
+from trunnion.cycle.course import CycleCourse, magnitude
+from trunnion.cycle.locking_course import LockingCourse, locking_course
+from trunnion.cycle.means import Means
+from trunnion.cycle.positions import Positions
+from trunnion.cycle.scales import scales_of
+from trunnion.errors import Finding, Status
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.contact import clearance
+from trunnion.model.mechanism import Mechanism
+from trunnion.model.quantity import Quantity
+from trunnion.model.units import KINDS
+from trunnion.results.quantities import quantity, readable
+from trunnion.results.sentences import finding_for
+from trunnion.solve import loads
+from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
+from trunnion.solve.memory import in_blocks
+from trunnion.solve.switches import accuracy_of, breaks_between
+from trunnion.solve.system import System, felt, rubbing
+
+if TYPE_CHECKING:
+    from trunnion.solve.run import Run
+
+__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "model_notes"]
+
+Array = NDArray[np.float64]
+RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
+FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
+MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
+MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
+LEAST = 0.01  # of the drive work: what supplies less is not worth a word
+ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
+MOST_PLACES = 3  # named in one sentence
+JUMP = 0.2  # of the largest effort: what changes by more at a break jumps there
+ALIKE = 0.5  # of a jump: another that differs by less may be the same elsewhere
+NEAR = 1 / 8  # of the cycle: how far a jump is moved at most
+ZERO_INERTIA = Quantity(0, KINDS["moment of inertia"])
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A run with its positions: what findings and figures of a cycle are made of."""
+
+    run: Run
+    at: Positions
+
+    @property
+    def course(self) -> CycleCourse | None:
+        """That of the cycle, if it was looked for."""
+        return self.at.course
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return self.run.system.mechanism
+
+    @cached_property
+    def locking(self) -> LockingCourse | None:
+        """Locking over the cycle, if there is friction and a driver."""
+        return locking_course(self.run, self.at.method) if rubbing(self.run.system) else None
+
+    def course_of(self, look: Callable[[Array], Sequence[Array]]) -> Courses:
+        """The course of some numbers of the motion."""
+        run = self.run
+
+        def rows(time: Array) -> tuple[Array, NDArray[np.intp]]:
+            numbers = look(time if run.cycle.duration > 0 else 0.0 * time)
+            return np.array([np.broadcast_to(primal(row), time.shape) for row in numbers]), np.zeros(time.shape, int)
+
+        bends = np.array([bend.time for bend in run.bends])
+        breaks = breaks_between(run.cycle, bends) if run.cycle.duration > 0 else np.array([0.0, 1.0])
+        with np.errstate(all="ignore"):
+            in_parts = in_blocks(rows, len(run.system.joints))
+            return Courses.of(in_parts, breaks, None, accuracy_of(run.cycle, Accuracy()))
+
+    def place(self, *times: float) -> str:
+        """One time, s, or the range between two, on the dial of the drive."""
+        dial = self.run.system.dial(self.run.values, np.array([*times, self.run.cycle.duration]))
+        return dial.at(0) if len(times) == 1 else f"between {dial.at(0)} and {dial.at(1)}"
+
+
+def findings(cycle: Cycle) -> list[Finding]:
+    """What is to be known of a mechanism over its cycle."""
+    return [finding for question in QUESTIONS for finding in question(cycle)]
+
+
+# ---- the model ------------------------------------------------------------------------------------------------
+
+
+def _of_the_model(cycle: Cycle) -> list[Finding]:
+    """What the model says that this analysis leaves out, how it was assembled, and what statics leaves open."""
+    run = cycle.run
+    notes = run.once("notes", lambda: model_notes(run.system.mechanism, run.system))
+    hints = run.once("far hints", lambda: list(_far_hints(run)))
+    return [*notes, *run.chosen.findings, *hints, *(run.determinacy.findings() if run.determinacy else [])]
+
+
+def _far_hints(run: Run) -> Iterator[Finding]:
+    """Hints of places that are far from where their points are at the start: they choose an assembly by chance."""
+    size = float(np.ravel(primal(run.system.size(run.values)))[0])
+    walk = run.walk(np.zeros(1))
+    for name, hint in run.system.mechanism.assembly.items():
+        if not isinstance(hint, tuple):
+            continue
+        link, _, point = name.rpartition(".")
+        link = link or run.system.joints[name][1][1]
+        place = [float(np.ravel(primal(part))[0]) for part in walk.point(link, point).place]
+        stated = [float(run.values[f"assembly.{name}.{axis}"]) for axis in "xyz"[: len(place)]]
+        distance = float(np.linalg.norm(np.subtract(place, stated)))
+        if distance > FAR * size:
+            words = ", ".join(quantity(part, "m") for part in place)
+            yield finding_for("assembly.far_hint", f"assembly.{name}", point=name, distance=distance, place=words)
+
+
+def effort_units(system: System) -> list[str]:
+    """Unit of every driver's effort."""
+    return ["N m" if system.turns(name) else "N" for name in system.mechanism.drivers]
+
+
+def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
+    """What the model says that this analysis leaves out, and warnings about the data."""
+    notes = list(mechanism.checked)
+    values = mechanism.parameters()
+    play = {name: clearance(name, values) for name in mechanism.effective_joints if name not in mechanism.seated}
+    playing = [name for name, own in play.items() if own is not None and own > 0]
+    bodies = {name: link for name, link in mechanism.effective_links.items() if name != mechanism.fixed_link}
+    heavy = [name for name, link in bodies.items() if link.mass.source != 0]
+    if heavy and mechanism.gravity is None:
+        down, none = ("[0, -9.81]", "[0, 0]") if mechanism.space == "planar" else ("[0, 0, -9.81]", "[0, 0, 0]")
+        notes.append(finding_for("model.gravity", "gravity", links=heavy, phrases={"down": down, "none": none}))
+    if not heavy and any(part.source != 0 for part in mechanism.gravity or ()):
+        notes.append(finding_for("model.no_mass", "gravity"))
+    sliding = {link for joint in mechanism.joints.values() if PAIRS[joint.type].guided for link in joint.links}
+    points = [name for name in heavy if bodies[name].inertia == ZERO_INERTIA and name not in sliding]
+    if points:
+        notes.append(finding_for("model.point_mass", "links", links=points))
+    tight = [
+        name
+        for name, joint in mechanism.effective_joints.items()
+        if joint.seat not in (None, "free")
+        and play.get(name) is not None
+        and f"joints.{name}.pin.hole_radius" in values
+    ]
+    if tight:
+        notes.append(finding_for("model.seat_without_play", "joints", joints=tight))
+    if playing:
+        # no seats are taken where links are over-constrained
+        held = {name for module in system.plan.modules if module.redundant for name in module.joints}
+        seatable = [name for name in playing if name not in held]
+        notes.append(finding_for("model.play_centred", "joints", joints=playing, seatable=seatable))
+    return notes
+
+
+# ---- assembly, locking and singular positions -----------------------------------------------------------------
+
+
+def _without_answer(cycle: Cycle) -> list[Finding]:
+    """Why positions have no answer."""
+    run, at, scales, units = cycle.run, cycle.at, scales_of(cycle.run), effort_units(cycle.run.system)
+    efforts = {}
+    for i, (name, unit) in enumerate(zip(cycle.mechanism.drivers, units, strict=True)):
+        lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
+        efforts[name] = lower, upper, unit
+    status, condition, margin = (at.arrays[name] for name in ("status", "condition", "locking_margin"))
+    joints = felt(run.system, run.values)
+    return diagnosis.findings(at.causes, at.dial, status, condition, efforts, margin, scales, cycle.locking, joints)
+
+
+def _ranges(cycle: Cycle) -> Iterator[Finding]:
+    """Where it can be assembled, if there are several such ranges: extremes are of that which holds the start."""
+    ranges = cycle.course.ranges if cycle.course else []
+    if len(ranges) > 1:
+        starts = [cycle.place(*ends) for *ends, start in ranges if start]
+        yield finding_for("assembly.ranges", "links", ranges=[cycle.place(*ends) for *ends, _ in ranges], starts=starts)
+
+
+def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
+    """Drivers whose periods have no common multiple."""
+    run, drivers = cycle.run, cycle.mechanism.drivers
+    spans = [run.system.span(run.values, name) for name in drivers]
+    several = len(spans) > 1 or cycle.mechanism.gears
+    if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
+        whom = "drivers" if len(spans) > 1 else "driver and the gears"
+        yield finding_for("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom})
+
+
+# ---- loads and springs ----------------------------------------------------------------------------------------
+
+
+def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
+    """Resistances that are negative somewhere, and so drive."""
+    run, entries = cycle.run, cycle.mechanism.parameter_set.entries.items()
+    paths = [path for path, entry in entries if entry.varies and entry.location[-1] in RESISTING]
+    if not paths:
+        return
+
+    def look(time: Array) -> list[Array]:
+        stated = Stated(stated_walk(run.system, run.values, run.chosen.assembly, time))
+        return [np.asarray(stated.get(path)) for path in paths]
+
+    courses = cycle.course_of(look)
+    for row, path in enumerate(paths):
+        cut = courses.picked(np.array([row])).parted(courses.passages(row))
+        below = cut.at(cut.edges[:-1] + cut.half)[0] < 0
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], below, [0]]).astype(int)))
+        places = [cycle.place(*cut.edges[pair]) for pair in ends.reshape(-1, 2)]
+        if places:
+            more = f" and in {len(places) - MOST_PLACES} more places" * (len(places) > MOST_PLACES)
+            yield finding_for("load.drives", path, at=", ".join(places[:MOST_PLACES]) + more)
+
+
+def _springs(cycle: Cycle) -> Iterator[Finding]:
+    """Springs whose torque jumps, that never act, or whose ends pass each other."""
+    run, springs = cycle.run, cycle.mechanism.springs
+    if not springs:
+        return
+    courses = cycle.course_of(lambda time: [state.elongation for *_, state in loads.springs(run.walk(time))])
+    for row, (name, spring) in enumerate(springs.items()):
+        where, elongation = f"springs.{name}", courses.picked(np.array([row]))
+        free, preload = (float(np.max(run.values.get(f"{where}.{key}", 0.0))) for key in ("free_length", "preload"))
+        if spring.joint is not None and run.system.turns(spring.joint):
+            before, after = elongation.sides(0)
+            jumps = np.flatnonzero(np.abs(after - before) > np.pi)
+            if len(jumps):
+                yield finding_for("spring.jump", where, at=cycle.place(float(courses.edges[1 + jumps[0]])))
+        if spring.only is not None:
+            sign = 1.0 if spring.only == "pull" else -1.0
+            most = elongation.extreme(lambda rows: rows[0], sign)
+            if most is not None and sign * most.value < 0:
+                yield finding_for("spring.never_acts", where, only=spring.only, free=free, nearest=free + most.value)
+        if spring.between is not None and spring.only != "pull" and (free or preload):
+            least, most = (elongation.extreme(lambda rows: rows[0], sign) for sign in (-1.0, 1.0))
+            if least is not None and most is not None and least.value + free <= MEETS * (most.value + free):
+                yield finding_for("spring.turned_round", where, at=cycle.place(least.time))
+
+
+def _idle_loads(cycle: Cycle) -> Iterator[Finding]:
+    """Useful loads that take no power anywhere; where there is no answer, that is why."""
+    marked = [name for name, load in cycle.mechanism.loads.items() if load.useful]
+    course = cycle.course
+    useful = cycle.at.arrays["useful_power"] if course is None else course.picked("useful_power").coefficients
+    if marked and np.all(np.isfinite(useful)) and not np.any(useful):
+        yield finding_for("load.no_power", "loads", loads=marked, count=len(marked))
+
+
+def beside_the_drive(mechanism: Mechanism) -> list[str]:
+    """Loads on a driven link that are not useful where others are, such as a hand's force beside its drive torque."""
+    useful = useful_loads(mechanism)
+    driven = {link for name in mechanism.drivers for link in mechanism.effective_joints[name].links}
+    driven.discard(mechanism.fixed_link)
+    return [name for name, load in mechanism.loads.items() if load.link in driven and name not in useful]
+
+
+def _uncounted_work(cycle: Cycle) -> Iterator[Finding]:
+    """A warning of an efficiency above 1, with the work of each source beside the drives; else notes of springs that
+    keep work at the end of a range, and of loads that act beside the drive and supply work."""
+    run, means, mechanism = cycle.run, cycle.at.means, cycle.mechanism
+    beside, useful = beside_the_drive(mechanism), useful_springs(mechanism)
+    storing = [name for name in mechanism.springs if name not in useful] if not run.cycle.periodic else []
+    above = means.efficiency > 1 + ROUNDED + means.efficiency_error
+    if not (above or beside or storing) or run.cycle.duration <= 0 or not np.isfinite(means.drive_power.value):
+        return
+    drive = means.drive_power.net * run.cycle.duration
+    every = _work(cycle, means)
+    work = {name: value for name, value in every.items() if value > LEAST * abs(drive)}
+    if above:
+        work = work or dict([max(every.items(), key=lambda item: item[1])])
+        supplies = ", ".join(f"{name} {readable(value, 'J')}" for name, value in work.items())
+        yield finding_for(
+            "efficiency.above_one", efficiency=means.efficiency, drive=drive, work=work, phrases={"supplies": supplies}
+        )
+        return
+    for name in storing:
+        if (stored := -every[f"spring {name}"]) > MUCH * drive > 0:
+            yield finding_for("spring.stores", f"springs.{name}", stored=stored, drive=drive)
+    for name in beside:
+        if (supplied := work.get(f"load {name}")) is not None:
+            yield finding_for("load.not_counted", f"loads.{name}", work=supplied, drive=drive)
+
+
+def _work(cycle: Cycle, means: Means) -> dict[str, float]:
+    """Work over the cycle, J, into the mechanism by each load and spring that is not useful, and by its masses."""
+    run, mechanism, duration = cycle.run, cycle.mechanism, cycle.run.cycle.duration
+    others = [name for name in mechanism.loads if name not in useful_loads(mechanism)]
+    springs = [name for name in mechanism.springs if name not in useful_springs(mechanism)]
+
+    def powers(time: Array) -> list[Array]:
+        back = run.solve(time)
+        return [*(back.load_powers[name] for name in others), *(back.springs[name].power for name in springs)]
+
+    names = [*(f"load {name}" for name in others), *(f"spring {name}" for name in springs)]
+    work = (cycle.course_of(powers).mean() * duration).tolist() if names else []
+    rest = means.useful_power.net + means.friction_power.net - means.drive_power.net
+    return {**dict(zip(names, work, strict=True)), "weight and inertia": rest * duration - sum(work)}
+
+
+# ---- pins and errors ------------------------------------------------------------------------------------------
+
+
+def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
+    """Efforts that are largest next to where pins cross their play, and nearer to it are not known."""
+    course = cycle.course
+    for i, name in enumerate(cycle.mechanism.drivers if course else ()):
+        assert course is not None
+        largest = course.extreme("drive_effort", i, of=magnitude)
+        if largest is not None and course.beside(largest, Status.CONTACT_LOST):
+            yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))
+
+
+def _lost_contacts(cycle: Cycle) -> Iterable[Finding]:
+    """Pins that lose contact."""
+    at = cycle.at
+    return contact_loss.findings(at.losses, at.arrays, list(cycle.run.system.joints), at.dial)
+
+
+def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
+    """Changes of efforts by the errors that are a jump at another place; and the largest change elsewhere."""
+    if cycle.course is None or not cycle.run.erring:
+        return
+    course, edges, units = cycle.course, cycle.course.courses.edges, effort_units(cycle.run.system)
+    for i, (name, unit) in enumerate(zip(cycle.mechanism.drivers, units, strict=True)):
+        jumps = course.jumps("drive_effort", i)
+        without = jumps - course.jumps("drive_effort_change", i)
+        left = course.sound.copy()
+        tops = []
+        for built, meant in _moved(jumps, without, JUMP * course.largest("drive_effort"), edges):
+            between = _between(built, meant, len(left))
+            left[between] = False
+            inside = np.isin(np.arange(len(left)), between) & course.sound
+            top = course.extreme("drive_effort_change", i, of=magnitude, panels=inside)
+            if top is not None:
+                tops.append((top, built, meant))
+        if tops:
+            top, built, meant = max(tops, key=lambda top: top[0].value)
+            rest = course.extreme("drive_effort_change", i, of=magnitude, panels=left)
+            places = [course.told(Place(0.0, float(edges[k + 1]))) for k in (built, meant)]
+            yield finding_for(
+                "errors.jump_moved", f"drivers.{name}", at=course.told(top).removeprefix("at "), built=places[0],
+                meant=places[1], rest=rest.value if rest else 0.0, unit=unit,
+            )  # fmt: skip
+
+
+def _moved(jumps: Array, without: Array, least: float, edges: Array) -> Iterator[tuple[int, int]]:
+    """Numbers of edges, of a jump of the mechanism with errors and of that without to which it belongs."""
+    alone = [
+        np.flatnonzero((np.abs(own) > least) & (np.abs(other) < ALIKE * np.abs(own)))
+        for own, other in ((jumps, without), (without, jumps))
+    ]
+    span = edges[-1] - edges[0]
+    for built in alone[0]:
+        away = np.abs(edges[1:][alone[1]] - edges[1:][built])
+        away = np.minimum(away, span - away)
+        same = np.abs(without[alone[1]] - jumps[built]) < ALIKE * np.abs(jumps[built])
+        away = np.where(same, away, np.inf)
+        if np.min(away, initial=np.inf) < NEAR * span:
+            yield int(built), int(alone[1][np.argmin(away)])
+
+
+def _between(one: int, other: int, count: int) -> NDArray[np.intp]:
+    """Panels between two edges, each of which ends the panel of its number, the shorter way round."""
+    ways = [np.arange(low + 1, low + 1 + (high - low) % count) % count for low, high in ((one, other), (other, one))]
+    return min(ways, key=len)
+
+
+QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
+    _of_the_model, _without_answer, _ranges, _no_common_period, _driving_resistances, _springs, _idle_loads,
+    _beside_gaps, _moved_jumps, _uncounted_work, _lost_contacts,
+)  # fmt: skip

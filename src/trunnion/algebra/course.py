@@ -13,7 +13,7 @@ chebfuns, IMA J. Numer. Anal. 30 (2010) 898-916, doi:10.1093/imanum/drp008.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -30,6 +30,7 @@ Solve = Callable[[Labels, Array], tuple[Array, NDArray[np.integer]]]
 
 ORDER = 12  # coefficients of a panel
 POINTS = -np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
+ON_POINTS = chebyshev.chebvander(POINTS, ORDER - 1).T
 FIT = np.linalg.inv(chebyshev.chebvander(POINTS, ORDER - 1))
 GRID = np.linspace(-1.0, 1.0, 49)  # places of a panel among which extremes are looked for first
 ON_GRID = chebyshev.chebvander(GRID, ORDER - 1).T
@@ -146,9 +147,13 @@ class Courses:
         tails: Array = np.max(np.abs(self.coefficients[..., -2:]), axis=-1)
         return tails
 
+    def panel(self, time: Array) -> Labels:
+        """The panel of every time, s; at an edge that after it."""
+        return np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.half) - 1)
+
     def at(self, time: Array) -> Array:
         """The rows at times, s, (row, time); at a break those after it."""
-        panel = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.half) - 1)
+        panel = self.panel(time)
         spot = (time - self.edges[panel]) / self.half[panel] - 1.0
         basis = chebyshev.chebvander(spot, ORDER - 1)
         rows: Array = np.einsum("tc,trc->rt", basis, self.coefficients[panel])
@@ -268,6 +273,28 @@ class Courses:
         """The values at the end and at the begin of every panel."""
         ends = self.coefficients[:, row] @ ENDS
         return ends[:, 1], ends[:, 0]
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Times, s, through whose values the polynomials of every panel go, (panel, node)."""
+        nodes: Array = self.edges[:-1, None] + self.half[:, None] * (POINTS + 1.0)
+        return nodes
+
+    def on_nodes(self) -> Array:
+        """The rows at the nodes, (row, panel, node)."""
+        return np.moveaxis(self.coefficients @ ON_POINTS, 1, 0)
+
+    def rate(self, values: Array, panels: NDArray[np.bool_]) -> Array:
+        """The rates at the nodes of some panels of rows with values there, (row, panel, node)."""
+        slopes = chebyshev.chebder(values @ FIT.T, axis=-1) / self.half[panels, None]
+        rates: Array = slopes @ ON_POINTS[:-1]
+        return rates
+
+    def extended(self, values: Array) -> Courses:
+        """With more rows on the same panels, by their values at the nodes, (row, panel, node)."""
+        more = np.moveaxis(values @ FIT.T, 0, 1)
+        sizes = np.concatenate([self.sizes, np.max(np.abs(values), axis=(1, 2), initial=0.0)])
+        return replace(self, coefficients=np.concatenate([self.coefficients, more], axis=1), sizes=sizes)
 
     def derivative(self) -> Courses:
         """The courses of the rates of all rows."""

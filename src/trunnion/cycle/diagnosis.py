@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +16,7 @@ from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
+from trunnion.solve.seating import Seated
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
 
 if TYPE_CHECKING:
@@ -71,10 +72,10 @@ class Causes:
                 if len(locked):
                     self._locked.setdefault(number, []).append((places[locked], share[locked]))
 
-    def note_seats(self, offsets: Mapping[str, NDArray[np.float64]], sticks: NDArray[np.bool_], offset: int) -> None:
+    def note_seats(self, seated: Seated, first: int) -> None:
         """Keep where the pins of one chunk lie, and where joints stick while pins travel."""
-        self._stuck.append(np.flatnonzero(sticks) + offset)
-        for path, numbers in offsets.items():
+        self._stuck.append(np.flatnonzero(seated.sticks) + first)
+        for path, numbers in seated.offsets.items():
             self._seats.setdefault(path, []).append(numbers)
 
     def stuck(self) -> Positions:

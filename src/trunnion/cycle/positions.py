@@ -21,11 +21,10 @@ from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import Lanes, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import Seated, settle
+from trunnion.solve.seating import SETTLED, Seating, seating_of
 from trunnion.solve.system import Dial, Values
 
 __all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
@@ -121,7 +120,7 @@ def stretch(
             progress(window.stop)
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
     resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
-    losses = contact_loss.find(arrays, run, time) if run.seats else []
+    losses = contact_loss.find(arrays, seating_of(run, method), time) if run.seats else []
     fill_of(run.system).unwrap(arrays, run.system, run.values, time)
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     means = still(arrays, run.system.mechanism)
@@ -152,22 +151,13 @@ def _fill_as_built(
 ) -> Backward:
     """One chunk of a mechanism with errors beside the ideal one; the walk it came of."""
     part, quick = time[window], replace(method, margin_up_to=0.0)
-    labels = fill_of(run.system).labels(run.system)
-    seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
-    scratch = results.allocate(
-        labels, len(seen.times), fill_of(run.system).absent(run.system), wanted={*IDEAL, *COMPARED}
-    )
-    meant = run.ideal(seen.times, quick)
-    fill_chunk(scratch, meant, seen.times, slice(0, len(seen.times)))
-    own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
-    scratch = {name: array[..., own] for name, array in scratch.items()}
+    labels, absent = fill_of(run.system).labels(run.system), fill_of(run.system).absent(run.system)
+    scratch = results.allocate(labels, len(part), absent, wanted={*IDEAL, *COMPARED})
+    fill_chunk(scratch, run.ideal(part, quick), part, slice(0, len(part)))
     for name, array in ideal.items():
         array[..., window] = scratch[name]
     if run.seats:
-        seated = settle(run, seen, method, meant)
-        back = seated.back
-        fill_chunk(arrays, back, part, window, causes)
-        _note_seats(arrays, seated, window, causes)
+        back = _fill_seated(arrays, seating_of(run, method), part, window, method, causes)
     else:
         back = run.solve(part, method=method)
         fill_chunk(arrays, back, part, window, causes)
@@ -176,14 +166,23 @@ def _fill_as_built(
     return back
 
 
-def _note_seats(arrays: Arrays, seated: Seated, window: slice, causes: diagnosis.Causes) -> None:
-    """What the iteration came to in one chunk, beside the walk with the pins in their seats."""
-    causes.note_seats(seated.offsets, seated.sticks, window.start)
-    arrays["seat_rounds"][window] = seated.rounds
-    arrays["seat_travel"][window] = seated.told
-    arrays["seat_change"][window] = seated.change
+def _fill_seated(
+    arrays: Arrays,
+    seating: Seating,
+    time: NDArray[np.float64],
+    window: slice,
+    method: FrictionMethod,
+    causes: diagnosis.Causes,
+) -> Backward:
+    """One chunk with the pins in their seats, and how these came to be."""
+    seated = seating.at(time, method)
+    fill_chunk(arrays, seated.back, time, window, causes)
+    causes.note_seats(seated, window.start)
+    arrays["seat_rounds"][window], arrays["seat_change"][window] = seating.iterated(time)
+    arrays["seat_travel"][window] = seated.states == SETTLED
     status = arrays["status"][window]
     np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
+    return seated.back
 
 
 def _fill_compiled(

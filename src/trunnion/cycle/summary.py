@@ -133,7 +133,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *_beside_gaps(run.system, at.course),
         *(moved_jumps.findings(at.course, units) if at.course and run.erring else ()),
         *uncounted.findings(run, at.means),
-        *contact_loss.findings(at.losses, at.arrays, list(run.system.joints), at.dial),
+        *contact_loss.findings(at.losses, at.arrays, run, at.dial),
     ], near
 
 

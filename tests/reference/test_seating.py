@@ -23,8 +23,8 @@ from reference.maximal_space import Array, Data, Drive, Frame
 from reference.seat_oracle import FourBar, Link, Linkage, SliderCrank
 from reference.seat_oracle_space import settle
 from trunnion.errors import Status
-from trunnion.solve.run import Run, prepare
 from trunnion.solve.end_loads import loads_of
+from trunnion.solve.run import Run, prepare
 
 LINKAGES: dict[str, tuple[Any, type[Linkage]]] = {
     "four-bar": (four_bar, FourBar),

@@ -154,9 +154,11 @@ class Courses:
     def at(self, time: Array) -> Array:
         """The rows at times, s, (row, time); at a break those after it."""
         panel = self.panel(time)
-        spot = (time - self.edges[panel]) / self.half[panel] - 1.0
-        basis = chebyshev.chebvander(spot, ORDER - 1)
-        rows: Array = np.einsum("tc,trc->rt", basis, self.coefficients[panel])
+        basis = chebyshev.chebvander((time - self.edges[panel]) / self.half[panel] - 1.0, ORDER - 1)
+        rows = np.empty((self.coefficients.shape[1], len(time)))
+        order = np.argsort(panel, kind="stable")
+        for lanes in np.split(order, np.flatnonzero(np.diff(panel[order])) + 1) if len(time) else []:
+            rows[:, lanes] = self.coefficients[panel[lanes[0]]] @ basis[lanes].T
         return rows
 
     def share(self, panels: NDArray[np.bool_]) -> float:
@@ -274,26 +276,27 @@ class Courses:
         ends = self.coefficients[:, row] @ ENDS
         return ends[:, 1], ends[:, 0]
 
-    @cached_property
-    def nodes(self) -> Array:
-        """Times, s, through whose values the polynomials of every panel go, (panel, node)."""
-        nodes: Array = self.edges[:-1, None] + self.half[:, None] * (POINTS + 1.0)
-        return nodes
+    def nodes(self, panels: NDArray[np.bool_]) -> Array:
+        """Times, s, through whose values the polynomials of some panels go, in a row."""
+        nodes: Array = self.edges[:-1][panels, None] + self.half[panels, None] * (POINTS + 1.0)
+        return nodes.ravel()
 
-    def on_nodes(self) -> Array:
-        """The rows at the nodes, (row, panel, node)."""
-        return np.moveaxis(self.coefficients @ ON_POINTS, 1, 0)
+    def on_nodes(self, panels: NDArray[np.bool_]) -> Array:
+        """The rows at these times."""
+        values = self.coefficients[panels] @ ON_POINTS  # (panel, row, node)
+        return np.moveaxis(values, 1, 0).reshape(values.shape[1], values.shape[0] * ORDER)
 
-    def rate(self, values: Array, panels: NDArray[np.bool_]) -> Array:
-        """The rates at the nodes of some panels of rows with values there, (row, panel, node)."""
-        slopes = chebyshev.chebder(values @ FIT.T, axis=-1) / self.half[panels, None]
-        rates: Array = slopes @ ON_POINTS[:-1]
-        return rates
+    def rates(self, rows: Array, panels: NDArray[np.bool_]) -> Array:
+        """The rates, at these times, of rows by their values there, (row, time)."""
+        slopes = chebyshev.chebder(_fitted(rows), axis=-1) / self.half[panels, None]
+        return np.asarray(slopes @ ON_POINTS[:-1]).reshape(rows.shape)
 
-    def extended(self, values: Array) -> Courses:
-        """With more rows on the same panels, by their values at the nodes, (row, panel, node)."""
-        more = np.moveaxis(values @ FIT.T, 0, 1)
-        sizes = np.concatenate([self.sizes, np.max(np.abs(values), axis=(1, 2), initial=0.0)])
+    def extended(self, rows: Array, panels: NDArray[np.bool_], elsewhere: float = 0.0) -> Courses:
+        """With more rows, by their values at these times; a number on all other panels."""
+        more = np.zeros((len(self.half), len(rows), ORDER))
+        more[..., 0] = elsewhere
+        more[panels] = np.moveaxis(_fitted(rows), 0, 1)
+        sizes = np.concatenate([self.sizes, np.max(np.abs(rows), axis=1, initial=0.0)])
         return replace(self, coefficients=np.concatenate([self.coefficients, more], axis=1), sizes=sizes)
 
     def derivative(self) -> Courses:
@@ -458,6 +461,11 @@ class _Resolving:
         breaks = np.unique(np.concatenate([self._breaks[k], changes]))
         states, sizes = panels.labels // 2, self._sizes[:, k]
         return Courses(edges, panels.coefficients, states, breaks, sizes, int(self._asked[k]))
+
+
+def _fitted(rows: Array) -> Array:
+    """Polynomials through values at the nodes of panels, (row, panel, coefficient)."""
+    return np.asarray(rows.reshape(len(rows), rows.shape[1] // ORDER, ORDER) @ FIT.T)
 
 
 def _between(edges: Sequence[Array], mechanism: Labels) -> tuple[Labels, Array, Array]:

@@ -5,14 +5,13 @@ which the courses of the loads without play say whatever the positions are; wher
 away from its wall; and where a seat does not settle, since there the load changes more by the seat than it presses.
 Beside it the figure of a zero-clearance analysis that S. W. E. Earles and C. L. S. Wu (Predicting the occurrence of
 contact loss and impact at a bearing from a zero-clearance analysis, Proc. 4th World Congress on the Theory of Machines
-and Mechanisms, 1975, 1013-1018) found to tell impact: rate of turn of the reaction over its size, from about 1 rad/(N s)
-on. It is empirical, and has a unit.
+and Mechanisms, 1975, 1013-1018) found to tell impact: rate of turn of the reaction over its size, from about
+1 rad/(N s) on. It is empirical, and has a unit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,167 +21,120 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.end_loads import NO_LOAD, Crossing, EndLoads
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import ROUNDS, UNSETTLED, Halt, Seating
+from trunnion.solve.seating import ROUNDS, UNSETTLED, Seating
 from trunnion.solve.system import Dial
 
-__all__ = ["EARLES_WU", "Loss", "find", "findings"]
+__all__ = ["EARLES_WU", "find", "findings"]
 
 EARLES_WU = 1.0  # rad/(N s)
 MOST_PLACES = 6  # named in one finding
-INSIDE = 1e-9  # of the cycle: positions at the ends of a time in which nothing presses a pin belong to it
+INSIDE = 1e-9  # of the cycle: positions at the ends of a time belong to it
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")
 
 Array = NDArray[np.float64]
 Arrays = dict[str, Array]
-Positions = NDArray[np.intp]
 
 
-@dataclass(frozen=True)
-class Loss:
-    """Loss of contact of one joint.
-
-    crossings: where its pin crosses the hole; idle: times, s, from and to, in which nothing presses an end (1, 2, 3 along
-    the axis, 0 of a play that has one); unsettled: positions whose seats did not settle, where this joint bears least;
-    halts: where its own travel would take more than its load; loaded: whether anything presses it at all; turns:
-    whether its load has a direction that can turn, as that of a guide has not.
-    """
-
-    joint: str
-    crossings: list[Crossing]
-    idle: list[tuple[int, float, float]]
-    unsettled: Positions
-    halts: list[Halt]
-    loaded: bool
-    turns: bool
-
-    @property
-    def part(self) -> str:
-        """What lies in the hole."""
-        return "pin" if self.turns else "slider"
-
-
-def find(arrays: Arrays, seating: Seating, time: Array) -> list[Loss]:
-    """Losses of contact of every joint that its load seats; written into `contact_lost` and the status."""
+def find(arrays: Arrays, seating: Seating, time: Array) -> None:
+    """Write the losses of contact of joints that their loads seat into `contact_lost`, the status and the numbers."""
     run, loads, status = seating.run, seating.loads, arrays["status"]
-    joints, losses = list(run.system.joints), []
-    for low in range(0, len(time), CHUNK):
-        window = slice(low, min(low + CHUNK, len(time)))
+    for first in range(0, len(time), CHUNK):
+        window = slice(first, min(first + CHUNK, len(time)))
         _fill_numbers(arrays["contact_loss_number"][:, window], loads, time[window])
-    loaded = [seat for seat in run.seats if seat.given is None]
-    if not loaded:
-        return losses
-    answered = status < Status.NOT_CONVERGED
-    late = np.flatnonzero((seating.states(time) == UNSETTLED) & answered & (status != Status.ZERO_SLIP))
-    least = _least_loaded(arrays["end_force"][..., late], [joints.index(seat.joint) for seat in loaded])
-    for seat in loaded:
-        i = joints.index(seat.joint)
-        crossings = [cross for cross in loads.passages if cross.end.seat.joint == seat.joint]
-        idle = [(end.place, low, high) for end, low, high in loads.idle if end.seat.joint == seat.joint]
-        presses = any(end.seat.joint == seat.joint for end, _ in loads.pressed) or not loads.largest > 0
-        turns = any(len(end) > 1 for end in seat.play.model.ends)
-        halts = [halt for halt in seating.halts if halt.joint == seat.joint]
-        loss = Loss(seat.joint, crossings, idle, late[least == i], halts, presses, turns)
-        if crossings or idle or len(loss.unsettled) or halts or not presses:
-            losses.append(loss)
-        lifted = [np.flatnonzero((low < time) & (time < high)) for _, low, high in halts]
-        lost = np.concatenate([_nearest(run, crossings, idle, time), loss.unsettled, *lifted])
-        arrays["contact_lost"][i, lost[answered[lost]]] = 1
-    anywhere = np.any(arrays["contact_lost"] > 0, axis=0)
-    np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
-    return losses
-
-
-def _nearest(
-    run: Run, crossings: Sequence[Crossing], idle: Sequence[tuple[int, float, float]], time: Array
-) -> Positions:
-    """Positions within the crossings and the times without a load, or if there are none in one that next to it."""
-    duration, step = run.cycle.duration, time[1] - time[0] if len(time) > 1 else 0.0
-    found = []
-    for low, middle, high in [(c.low, c.time, c.high) for c in crossings] + [(a, a, b) for _, a, b in idle]:
-        away = np.abs(time - middle)
+    joints, duration, lost = list(run.system.joints), run.cycle.duration, arrays["contact_lost"]
+    step = time[1] - time[0] if len(time) > 1 else 0.0
+    for halt in seating.halts:
+        lost[joints.index(halt.joint), (halt.low < time) & (time < halt.high)] = 1
+    times = [(cross.end, cross.low, cross.time, cross.high) for cross in loads.passages]
+    for end, low, middle, high in times + [(end, low, low, high) for end, low, high in loads.idle]:
+        row, away = joints.index(end.seat.joint), np.abs(time - middle)
         away = np.minimum(away, duration - away) if run.cycle.periodic else away
-        found.append(np.flatnonzero((time >= low - INSIDE * duration) & (time <= high + INSIDE * duration)))
-        if not len(found[-1]) and np.min(away) <= (0.5 + INSIDE) * step:
-            found.append(np.array([np.argmin(away)]))
-    return np.concatenate([*found, np.zeros(0, np.intp)])
+        lost[row, (time >= low - INSIDE * duration) & (time <= high + INSIDE * duration)] = 1
+        if np.min(away) <= (0.5 + INSIDE) * step:  # the position next to it, if it lies between two
+            lost[row, np.argmin(away)] = 1
+    late = np.flatnonzero((seating.states(time) == UNSETTLED) & (status != Status.ZERO_SLIP))
+    if len(late):  # of the joint whose end bears least
+        rows = [joints.index(seat.joint) for seat in run.seats if seat.given is None]
+        sizes = np.sqrt(np.sum(arrays["end_force"][rows][..., late] ** 2, axis=2))
+        least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
+        lost[np.array(rows)[least], late] = 1
+    lost[:, status >= Status.NOT_CONVERGED] = 0
+    anywhere = np.any(lost > 0, axis=0)
+    np.maximum(status, np.where(anywhere, status.dtype.type(Status.CONTACT_LOST), status.dtype.type(0)), out=status)
 
 
 def _fill_numbers(numbers: Array, loads: EndLoads, time: Array) -> None:
     """The figure of Earles and Wu, |F × Ḟ|/|F|³, rad/(N s), of every joint: of its reaction without play, in space of
     the force on an end."""
     forces, rates = loads.courses.at(time), loads.rates.at(time)
-    for i, vectors in enumerate(loads.vectors):
+    for number, vectors in zip(numbers, loads.vectors, strict=True):
         for rows in vectors:
             force, rate = forces[rows], rates[rows]
             square = np.sum(force * force, axis=0)
             with np.errstate(all="ignore"):
-                across = np.sqrt(np.sum((rate - force * (np.sum(force * rate, axis=0) / square)) ** 2, axis=0))
-                numbers[i] = np.fmax(
-                    numbers[i], np.where(np.sqrt(square) > NO_LOAD * loads.largest, across / square, np.nan)
-                )
-
-
-def _least_loaded(forces: Array, rows: Sequence[int]) -> Positions:
-    """Of the joints with loaded seats that whose end bears least, at each of some positions."""
-    sizes = np.sqrt(np.sum(forces[rows] ** 2, axis=2))
-    least = np.argmin(np.nan_to_num(np.min(np.where(np.isfinite(sizes), sizes, np.inf), axis=1)), axis=0)
-    return np.array(rows, np.intp)[least]
+                across = np.linalg.norm(rate - force * (np.sum(force * rate, axis=0) / square), axis=0)
+                pressed = np.sqrt(square) > NO_LOAD * loads.largest
+                number[...] = np.fmax(number, np.where(pressed, across / square, np.nan))
 
 
 # ---- what is told of it -----------------------------------------------------------------------------------------
 
 
-def findings(losses: Sequence[Loss], arrays: Arrays, run: Run, dial: Dial) -> Iterator[Finding]:
+def findings(arrays: Arrays, seating: Seating, time: Array, dial: Dial) -> Iterator[Finding]:
     """One finding for all joints that lose contact at the same places, and for those that nothing presses."""
-    joints = list(run.system.joints)
-    yield from _unloaded(losses, run)
-    lost: dict[tuple[str, str], list[Loss]] = {}
-    lifted: dict[tuple[str, str], list[Loss]] = {}
-    for loss in losses:
-        if not loss.loaded:
-            yield finding_for("seat.unloaded", f"joints.{loss.joint}", part=loss.part)
-        elif loss.crossings:
-            places = [f"at {_at(run, cross.time)}{ENDS[cross.end.place]}" for cross in loss.crossings]
-            lost.setdefault((loss.part, _listed(places)), []).append(loss)
-        if loss.halts:
-            places = dict.fromkeys(_between(run, halt.low, halt.high) for halt in loss.halts)
-            lifted.setdefault((loss.part, _listed(list(places))), []).append(loss)
-    for (part, at), together in lost.items():
-        numbers = arrays["contact_loss_number"][[joints.index(loss.joint) for loss in together]]
-        yield _lost(together, part, at, numbers, dial)
-    for (part, at), together in lifted.items():
-        yield finding_for("contact.lifted", _where(together), part=part, at=at, count=len(together))
-    for loss in losses:
-        if loss.loaded and len(loss.unsettled):
-            at, worst = dial.intervals(loss.unsettled), np.nanmax(arrays["seat_change"][loss.unsettled])
-            yield finding_for("seat.unsettled", _where([loss]), rounds=ROUNDS, at=at, change=worst)
+    run, loads, joints = seating.run, seating.loads, list(seating.run.system.joints)
+    yield from _unloaded(loads)
+    lost: dict[tuple[str, str], list[str]] = {}
+    lifted: dict[tuple[str, str], list[str]] = {}
+    for seat in run.seats:
+        joint, part = seat.joint, "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
+        crossings = [cross for cross in loads.passages if cross.end.seat.joint == joint]
+        halts = [_between(run, halt.low, halt.high) for halt in seating.halts if halt.joint == joint]
+        if crossings:
+            at = _listed([f"at {_at(run, cross.time)}{ENDS[cross.end.place]}" for cross in crossings])
+            lost.setdefault((part, at), []).append(joint)
+        elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
+            yield finding_for("seat.unloaded", f"joints.{joint}", part=part)
+        if halts:
+            lifted.setdefault((part, _listed(list(dict.fromkeys(halts)))), []).append(joint)
+    for (part, at), names in lost.items():
+        numbers = arrays["contact_loss_number"][[joints.index(name) for name in names]]
+        crossings = [cross for cross in loads.passages if cross.end.seat.joint in names]
+        yield _lost(names, crossings, part, at, numbers, dial)
+    for (part, at), names in lifted.items():
+        yield finding_for("contact.lifted", f"joints.{', '.join(names)}", part=part, at=at, count=len(names))
+    unsettled = (arrays["contact_lost"] > 0) & (seating.states(time) == UNSETTLED)
+    for i in np.flatnonzero(np.any(unsettled, axis=1)):
+        at, change = dial.intervals(np.flatnonzero(unsettled[i])), np.max(arrays["seat_change"][unsettled[i]])
+        yield finding_for("seat.unsettled", f"joints.{joints[i]}", rounds=ROUNDS, at=at, change=change)
 
 
-def _unloaded(losses: Sequence[Loss], run: Run) -> Iterator[Finding]:
+def _unloaded(loads: EndLoads) -> Iterator[Finding]:
     """The joints that bear no load over a range, with the end that does not where the other does."""
     ranges: dict[str, dict[str, str]] = {}
-    for loss in losses:
-        for end, low, high in loss.idle:
-            ends = ranges.setdefault(_between(run, low, high), {})
-            ends[loss.joint] = "" if loss.joint in ends else ENDS[end]
+    for end, low, high in loads.idle:
+        ends = ranges.setdefault(_between(loads.run, low, high), {})
+        ends[end.seat.joint] = "" if end.seat.joint in ends else ENDS[end.place]
     for text, ends in ranges.items():
         yield finding_for("contact.unloaded", "joints", joints=[name + end for name, end in ends.items()], at=text)
 
 
-def _lost(losses: Sequence[Loss], part: str, at: str, numbers: Array, dial: Dial) -> Finding:
+def _lost(
+    names: Sequence[str], crossings: Sequence[Crossing], part: str, at: str, numbers: Array, dial: Dial
+) -> Finding:
     """Of joints that lose contact at the same places: the load of that where it falls nearest to zero of its peak.
 
     numbers: of Earles and Wu, (joint, position).
     """
-    nearest = min((cross for loss in losses for cross in loss.crossings), key=lambda cross: cross.least / cross.peak)
+    nearest = min(crossings, key=lambda cross: cross.least / cross.peak)
     least = nearest.least if nearest.least > NO_LOAD * nearest.peak else 0.0  # less than that is rounding
     number, turning = None, ""
-    if losses[0].turns and np.any(np.isfinite(numbers)):
+    if part == "pin" and np.any(np.isfinite(numbers)):  # the load of a slider has no direction that can turn
         number = np.nanmax(numbers)
         turning = f"at {dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
     return finding_for(
-        "contact.lost", _where(losses), part=part, least=least, peak=nearest.peak, at=at, likely=EARLES_WU,
-        number=number, turning=turning, count=len(losses),
+        "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=at,
+        likely=EARLES_WU, number=number, turning=turning, count=len(names),
     )  # fmt: skip
 
 
@@ -195,10 +147,6 @@ def _between(run: Run, low: float, high: float) -> str:
     """A time, s, from and to, as positions are named."""
     first, last = _at(run, low), _at(run, high)
     return f"at {first}" if first == last else f"between {first} and {last}"
-
-
-def _where(losses: Sequence[Loss]) -> str:
-    return f"joints.{', '.join(loss.joint for loss in losses)}"
 
 
 def _at(run: Run, time: float) -> str:

@@ -259,6 +259,7 @@ class _Looking:
             seated = self.seats.at(time, self.method)
             arrays = self._filled(seated.back, time)
             self._stand_in(arrays, seated.valid, time)
+            arrays["status"] = np.where(seated.sticks, np.maximum(arrays["status"], Status.ZERO_SLIP), arrays["status"])
         else:
             arrays = self._filled((run.ideal if self.ideal else run.solve)(time, method=self.method), time)
             self._compare(arrays, time)

@@ -16,7 +16,6 @@ from trunnion.results.scales import Scales
 from trunnion.results.sentences import finding_for
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
-from trunnion.solve.seating import Seated
 from trunnion.solve.system import Dial, Positions, System, rubbing, sticking
 
 if TYPE_CHECKING:
@@ -46,7 +45,6 @@ class Causes:
     _locked: dict[int, list[tuple[Positions, NDArray[np.float64]]]] = field(default_factory=dict)
     _singular: dict[int, list[Positions]] = field(default_factory=dict)
     _undefined: dict[str, list[Positions]] = field(default_factory=dict)
-    _seats: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
     _stuck: list[Positions] = field(default_factory=list)
 
     def note(self, back: Backward, status: NDArray[np.int8], places: Positions) -> None:
@@ -72,19 +70,13 @@ class Causes:
                 if len(locked):
                     self._locked.setdefault(number, []).append((places[locked], share[locked]))
 
-    def note_seats(self, seated: Seated, first: int) -> None:
-        """Keep where the pins of one chunk lie, and where joints stick while pins travel."""
-        self._stuck.append(np.flatnonzero(seated.sticks) + first)
-        for path, numbers in seated.offsets.items():
-            self._seats.setdefault(path, []).append(numbers)
+    def note_sticking(self, positions: Positions) -> None:
+        """Keep where joints stick while pins travel."""
+        self._stuck.append(positions)
 
     def stuck(self) -> Positions:
         """Positions at which only the travel of seats decides the sense of a friction."""
         return np.concatenate(self._stuck) if self._stuck else np.zeros(0, np.intp)
-
-    def seats(self) -> dict[str, NDArray[np.float64]]:
-        """Offsets of the pins at all positions, by the names of `shifts`."""
-        return {path: np.concatenate(parts) for path, parts in self._seats.items()}
 
     def _note_singular(self, walk: Forward, status: NDArray[np.int8], places: Positions) -> None:
         """The module whose condition is the worst at each singular position."""

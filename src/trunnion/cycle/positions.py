@@ -24,7 +24,7 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import SETTLED, Seating, seating_of
+from trunnion.solve.seating import SETTLED, seating_of
 from trunnion.solve.system import Dial, Values
 
 __all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
@@ -43,7 +43,7 @@ def check_steps(steps: int) -> None:
 class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
-    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; walked: the
+    means: over the cycle; ideal: those of the mechanism without errors, if it has any; walked: the
     one walk that they all came of, where it was one and pins lie in no seats; course: that of the cycle, which does not
     depend on the positions, if it was looked for.
     """
@@ -56,7 +56,6 @@ class Positions:
     causes: diagnosis.Causes
     means: Means
     ideal: Means | None
-    losses: list[contact_loss.Loss]
     walked: Backward | None = None
     course: CycleCourse | None = None
 
@@ -119,14 +118,16 @@ def stretch(
         if progress:
             progress(window.stop)
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
-    resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
-    losses = contact_loss.find(arrays, seating_of(run, method), time) if run.seats else []
+    offsets = seating_of(run, method).offsets(time) if run.seats else {}
+    resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), offsets)
+    if run.seats:
+        contact_loss.find(arrays, seating_of(run, method), time)
     fill_of(run.system).unwrap(arrays, run.system, run.values, time)
     walked = back if steps <= min(LOOKED, CHUNK) and not run.seats else None
     means = still(arrays, run.system.mechanism)
     meant = still(ideal, run.system.mechanism) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, labels, time, dial, method, causes, means, meant, losses, walked)
+    return Positions(arrays, labels, time, dial, method, causes, means, meant, walked)
 
 
 def _refuse_seats(run: Run) -> None:
@@ -156,33 +157,19 @@ def _fill_as_built(
     fill_chunk(scratch, run.ideal(part, quick), part, slice(0, len(part)))
     for name, array in ideal.items():
         array[..., window] = scratch[name]
-    if run.seats:
-        back = _fill_seated(arrays, seating_of(run, method), part, window, method, causes)
-    else:
-        back = run.solve(part, method=method)
-        fill_chunk(arrays, back, part, window, causes)
+    seating = seating_of(run, method) if run.seats else None
+    seated = seating.at(part, method) if seating else None
+    back = seated.back if seated else run.solve(part, method=method)
+    fill_chunk(arrays, back, part, window, causes)
+    if seating and seated:
+        causes.note_sticking(np.flatnonzero(seated.sticks) + window.start)
+        arrays["seat_rounds"][window], arrays["seat_change"][window] = seating.rounds, seating.change[seated.states]
+        arrays["seat_travel"][window] = seated.states == SETTLED
+        status = arrays["status"][window]
+        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
     return back
-
-
-def _fill_seated(
-    arrays: Arrays,
-    seating: Seating,
-    time: NDArray[np.float64],
-    window: slice,
-    method: FrictionMethod,
-    causes: diagnosis.Causes,
-) -> Backward:
-    """One chunk with the pins in their seats, and how these came to be."""
-    seated = seating.at(time, method)
-    fill_chunk(arrays, seated.back, time, window, causes)
-    causes.note_seats(seated, window.start)
-    arrays["seat_rounds"][window], arrays["seat_change"][window] = seating.iterated(time)
-    arrays["seat_travel"][window] = seated.states == SETTLED
-    status = arrays["status"][window]
-    np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
-    return seated.back
 
 
 def _fill_compiled(

@@ -39,6 +39,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import Stated, stated_walk, useful_loads
 from trunnion.solve.margin import locking_margin
+from trunnion.solve.seating import seating_of
 from trunnion.solve.system import Dial, System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def findings(run: Run, at: Positions) -> tuple[list[Finding], near_locking.Locki
         *_beside_gaps(run.system, at.course),
         *(moved_jumps.findings(at.course, units) if at.course and run.erring else ()),
         *uncounted.findings(run, at.means),
-        *contact_loss.findings(at.losses, at.arrays, run, at.dial),
+        *(contact_loss.findings(at.arrays, seating_of(run, at.method), at.time, at.dial) if run.seats else ()),
     ], near
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
+from trunnion.algebra.course import ON_GRID, Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
@@ -33,7 +33,7 @@ from trunnion.solve.system import rubbing
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["NO_LOAD", "Crossing", "End", "EndLoads", "end_loads", "loads_of", "reactions"]
+__all__ = ["NO_LOAD", "Crossing", "End", "EndLoads", "end_loads", "loads_of", "plain", "reactions"]
 
 Array = NDArray[np.float64]
 NO_LOAD = 1e-9  # of the largest reaction: a load below it is rounding and presses nothing anywhere
@@ -51,7 +51,7 @@ class End(NamedTuple):
 
     seat: GivenSeat
     number: int
-    rows: slice
+    rows: list[int]
     radius: float
 
     @property
@@ -84,7 +84,7 @@ class Crossing(NamedTuple):
     @property
     def lasts(self) -> bool:
         """Whether the pin is on its way for a time."""
-        return self.high > self.low and self.end.rows.stop - self.end.rows.start > 1
+        return self.high > self.low and len(self.end.rows) > 1
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ class EndLoads:
     """The loads of a run's ends with every pin in the middle of its hole, over the cycle.
 
     courses: loads, N, in the frame of each hole; the size of all reactions, N; reaction of every joint, N; rates of the
-    joints whose sense of motion decides a load. ends: those that loads seat; total: row of the size; senses: rows of the
-    rates; vectors: of every joint, rows of what presses it: its reaction, in space the force on either end.
+    joints whose sense of motion decides a load. ends: those that loads seat; total: row of the size; senses: rows of
+    the rates; vectors: of every joint, rows of what presses it: its reaction, in space the force on either end.
     """
 
     run: Run
@@ -106,9 +106,9 @@ class EndLoads:
     @functools.cached_property
     def largest(self) -> float:
         """The largest size of all reactions in the cycle, N."""
-        return self.peak(slice(self.total, self.total + 1))
+        return self.peak([self.total])
 
-    def peak(self, rows: slice) -> float:
+    def peak(self, rows: list[int]) -> float:
         """The largest size of a vector of rows."""
         found = self.courses.extreme(lambda all_rows: _size(all_rows[rows]))
         return 0.0 if found is None else abs(found.value)
@@ -132,11 +132,14 @@ class EndLoads:
         """The times, s, from and to, in which nothing presses an end that is pressed elsewhere."""
         found = []
         for end, _ in self.pressed:
-            size = np.max(np.sum(np.abs(self.courses.coefficients[:, end.rows]), axis=-1), axis=-1)
-            empty = np.concatenate([[False], size <= NO_LOAD * self.largest, [False]])
-            turns = np.flatnonzero(empty[1:] != empty[:-1])
-            found += [(end, *self.courses.edges[turns[k : k + 2]].tolist()) for k in range(0, len(turns), 2)]
+            turns = np.flatnonzero(np.diff(self._empty(end), prepend=False, append=False))
+            found += [(end, low, high) for low, high in self.courses.edges[turns].reshape(-1, 2).tolist()]
         return found
+
+    def _empty(self, end: End) -> NDArray[np.bool_]:
+        """The panels in which nothing presses an end."""
+        sizes = np.sum(np.abs(self.courses.coefficients[:, end.rows]), axis=-1)
+        return np.asarray(np.max(sizes, axis=-1) <= NO_LOAD * self.largest)
 
     @functools.cached_property
     def rates(self) -> Courses:
@@ -172,7 +175,7 @@ class EndLoads:
                 own[:, lanes] = self.courses.at(time[lanes])[end.rows]
                 if cross.lasts:
                     floor[lanes] = cross.level
-        return tuple(own), floor
+        return tuple(np.asarray(row) for row in own), np.asarray(floor)
 
     @functools.cached_property
     def passages(self) -> list[Crossing]:
@@ -190,36 +193,31 @@ class EndLoads:
 
     def _jumps(self, end: End, peak: float) -> Iterator[Crossing]:
         """Where a load jumps to the other side of the hole."""
-        ends = np.array([self.courses.ends(row) for row in range(*end.rows.indices(len(self.courses.sizes)))])
+        ends = np.array([self.courses.ends(row) for row in end.rows])
         before, after = ends[:, 0], np.roll(ends[:, 1], -1, axis=1)  # of the last panel that after a period
         step = after - before
         with np.errstate(all="ignore"):
             share = np.clip(-np.sum(before * step, axis=0) / np.sum(step * step, axis=0), 0.0, 1.0)
         least = _size(before + share * step)
         over = (np.sum(before * after, axis=0) < 0) & (least <= JUMP * peak)
+        over &= np.minimum(_size(before), _size(after)) > self._level(end, self.courses.edges[1:])
         over[-1] &= self.run.cycle.periodic
-        for k in np.flatnonzero(
-            over & (np.minimum(_size(before), _size(after)) > self._level(end, self.courses.edges[1:]))
-        ):
+        for k in np.flatnonzero(over):
             time = float(self.courses.edges[k + 1])
             yield Crossing(end, time, time, time, float(least[k]), peak, 0.0)
 
     def _level(self, end: End, time: Array) -> Array:
         """The load of an end, N, that the play itself changes nearly as much as it is."""
         size = self.courses.at(time)[self.total]
-        play = end.radius / max(
-            _plain(self.run.system.size(self.run.values)), _plain(end.seat.play.length) * end.spread
-        )
+        play = end.radius / max(plain(self.run.system.size(self.run.values)), plain(end.seat.play.length) * end.spread)
         return np.asarray(CROSSING * play * np.maximum(np.nan_to_num(size), QUIET * self.largest))
 
     def _dips(self, end: End, peak: float) -> Iterator[Crossing]:
         """Where a load falls to zero within what the play changes of it, and rises again."""
-        courses, rows = self.courses, end.rows
-        shallow = np.min(_size(courses.coefficients[:, rows] @ COARSE, axis=1), axis=1) <= 2 * JUMP * peak
-        empty = np.max(np.sum(np.abs(courses.coefficients[:, rows]), axis=-1), axis=-1) <= NO_LOAD * self.largest
-        for k in np.flatnonzero(shallow & ~empty):
-            spots = _least(courses.coefficients[k, rows])
-            loads, rates = _there(courses.coefficients[k, rows], spots)
+        courses = self.courses
+        shallow = np.min(_size(courses.coefficients[:, end.rows] @ ON_GRID, axis=1), axis=1) <= 2 * JUMP * peak
+        for k in np.flatnonzero(shallow & ~self._empty(end)):
+            spots, loads, rates = _least(courses.coefficients[k, end.rows])
             times = courses.edges[k] + courses.half[k] * (spots + 1.0)
             level = self._level(end, np.clip(times, courses.edges[k], courses.edges[k + 1] * (1 - 1e-15)))
             for time, load, rate, most in zip(times, _size(loads), _size(rates) / courses.half[k], level, strict=True):
@@ -227,9 +225,6 @@ class EndLoads:
                     reach = min(np.sqrt(most**2 - load**2) / max(rate, 1e-300), WIDEST * courses.span)
                     low, high = np.clip([time - reach, time + reach], courses.edges[0], courses.edges[-1])
                     yield Crossing(end, float(time), float(low), float(high), float(load), peak, float(most))
-
-
-COARSE = chebyshev.chebvander(np.linspace(-1.0, 1.0, 49), 11).T
 
 
 def _merged(crossings: list[Crossing]) -> list[Crossing]:
@@ -244,8 +239,9 @@ def _merged(crossings: list[Crossing]) -> list[Crossing]:
     return found
 
 
-def _least(coefficients: Array) -> Array:
-    """Places of a panel at which a vector, (component, coefficient), is least: inside, or at an end of the panel."""
+def _least(coefficients: Array) -> tuple[Array, Array, Array]:
+    """Places of a panel at which a vector, (component, coefficient), is least, inside or at an end of the panel; the
+    vector there, and its derivative by the place."""
     slope = functools.reduce(
         chebyshev.chebadd, (chebyshev.chebmul(part, chebyshev.chebder(part)) for part in coefficients)
     )
@@ -253,15 +249,12 @@ def _least(coefficients: Array) -> Array:
     real = np.real(roots[(np.abs(np.imag(roots)) <= 1e-4) & (np.abs(np.real(roots)) <= 1.0 + EDGE)])
     spots = np.unique(np.clip(np.concatenate([real, [-1.0, 1.0]]), -1.0, 1.0))
     bends = chebyshev.chebval(spots, chebyshev.chebder(slope)) if len(slope) > 1 else np.zeros(len(spots))
-    return np.asarray(spots[(bends > 0) | (np.abs(spots) == 1.0)])
+    spots = spots[(bends > 0) | (np.abs(spots) == 1.0)]
+    values, slopes = (chebyshev.chebval(spots, part) for part in (coefficients.T, chebyshev.chebder(coefficients.T)))
+    return spots, np.asarray(values), np.asarray(slopes)
 
 
-def _there(coefficients: Array, spots: Array) -> tuple[Array, Array]:
-    """A vector and its derivative by the place in the panel."""
-    return chebyshev.chebval(spots, coefficients.T), chebyshev.chebval(spots, chebyshev.chebder(coefficients.T))
-
-
-def _plain(number: Number) -> float:
+def plain(number: Number) -> float:
     """A number that does not change along the way."""
     return float(np.ravel(np.asarray(primal(number), float))[0])
 
@@ -305,7 +298,7 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
     ends, first = [], 0
     for seat in seats:
         for number, (end, radius) in enumerate(zip(seat.play.model.ends, seat.play.radii, strict=True)):
-            ends.append(End(seat, number, slice(first, first + len(end)), _plain(radius)))
+            ends.append(End(seat, number, list(range(first, first + len(end))), plain(radius)))
             first += len(end)
     rates = first + 1 + count * len(system.joints)
     senses, last = {}, rates
@@ -338,6 +331,6 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
 
 def _on_ends(ends: Sequence[End]) -> list[list[int]]:
     """Rows of the force on either end of a pin, across its axis."""
-    places = {place: [row for end in ends if end.seat.play.model.ends[end.number][0][0] == place
-                      for row in range(end.rows.start, end.rows.stop)] for place in "12"}  # fmt: skip
-    return [rows for rows in places.values() if rows]
+    places = [end.seat.play.model.ends[end.number][0][0] for end in ends]
+    rows = ([row for end, at in zip(ends, places, strict=True) if at == place for row in end.rows] for place in "12")
+    return [one for one in rows if one]

@@ -110,8 +110,8 @@ class EndLoads:
 
     def peak(self, rows: list[int]) -> float:
         """The largest size of a vector of rows."""
-        found = self.courses.extreme(lambda all_rows: _size(all_rows[rows]))
-        return 0.0 if found is None else abs(found.value)
+        most = self.courses.extreme(lambda all_rows: _size(all_rows[rows]))
+        return 0.0 if most is None else abs(most.value)
 
     @functools.cached_property
     def pressed(self) -> list[tuple[End, float]]:
@@ -122,19 +122,19 @@ class EndLoads:
     @functools.cached_property
     def crossings(self) -> list[Crossing]:
         """Where pins cross their holes, in the order of time; those of each end that touch are one."""
-        found = []
+        crossings = []
         for end, peak in self.pressed:
-            found += [*self._jumps(end, peak), *_merged(list(self._dips(end, peak)))]
-        return sorted(found, key=lambda crossing: crossing.time)
+            crossings += [*self._jumps(end, peak), *_merged(list(self._dips(end, peak)))]
+        return sorted(crossings, key=lambda crossing: crossing.time)
 
     @functools.cached_property
     def idle(self) -> list[tuple[End, float, float]]:
         """The times, s, from and to, in which nothing presses an end that is pressed elsewhere."""
-        found = []
+        times = []
         for end, _ in self.pressed:
             turns = np.flatnonzero(np.diff(self._empty(end), prepend=False, append=False))
-            found += [(end, low, high) for low, high in self.courses.edges[turns].reshape(-1, 2).tolist()]
-        return found
+            times += [(end, low, high) for low, high in self.courses.edges[turns].reshape(-1, 2).tolist()]
+        return times
 
     def _empty(self, end: End) -> NDArray[np.bool_]:
         """The panels in which nothing presses an end."""
@@ -158,7 +158,8 @@ class EndLoads:
             for rows in (courses.at(time), courses.at(after))
         ]
         return {
-            joint: np.where(senses[0][own] != 0, senses[0][own], senses[1][own]) for joint, own in self.senses.items()
+            joint: np.where(senses[0][rows] != 0, senses[0][rows], senses[1][rows])
+            for joint, rows in self.senses.items()
         }
 
     def across(self, end: End, time: Array, load: Sequence[Number], least: Array) -> tuple[tuple[Array, ...], Array]:
@@ -167,15 +168,15 @@ class EndLoads:
         That of pins in the middle while the pin crosses its hole: it lies as far off the middle as the load is of that
         with which it leaves the wall.
         """
-        own = np.array([np.broadcast_to(primal(part), time.shape) for part in load], float)
+        parts = np.array([np.broadcast_to(primal(part), time.shape) for part in load], float)
         floor = np.broadcast_to(least, time.shape).copy()
         for cross in self.crossings:
             lanes = (time > cross.low) & (time < cross.high)
             if cross.end == end and np.any(lanes):
-                own[:, lanes] = self.courses.at(time[lanes])[end.rows]
+                parts[:, lanes] = self.courses.at(time[lanes])[end.rows]
                 if cross.lasts:
                     floor[lanes] = cross.level
-        return tuple(np.asarray(row) for row in own), np.asarray(floor)
+        return tuple(np.asarray(row) for row in parts), np.asarray(floor)
 
     @functools.cached_property
     def passages(self) -> list[Crossing]:
@@ -229,14 +230,14 @@ class EndLoads:
 
 def _merged(crossings: list[Crossing]) -> list[Crossing]:
     """Those that touch as one, of the least load of them."""
-    found: list[Crossing] = []
-    for crossing in sorted(crossings, key=lambda one: one.low):
-        if found and crossing.low <= found[-1].high:
-            last = found.pop()
-            least = min(last, crossing, key=lambda one: one.least)
+    merged: list[Crossing] = []
+    for crossing in sorted(crossings, key=lambda crossing: crossing.low):
+        if merged and crossing.low <= merged[-1].high:
+            last = merged.pop()
+            least = min(last, crossing, key=lambda crossing: crossing.least)
             crossing = least._replace(low=last.low, high=max(last.high, crossing.high))
-        found.append(crossing)
-    return found
+        merged.append(crossing)
+    return merged
 
 
 def _least(coefficients: Array) -> tuple[Array, Array, Array]:
@@ -271,13 +272,13 @@ def loads_of(back: Backward, seat: GivenSeat) -> list[tuple[Number, ...]]:
 
 def _sensed(run: Run) -> list[str]:
     """Joints whose sense of motion decides a friction or a load, each contact of them that of one freedom."""
-    system, found = run.system, []
+    system, joints = run.system, []
     for joint in dict.fromkeys([*rubbing(system), *system.resisted]):
         pair, friction = PAIRS[system.joints[joint][0]], system.mechanism.effective_joints[joint].friction
         summed = friction is not None and friction.model == "pezzuti" and joint not in system.resisted
         if pair.one_axis and (len(pair.freedoms) == 1 or summed):
-            found.append(joint)
-    return found
+            joints.append(joint)
+    return joints
 
 
 def reactions(back: Backward, loads: Sequence[Number]) -> Number:
@@ -333,4 +334,4 @@ def _on_ends(ends: Sequence[End]) -> list[list[int]]:
     """Rows of the force on either end of a pin, across its axis."""
     places = [end.seat.play.model.ends[end.number][0][0] for end in ends]
     rows = ([row for end, at in zip(ends, places, strict=True) if at == place for row in end.rows] for place in "12")
-    return [one for one in rows if one]
+    return [part for part in rows if part]

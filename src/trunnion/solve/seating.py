@@ -81,15 +81,15 @@ class Halt(NamedTuple):
 class Seating:
     """The seats of a run over its cycle.
 
-    given: offsets that are stated; loads: of pins in the middle; courses: offsets of the pins that loads seat, m, by
-    `paths`, then what their travel adds to the twist and to the acceleration of each of `links`; halts: in which pins
-    are held; turned: times, s, from and to, in which the travel turns round the sense of a joint, (2, time); rounds:
-    most that any seat took, and the largest change, of its clearance, that one more would make, by state.
+    fixed: offsets that the model states; loads: of pins in the middle; courses: offsets of the pins that loads seat, m,
+    by `paths`, then what their travel adds to the twist and to the acceleration of each of `links`; halts: in which
+    pins are held; turned: times, s, from and to, in which the travel turns round the sense of a joint, (2, time);
+    rounds: most that any seat took, and the largest change, of its clearance, that one more would make, by state.
     """
 
     run: Run
     method: FrictionMethod
-    given: dict[str, float]
+    fixed: dict[str, float]
     loads: EndLoads
     courses: Courses
     paths: Sequence[str]
@@ -128,8 +128,8 @@ class Seating:
         return np.nan_to_num(self.courses.at(time))
 
     def _placed(self, rows: Array) -> dict[str, Array]:
-        stated = {path: np.full(rows.shape[1], number) for path, number in self.given.items()}
-        return stated | dict(zip(self.paths, rows, strict=False))
+        fixed = {path: np.full(rows.shape[1], number) for path, number in self.fixed.items()}
+        return fixed | dict(zip(self.paths, rows, strict=False))
 
     def states(self, time: Array) -> NDArray[np.intp]:
         """How the seats of times, s, came to be."""
@@ -163,7 +163,7 @@ def _seating(run: Run, method: FrictionMethod) -> Seating:
         courses = Courses(edges, np.zeros((1, 0, ORDER)), np.zeros(1, np.intp), edges, np.zeros(0), 0)
     courses, links, halts, turned = settling.travelling(courses)
     return Seating(
-        run, method, settling.given, settling.loads, courses, settling.paths, links, halts, turned, settling.rounds,
+        run, method, settling.fixed, settling.loads, courses, settling.paths, links, halts, turned, settling.rounds,
         settling.change,
     )  # fmt: skip
 
@@ -173,11 +173,11 @@ class _Settling:
 
     def __init__(self, run: Run, method: FrictionMethod) -> None:
         self.run, self.method, self.loads = run, method, end_loads(run, method)
-        self.given: dict[str, float] = {}
+        self.fixed: dict[str, float] = {}
         for seat in run.seats:
             if seat.given is not None:
-                stated = seat.play.model.paths(f"seats.{seat.joint}", seat.given)
-                self.given |= {path: plain(number) for path, number in stated.items()}
+                offsets = seat.play.model.paths(f"seats.{seat.joint}", seat.given)
+                self.fixed |= {path: plain(number) for path, number in offsets.items()}
         self.seats = [seat for seat in run.seats if seat.given is None]
         self.paths = [f"seats.{seat.joint}.{key}" for seat in self.seats for end in seat.play.model.ends for key in end]
         self.rounds, self.change = 0, np.zeros(4)
@@ -252,19 +252,19 @@ class _Settling:
         offsets[:, change > TOLERANCE] = smooth[:, change > TOLERANCE]
         return offsets, rounds, change, unknown
 
-    def _held(self, time: Array, offsets: Array) -> Backward:
+    def _static(self, time: Array, offsets: Array) -> Backward:
         """Motion and forces with the pins held at offsets, in the sense of the motion without play."""
         senses: dict[str, Sense] = {joint: tuple(rows) for joint, rows in self.loads.sensed(time).items()}
         return self.run.at(time, self._placed(offsets), self.method, senses, rests=dict.fromkeys(senses, False))
 
     def _placed(self, offsets: Array) -> dict[str, Array | float]:
-        return {**self.given, **dict(zip(self.paths, offsets, strict=True))}
+        return {**self.fixed, **dict(zip(self.paths, offsets, strict=True))}
 
     def _pressed(self, time: Array, offsets: Array) -> Array:
         """Where the loads press the pins that are held at offsets, friction taken into account; NaN without loads."""
-        back, senses = self._held(time, offsets), self.loads.sensed(time)
+        back, senses = self._static(time, offsets), self.loads.sensed(time)
         loads = {seat.joint: loads_of(back, seat) for seat in self.seats}
-        size = reactions(back, [part for own in loads.values() for load in own for part in load])
+        size = reactions(back, [part for ends in loads.values() for load in ends for part in load])
         least = NO_LOAD * np.maximum(size, IDLE * self.loads.largest)
         seats = np.zeros_like(offsets) + 0.0 * size
         for end in self.loads.ends:
@@ -281,15 +281,15 @@ class _Settling:
         ways = [np.linalg.norm((after - before)[end.rows], axis=0) / end.radius for end in self.loads.ends]
         return np.asarray(functools.reduce(np.maximum, ways, np.zeros(before.shape[1])))
 
-    def _extrapolated(self, before: Array, after: Array, here: Array, there: Array) -> Array:
-        """The seats to which two rounds, before → after and here → there, lead if the map between is a straight one; as
+    def _extrapolated(self, before: Array, after: Array, here: Array, goal: Array) -> Array:
+        """The seats to which two rounds, before → after and here → goal, lead if the map between is a straight one; as
         far from the middle as the last."""
-        step, last = there - here, after - before
+        step, last = goal - here, after - before
         square = np.sum((step - last) ** 2, axis=0)
         share = np.sum(step * (step - last), axis=0) / np.where(square > 0, square, np.inf)
-        ahead = np.asarray(there - share * (there - after))
+        ahead = np.asarray(goal - share * (goal - after))
         for end in self.loads.ends:
-            size, far = (np.linalg.norm(place[end.rows], axis=0) for place in (ahead, there))
+            size, far = (np.linalg.norm(place[end.rows], axis=0) for place in (ahead, goal))
             ahead[end.rows] *= np.where(size > 0, far / np.where(size > 0, size, 1.0), 0.0)
         return ahead
 
@@ -306,16 +306,18 @@ class _Settling:
         if not (self.loads.pressed and np.any(settled)):
             return courses, [], [], np.zeros((2, 0))
         time, offsets = courses.nodes(settled), courses.on_nodes(settled)
-        rates, back = courses.rates(offsets, settled), self._held(time, offsets)
-        held, middle = back.walk.motions, run.walk(time).motions
+        rates, back = courses.rates(offsets, settled), self._static(time, offsets)
+        static, middle = back.walk.motions, run.walk(time).motions
         places = {path: Dual(*both) for path, *both in zip(self.paths, offsets, rates, strict=True)}
-        twists = _added_twists(run, {**run.values, **self.given, **places}, time) if np.any(rates) else {}
+        twists = _added_twists(run, {**run.values, **self.fixed, **places}, time) if np.any(rates) else {}
         travel, more = {}, np.zeros((0, len(time)))
         for link, twist in twists.items():
-            rows = [_rows(part, time) for part in (twist, *held[link][1:], *middle[link][1:])]
+            rows = [_rows(part, time) for part in (twist, *static[link][1:], *middle[link][1:])]
             added = courses.rates(rows[1] + rows[0] - rows[3], settled) + rows[4] - rows[2]
             both = np.nan_to_num([rows[0], added])
-            travel[link] = Travel(*(_shaped(part, own) for part, own in zip(held[link][1:], both, strict=True)))
+            travel[link] = Travel(
+                *(_shaped(part, numbers) for part, numbers in zip(static[link][1:], both, strict=True))
+            )
             more = np.concatenate([more, *both])
         moving = run.at(time, self._placed(offsets), self.method, travel=travel)
         joints = dict.fromkeys(end.seat.joint for end, _ in self.loads.pressed)
@@ -332,13 +334,13 @@ class _Settling:
         signs = []
         for end, peak in self.loads.pressed:
             if end.seat.joint == joint:
-                held, moved = (
+                static, moved = (
                     _rows(tuple(loads_of(walk, end.seat)[end.number]), time) / peak for walk in (back, moving)
                 )
-                sizes = np.linalg.norm(held, axis=0) * np.linalg.norm(moved, axis=0)
-                signs.append(np.sum(held * offsets[end.rows], axis=0) / end.radius)
-                signs.append(np.sum(held * moved, axis=0) - ASIDE * sizes)
-                signs.append(np.sum(held**2 - ((moved - held) / MOST) ** 2, axis=0))
+                sizes = np.linalg.norm(static, axis=0) * np.linalg.norm(moved, axis=0)
+                signs.append(np.sum(static * offsets[end.rows], axis=0) / end.radius)
+                signs.append(np.sum(static * moved, axis=0) - ASIDE * sizes)
+                signs.append(np.sum(static**2 - ((moved - static) / MOST) ** 2, axis=0))
         return signs
 
     def _senses(self, time: Array, moving: Backward) -> list[Array]:
@@ -357,9 +359,9 @@ def _below(courses: Courses, signs: Sequence[Array]) -> Array:
     rows = np.arange(first, first + len(signs))
     if not len(rows):
         return np.zeros((2, 0))
-    judged = courses.extended(np.nan_to_num(signs, nan=1.0), courses.states == SETTLED, elsewhere=1.0)
-    times = np.unique(np.concatenate([courses.edges, *(judged.passages(row) for row in rows)]))
-    below = np.any(judged.at((times[1:] + times[:-1]) / 2)[rows] < -ROUNDING, axis=0)
+    marked = courses.extended(np.nan_to_num(signs, nan=1.0), courses.states == SETTLED, elsewhere=1.0)
+    times = np.unique(np.concatenate([courses.edges, *(marked.passages(row) for row in rows)]))
+    below = np.any(marked.at((times[1:] + times[:-1]) / 2)[rows] < -ROUNDING, axis=0)
     return np.asarray(times[np.flatnonzero(np.diff(below, prepend=False, append=False))].reshape(-1, 2).T)
 
 

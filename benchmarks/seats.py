@@ -1,7 +1,7 @@
 """What loaded seats cost: `analyse` with its pins where their loads press them, beside the ideal analysis of the same.
 
 Both are the whole of `trunnion.analyse`, Dataset and findings included, in turns; what the seats add is counted in
-times of the ideal analysis. The seats take the ideal mechanism, the rounds, the travel of the seats and the last walk.
+times of the ideal analysis. The seats take their courses, and at each position the ideal mechanism and one walk.
 """
 
 from __future__ import annotations

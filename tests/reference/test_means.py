@@ -11,7 +11,6 @@ import pytest
 
 import trunnion
 from trunnion import Mechanism
-from trunnion.cycle import contact_loss
 from trunnion.cycle.summary import balance
 from trunnion.errors import Status
 from trunnion.measures.measures import named
@@ -19,6 +18,7 @@ from trunnion.results.attributes import summary_of
 from trunnion.results.quantities import quantity
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import Mechanisms, edges
 from trunnion.views.cycle.deviations_tables import error_rows
 
@@ -202,7 +202,7 @@ def test_extremes_are_of_positions_that_are_valid(model: str) -> None:
     assert np.any(lost)
     sizes, fine = (np.sqrt((one["reaction_force"].values ** 2).sum(axis=1)) for one in (result, dense))
     rows = {row.name: row.value for row in summary_of(result)}
-    low, high = contact_loss.gaps(prepare(mechanism))[..., None]
+    low, high = seating_of(prepare(mechanism)).gaps[..., None]
     kept = ~np.any((low < dense["time"].values) & (dense["time"].values < high), axis=0)
     for size, joint in zip(fine, result["joint"].values, strict=True):
         assert rows[f"{joint}.reaction_max"] == pytest.approx(np.max(size[kept]), rel=1e-3)

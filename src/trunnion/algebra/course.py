@@ -30,6 +30,7 @@ Solve = Callable[[Labels, Array], tuple[Array, NDArray[np.integer]]]
 
 ORDER = 12  # coefficients of a panel
 POINTS = -np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
+ON_POINTS = chebyshev.chebvander(POINTS, ORDER - 1).T
 FIT = np.linalg.inv(chebyshev.chebvander(POINTS, ORDER - 1))
 GRID = np.linspace(-1.0, 1.0, 49)  # places of a panel among which extremes are looked for first
 ON_GRID = chebyshev.chebvander(GRID, ORDER - 1).T
@@ -147,12 +148,18 @@ class Courses:
         tails: Array = np.max(np.abs(self.coefficients[..., -2:]), axis=-1)
         return tails
 
+    def panel(self, time: Array) -> Labels:
+        """The panel of every time, s; at an edge that after it."""
+        return np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.half) - 1)
+
     def at(self, time: Array) -> Array:
         """The rows at times, s, (row, time); at a break those after it."""
-        panel = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.half) - 1)
-        spot = (time - self.edges[panel]) / self.half[panel] - 1.0
-        basis = chebyshev.chebvander(spot, ORDER - 1)
-        rows: Array = np.einsum("tc,trc->rt", basis, self.coefficients[panel])
+        panel = self.panel(time)
+        basis = chebyshev.chebvander((time - self.edges[panel]) / self.half[panel] - 1.0, ORDER - 1)
+        rows = np.empty((self.coefficients.shape[1], len(time)))
+        order = np.argsort(panel, kind="stable")
+        for lanes in np.split(order, np.flatnonzero(np.diff(panel[order])) + 1) if len(time) else []:
+            rows[:, lanes] = self.coefficients[panel[lanes[0]]] @ basis[lanes].T
         return rows
 
     def share(self, panels: NDArray[np.bool_]) -> float:
@@ -289,6 +296,29 @@ class Courses:
         """The values at the end and at the begin of every panel."""
         ends = self.coefficients[:, row] @ ENDS
         return ends[:, 1], ends[:, 0]
+
+    def nodes(self, panels: NDArray[np.bool_]) -> Array:
+        """Times, s, through whose values the polynomials of some panels go, in a row."""
+        nodes: Array = self.edges[:-1][panels, None] + self.half[panels, None] * (POINTS + 1.0)
+        return nodes.ravel()
+
+    def on_nodes(self, panels: NDArray[np.bool_]) -> Array:
+        """The rows at these times."""
+        values = self.coefficients[panels] @ ON_POINTS  # (panel, row, node)
+        return np.moveaxis(values, 1, 0).reshape(values.shape[1], values.shape[0] * ORDER)
+
+    def rates(self, rows: Array, panels: NDArray[np.bool_]) -> Array:
+        """The rates, at these times, of rows by their values there, (row, time)."""
+        slopes = chebyshev.chebder(_fitted(rows), axis=-1) / self.half[panels, None]
+        return np.asarray(slopes @ ON_POINTS[:-1]).reshape(rows.shape)
+
+    def extended(self, rows: Array, panels: NDArray[np.bool_], elsewhere: float = 0.0) -> Courses:
+        """With more rows, by their values at these times; a number on all other panels."""
+        more = np.zeros((len(self.half), len(rows), ORDER))
+        more[..., 0] = elsewhere
+        more[panels] = np.moveaxis(_fitted(rows), 0, 1)
+        sizes = np.concatenate([self.sizes, np.max(np.abs(rows), axis=1, initial=0.0)])
+        return replace(self, coefficients=np.concatenate([self.coefficients, more], axis=1), sizes=sizes)
 
     def derivative(self) -> Courses:
         """The courses of the rates of all rows."""
@@ -463,6 +493,11 @@ class _Resolving:
         breaks = np.unique(np.concatenate([self._breaks[k], changes]))
         states, sizes = panels.labels // 2, self._sizes[:, k]
         return Courses(edges, panels.coefficients, states, breaks, sizes, int(self._asked[k]))
+
+
+def _fitted(rows: Array) -> Array:
+    """Polynomials through values at the nodes of panels, (row, panel, coefficient)."""
+    return np.asarray(rows.reshape(len(rows), rows.shape[1] // ORDER, ORDER) @ FIT.T)
 
 
 def _between(edges: Sequence[Array], mechanism: Labels) -> tuple[Labels, Array, Array]:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses, Place
 from trunnion.algebra.quadrature import CANCELLED
-from trunnion.cycle import contact_loss
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.fill import allocate
 from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
@@ -27,13 +26,12 @@ from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import around
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run
-from trunnion.solve.seating import settle
+from trunnion.solve.seating import seating_of
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS, SEATED, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import System
@@ -47,7 +45,6 @@ POWERS = ("drive_power", "useful_power", "friction_power", "power_residual")
 FORCES = ("drive_effort", "reaction_force", "reaction_moment", "drive_effort_change")
 FOLLOWED = ("drive_effort", *POWERS, "reaction_force")
 COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "drive_effort_change")
-HELD = 16  # beside the status of panels in which accelerations leave out the travel of seats
 SIDE = 1e-7  # of the cycle: beside a break
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther, and said to be there
 CLOSE = 1e-10  # of the cycle: breaks that are one
@@ -79,7 +76,7 @@ class CycleCourse:
     @cached_property
     def status(self) -> NDArray[np.intp]:
         """Of every panel."""
-        return np.asarray(self.courses.states % HELD)
+        return np.asarray(self.courses.states)
 
     @cached_property
     def sound(self) -> NDArray[np.bool_]:
@@ -288,10 +285,9 @@ class _Looking:
 
     def __init__(self, run: Run, method: FrictionMethod, ideal: bool, names: tuple[str, ...]) -> None:
         self.run, self.method, self.ideal = run, method, ideal
-        self.seats = bool(run.seats) and not ideal
+        self.seats = seating_of(run, method) if run.seats and not ideal else None
         self.errs = run.erring and not ideal
         self.shapes: dict[str, tuple[int, ...]] = {}
-        self._gaps = contact_loss.gaps(run) if self.seats else np.zeros((2, 0))
         self._names = names
 
     def breaks(self) -> Array:
@@ -303,16 +299,16 @@ class _Looking:
         if run.erring:
             without = Mechanisms(run.system, run.chosen.assembly, run.ideal_values, [run.cycle])
             bends += [bend.time for bend in stated_bends(without)]
-        return breaks_between(run.cycle, np.concatenate([bends, self._gaps.ravel()]))
+        return breaks_between(run.cycle, np.concatenate([bends, self.seats.breaks if self.seats else []]))
 
     def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
         """Rows and statuses at times, s."""
         run, time = self.run, time if self.run.cycle.duration > 0 else 0.0 * time
         if self.seats:
-            seated = settle(run, around(time, run.cycle), self.method)
+            seated = self.seats.at(time, self.method)
             arrays = self._filled(seated.back, time)
-            self._stand_in(arrays, contact_loss.valid(seated, run, self._gaps, time), time)
-            arrays["status"] = arrays["status"] + np.where(seated.told, 0, HELD)
+            self._stand_in(arrays, seated.valid, time)
+            arrays["status"] = np.where(seated.sticks, np.maximum(arrays["status"], Status.ZERO_SLIP), arrays["status"])
         else:
             arrays = self._filled((run.ideal if self.ideal else run.solve)(time, method=self.method), time)
             self._compare(arrays, time)
@@ -325,9 +321,9 @@ class _Looking:
         if not self.seats:
             back = self.run.solve(time, method=self.method)
             return back, status_of(back, time.shape)
-        seated = settle(self.run, around(time, self.run.cycle), self.method)
-        status, valid = status_of(seated.back, time.shape), contact_loss.valid(seated, self.run, self._gaps, time)
-        return seated.back, np.where(valid, status, np.maximum(status, Status.CONTACT_LOST))
+        seated = self.seats.at(time, self.method)
+        status = status_of(seated.back, time.shape)
+        return seated.back, np.where(seated.valid, status, np.maximum(status, Status.CONTACT_LOST))
 
     def _filled(self, back: Backward, time: Array) -> Arrays:
         """The variables of a walk at times, s."""

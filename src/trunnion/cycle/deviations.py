@@ -12,8 +12,8 @@ from trunnion.cycle.fill import Into
 from trunnion.joints.clearance import describing
 from trunnion.model.contact import clearance
 from trunnion.solve.backward import Backward
+from trunnion.solve.end_loads import loads_of
 from trunnion.solve.forward import Forward
-from trunnion.solve.seating import loads_of
 from trunnion.solve.seats import GivenSeat, seats
 
 __all__ = ["COMPARED", "fill_errors", "fill_seats"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -50,7 +50,6 @@ class Causes:
     _locked: dict[int, list[tuple[Positions, NDArray[np.float64]]]] = field(default_factory=dict)
     _singular: dict[int, list[Positions]] = field(default_factory=dict)
     _undefined: dict[str, list[Positions]] = field(default_factory=dict)
-    _seats: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
     _stuck: list[Positions] = field(default_factory=list)
 
     def note(self, back: Backward, status: NDArray[np.int8], places: Positions) -> None:
@@ -76,19 +75,13 @@ class Causes:
                 if len(locked):
                     self._locked.setdefault(number, []).append((places[locked], share[locked]))
 
-    def note_seats(self, offsets: Mapping[str, NDArray[np.float64]], sticks: NDArray[np.bool_], offset: int) -> None:
-        """Keep where the pins of one chunk lie, and where joints stick while pins travel."""
-        self._stuck.append(np.flatnonzero(sticks) + offset)
-        for path, numbers in offsets.items():
-            self._seats.setdefault(path, []).append(numbers)
+    def note_sticking(self, positions: Positions) -> None:
+        """Keep where joints stick while pins travel."""
+        self._stuck.append(positions)
 
     def stuck(self) -> Positions:
         """Positions at which only the travel of seats decides the sense of a friction."""
         return np.concatenate(self._stuck) if self._stuck else np.zeros(0, np.intp)
-
-    def seats(self) -> dict[str, NDArray[np.float64]]:
-        """Offsets of the pins at all positions, by the names of `shifts`."""
-        return {path: np.concatenate(parts) for path, parts in self._seats.items()}
 
     def _note_singular(self, walk: Forward, status: NDArray[np.int8], places: Positions) -> None:
         """The module whose condition is the worst at each singular position."""

@@ -33,6 +33,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve import loads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
 from trunnion.solve.memory import in_blocks
+from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import System, felt, rubbing
 
@@ -327,7 +328,9 @@ def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
 def _lost_contacts(cycle: Cycle) -> Iterable[Finding]:
     """Pins that lose contact."""
     at = cycle.at
-    return contact_loss.findings(at.losses, at.arrays, list(cycle.run.system.joints), at.dial)
+    if not cycle.run.seats:
+        return ()
+    return contact_loss.findings(at.arrays, seating_of(cycle.run, at.method), at.time, at.dial)
 
 
 def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:

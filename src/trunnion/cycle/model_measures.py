@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
-from trunnion.cycle import contact_loss
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
@@ -22,6 +21,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
+from trunnion.solve.seating import seating_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,7 +143,7 @@ def _extremes(run: Run, measures: Sequence[Measure], method: FrictionMethod) -> 
     single = [one for one in measures if one.single(run.system)]
     if not single:
         return {}
-    gaps = contact_loss.gaps(run) if run.seats and run.cycle.duration > 0 else None
+    gaps = seating_of(run, method).gaps if run.seats else None
     ends = [
         figures_of(run, [replace(one, statistic=statistic) for one in single], method, gaps)
         for statistic in ("minimum", "maximum")

@@ -18,11 +18,10 @@ from trunnion.cycle.means import IDEAL, Means, still
 from trunnion.cycle.unanswered import blank
 from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Finding, MechanismError, Status
-from trunnion.solve.eccentricity_rate import Lanes, lanes
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
-from trunnion.solve.seating import Seated, settle
+from trunnion.solve.seating import SETTLED, seating_of
 from trunnion.solve.system import Dial, Values
 
 __all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
@@ -41,8 +40,8 @@ def check_steps(steps: int) -> None:
 class Positions:
     """What every position of a cycle came to, before the books of the cycle are made of it.
 
-    means: over the cycle; ideal: those of the mechanism without errors, if it has any; losses: of contact; course: that
-    of the cycle, which does not depend on the positions, if it was looked for.
+    means: over the cycle; ideal: those of the mechanism without errors, if it has any; course: that of the cycle, which
+    does not depend on the positions, if it was looked for.
     """
 
     arrays: Arrays
@@ -53,7 +52,6 @@ class Positions:
     causes: diagnosis.Causes
     means: Means
     ideal: Means | None
-    losses: list[contact_loss.Loss]
     course: CycleCourse | None = None
 
 
@@ -113,13 +111,15 @@ def stretch(
         if progress:
             progress(window.stop)
     quick = replace(method, margin_up_to=0.0)  # the margin is known by now
-    resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), causes.seats())
-    losses = contact_loss.find(arrays, run, time) if run.seats else []
+    offsets = seating_of(run, method).offsets(time) if run.seats else {}
+    resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), offsets)
+    if run.seats:
+        contact_loss.find(arrays, seating_of(run, method), time)
     unwrap(arrays, run.system, run.values, time)
     means = still(arrays, run.system.mechanism)
     meant = still(ideal, run.system.mechanism) if run.erring else None
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, names, time, dial, method, causes, means, meant, losses)
+    return Positions(arrays, names, time, dial, method, causes, means, meant)
 
 
 def _refuse_seats(run: Run) -> None:
@@ -144,34 +144,22 @@ def _fill_as_built(
 ) -> None:
     """One chunk of a mechanism with errors beside the ideal one."""
     part, quick = time[window], replace(method, margin_up_to=0.0)
-    seen = lanes(part, run.cycle) if run.seats else Lanes(part, np.arange(len(part)), 0)
-    scratch = allocate(run.system, len(seen.times), wanted={*IDEAL, *COMPARED})
-    meant = run.ideal(seen.times, quick)
-    fill_chunk(scratch, meant, seen.times, slice(0, len(seen.times)))
-    own = slice(int(seen.own[0]), int(seen.own[-1]) + 1)
-    scratch = {name: array[..., own] for name, array in scratch.items()}
+    scratch = allocate(run.system, len(part), wanted={*IDEAL, *COMPARED})
+    fill_chunk(scratch, run.ideal(part, quick), part, slice(0, len(part)))
     for name, array in ideal.items():
         array[..., window] = scratch[name]
-    if run.seats:
-        seated = settle(run, seen, method, meant)
-        back = seated.back
-        fill_chunk(arrays, back, part, window, causes)
-        _note_seats(arrays, seated, window, causes)
-    else:
-        back = run.solve(part, method=method)
-        fill_chunk(arrays, back, part, window, causes)
+    seating = seating_of(run, method) if run.seats else None
+    seated = seating.at(part, method) if seating else None
+    back = seated.back if seated else run.solve(part, method=method)
+    fill_chunk(arrays, back, part, window, causes)
+    if seating and seated:
+        causes.note_sticking(np.flatnonzero(seated.sticks) + window.start)
+        arrays["seat_rounds"][window], arrays["seat_change"][window] = seating.rounds, seating.change[seated.states]
+        arrays["seat_travel"][window] = seated.states == SETTLED
+        status = arrays["status"][window]
+        np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
     fill_errors(arrays, scratch, link_numbers(run.system), window)
     blank(arrays, arrays["status"][window].astype(np.int8), window)
-
-
-def _note_seats(arrays: Arrays, seated: Seated, window: slice, causes: diagnosis.Causes) -> None:
-    """What the iteration came to in one chunk, beside the walk with the pins in their seats."""
-    causes.note_seats(seated.offsets, seated.sticks, window.start)
-    arrays["seat_rounds"][window] = seated.rounds
-    arrays["seat_travel"][window] = seated.told
-    arrays["seat_change"][window] = seated.change
-    status = arrays["status"][window]
-    np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
 
 
 def _fill_compiled(

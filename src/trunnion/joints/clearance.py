@@ -220,12 +220,13 @@ def _size(load: Vector) -> Number:
 def pressed(load: Vector, radius: Number, least: Number = 0.0) -> Vector:
     """Where a load presses the pin at one end: c = ρ Q/|Q|, m; the maximiser of Q · c over |c| ≤ ρ.
 
-    least: load, N, below which the seat goes to the centre instead of jumping, c = ρ Q/√(|Q|² + least²).
+    least: load, N, below which the seat goes straight through the middle instead of jumping, c = ρ Q/least.
     """
-    square: Number = least * least
+    square: Number = 0.0
     for part in load:
         square = square + part * part
     xp = namespace(square)
+    square = xp.where(square > least * least, square, least * least)
     there = square > 0
     share = xp.where(there, radius / xp.sqrt(xp.where(there, square, 1.0)), 0.0)
     return tuple(share * part for part in load)

@@ -20,12 +20,11 @@ from trunnion.measures.figures import Reference, known
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
-from trunnion.solve.seating import settle
+from trunnion.solve.seating import seating_of
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, tracked
 
@@ -103,9 +102,8 @@ def courses_of(
     kernel = NumpyKernel(run, tuple(measures), replace(method, margin_up_to=0.0))
     if not run.seats:
         return kernel.courses(run.values, time)
-    seen = lanes(time, run.cycle)
     with np.errstate(all="ignore"):
-        seated = settle(run, seen, kernel.method)
+        seated = seating_of(run, kernel.method).at(time, kernel.method)
         status = status_of(seated.back, time.shape)
         np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
         found = {

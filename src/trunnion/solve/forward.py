@@ -49,10 +49,10 @@ class Motion(NamedTuple):
 
 
 class Travel(NamedTuple):
-    """What the travel of seats adds to the velocity of a link, and the link's whole acceleration; None: as if held."""
+    """What the travel of seats adds to the twist of a link, and to its acceleration."""
 
     twist: Any
-    acceleration: Any = None
+    acceleration: Any
 
 
 class PointMotion(NamedTuple):
@@ -201,8 +201,7 @@ class Forward(ABC):
         """Let the links also move as the seats of their pins travel."""
         for link, own in travel.items():
             motion = self.motions[link]
-            twist = zipped(operator.add, motion.twist, own.twist)
-            acceleration = motion.acceleration if own.acceleration is None else own.acceleration
+            twist, acceleration = (zipped(operator.add, *both) for both in zip(motion[1:], own, strict=True))
             self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
 
     def outside(self, place: Place) -> tuple[Any, Any]:

@@ -71,9 +71,10 @@ class Run:
         method: FrictionMethod | None,
         zero_slip: Mapping[str, Sense] | None = None,
         travel: Mapping[str, Travel] | None = None,
+        rests: Mapping[str, bool] | None = None,
     ) -> Backward:
         deflections = {joint: history.at(time) for joint, history in past.items()}
-        given = Given(zero_slip or {}, deflections, travel or {})
+        given = Given(zero_slip or {}, deflections, travel or {}, rests=rests or {})
         return solve(self.system, values, self.chosen.assembly, time, method, given)
 
     def at(
@@ -83,9 +84,10 @@ class Run:
         method: FrictionMethod | None = None,
         zero_slip: Mapping[str, Sense] | None = None,
         travel: Mapping[str, Travel] | None = None,
+        rests: Mapping[str, bool] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
-        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, travel)
+        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, travel, rests)
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""

@@ -1,95 +1,379 @@
-"""Where the pins lie in their holes: the seats that are given, and those that the reactions press the pins into.
+"""Where the pins lie in their holes over the cycle: seats that are given, and those that the reactions press them into.
 
-A seat and the reactions depend on each other: the seat moves the links by some ρ/l of their size, the reactions
-change by as much, and so does the seat. The iteration starts from the reactions of the ideal mechanism and gains
-three or four digits a round, but where the load of an end comes near zero: there the seat would have to jump, and
-contact is lost.
+A seat and the reactions depend on each other: the seat moves the links by some ρ/l of their size, the reactions change
+by as much, and so does the seat. So both are iterated at any time by itself; the reactions are those of pins held in
+their seats. Between the places at which a load jumps, a joint turns round or a pin crosses its hole (`end_loads`) the
+offsets are smooth: they are courses, found once. How fast the seats travel, and with them the links, are derivatives of
+these.
+
+Held pins take what resists a joint in the sense in which it moves without play. Where the travel of the pins turns that
+sense round, for the little while before or after the joint does, no seat agrees with its own friction.
 """
 
 from __future__ import annotations
 
 import functools
-import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
+from trunnion.algebra.course import FIT, ORDER, POINTS, Accuracy, Courses
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import flat
+from trunnion.algebra.nested import each, flat
 from trunnion.joints.clearance import pressed, turned_by_friction
-from trunnion.solve import eccentricity_rate as rate
-from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import Lanes, Moved, part_of, travel
+from trunnion.solve import forward as kinematics
+from trunnion.solve.backward import Backward, Sense
+from trunnion.solve.end_loads import NO_LOAD, EndLoads, end_loads, loads_of, plain, reactions
 from trunnion.solve.forward import Travel
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.system import rubbing
+from trunnion.solve.switches import accuracy_of, breaks_between
+from trunnion.solve.system import Values
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-from trunnion.solve.seats import GivenSeat
+__all__ = ["ROUNDS", "SETTLED", "UNSETTLED", "Halt", "Seated", "Seating", "seating_of"]
 
-__all__ = [
-    "ROUNDS", "TOLERANCE", "Seated", "loads_of", "settle",
-]  # fmt: skip
+ROUNDS = 12  # most of the iteration
+EXACT = 1e-12  # change that one more round would make of a seat, of its clearance, at which it has settled
+TOLERANCE = 1e-6  # likewise, beyond which it has not, however many the rounds
+SETTLED, FLOATING, UNSETTLED, UNKNOWN = range(4)  # states of the courses
+RESOLVED = Accuracy(1e-10, 1e-10, shortest=1e-6, rounds=12)  # second derivatives of offsets lose four digits
+IDLE = 1e-3  # of the largest load of the cycle: positions with less are like those without
+ASIDE, MOST = 0.5, 3.0  # cosine by which the travel of a pin may turn its load, and how many times it may change it
+ROUNDING = 1e-9  # of a load: one that points away from the wall, not along it but for rounding
 
-ROUNDS = 10  # most of the iteration
-MARGIN = 50.0  # by which a second round may gain less than the first
-SLUGGISH = 0.1  # of the change before: rounds that gain less than this are helped
-SLOW = 0.01  # of its largest speed: below it the travel of the seats may turn the slip of a joint round
-TOLERANCE = 1e-6  # change of a seat that one more round would make, of its clearance
-NO_LOAD = 1e-9  # of the largest reaction of a position: a load below it is rounding and presses nothing anywhere
-
-Vector = tuple[Number, ...]
 Array = NDArray[np.float64]
-
-
-class Pressed(NamedTuple):
-    """What a walk says of the seats: those its reactions press the pins into, m, by the names of `shifts`, and the
-    speeds of the joints with friction, (joint, lane).
-    """
-
-    offsets: dict[str, Array]
-    speeds: Array
 
 
 @dataclass(frozen=True)
 class Seated:
-    """Where the pins of some positions lie, and the walk with them there.
+    """Pins in their seats at some times.
 
-    offsets: by the names of `shifts` (`seats.JOINT.1.x`), m; rounds: of the iteration; change: that one more round
-    would make, of the clearances; sticks: positions at which only the travel of the seats decides the sense of a
-    friction, the joint itself being all but at rest; told: at which the accelerations contain the travel of the seats;
-    loads: of the pin on each end of its hole, N, by joint.
+    back: motion and forces, as the pins travel; states: how the seats came to be; sticks: where the travel of the seats
+    turns round the sense of a joint.
     """
 
-    offsets: dict[str, Array]
-    rounds: NDArray[np.intp]
-    change: Array
-    sticks: NDArray[np.bool_]
-    told: NDArray[np.bool_]
     back: Backward
-    loads: dict[str, list[Vector]]
+    states: NDArray[np.intp]
+    sticks: NDArray[np.bool_]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Where every pin has settled and presses against its wall."""
+        return np.asarray((self.states != FLOATING) & (self.states != UNSETTLED))
 
 
-def loads_of(back: Backward, seat: GivenSeat) -> list[Vector]:
-    """Load of the pin on each end of its hole, N, in the hole's frame."""
-    force, moment = back.on_hole(seat.joint)
-    return seat.play.model.loads(force, moment, seat.play.length)
+class Halt(NamedTuple):
+    """A time, s, from and to, in which the pin of a joint cannot travel as its seat does: its load does not hold it."""
+
+    joint: str
+    low: float
+    high: float
 
 
-def _pressed(back: Backward, seat: GivenSeat, loads: Sequence[Vector], least: Number) -> list[Vector]:
-    """Where the loads press the pin at its ends, friction taken into account."""
-    share = _share(back, seat.joint)
-    spin = back.walk.hole_spin(seat.joint)
-    return [
-        pressed(turned_by_friction(load, share, spin) if share is not None else load, radius, least)
-        for load, radius in zip(loads, seat.play.radii, strict=True)
-    ]
+@dataclass(frozen=True)
+class Seating:
+    """The seats of a run over its cycle.
+
+    fixed: offsets that the model states; loads: of pins in the middle; courses: offsets of the pins that loads seat, m,
+    by `paths`, then what their travel adds to the twist and to the acceleration of each of `links`; halts: in which
+    pins are held; turned: times, s, from and to, in which the travel turns round the sense of a joint, (2, time);
+    rounds: most that any seat took, and the largest change, of its clearance, that one more would make, by state.
+    """
+
+    run: Run
+    method: FrictionMethod
+    fixed: dict[str, float]
+    loads: EndLoads
+    courses: Courses
+    paths: Sequence[str]
+    links: Sequence[str]
+    halts: Sequence[Halt]
+    turned: Array
+    rounds: int
+    change: Array
+
+    @property
+    def breaks(self) -> Array:
+        """Times, s, at which seats or their rates may jump."""
+        halts = [time for halt in self.halts for time in halt[1:]]
+        return np.concatenate([self.courses.breaks, halts, self.turned.ravel()])
+
+    @property
+    def gaps(self) -> Array:
+        """Times, s, from and to, in which a pin does not lie at its wall; (2, gap)."""
+        return np.concatenate([self.loads.gaps, np.array([halt[1:] for halt in self.halts], float).reshape(-1, 2).T], 1)
+
+    def at(self, time: Array, method: FrictionMethod | None = None) -> Seated:
+        """Motion and forces at times, s, with every pin in its seat; method: that of the seats if not given."""
+        time = self._within(time)
+        rows, states, still = self._rows(time), self.states(time), self.run.system.geometry.walk.algebra.STILL
+        added = iter(np.where(states == SETTLED, rows[len(self.paths) :], 0.0))
+        travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
+        back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
+        sticks = np.any((self.turned[0] < time[:, None]) & (time[:, None] < self.turned[1]), axis=1)
+        return Seated(back, states, sticks)
+
+    def offsets(self, time: Array) -> dict[str, Array]:
+        """Where the pins lie at times, s, m, by the names of `shifts`."""
+        return self._placed(self._rows(self._within(time)))
+
+    def _rows(self, time: Array) -> Array:
+        return np.nan_to_num(self.courses.at(time))
+
+    def _placed(self, rows: Array) -> dict[str, Array]:
+        fixed = {path: np.full(rows.shape[1], number) for path, number in self.fixed.items()}
+        return fixed | dict(zip(self.paths, rows, strict=False))
+
+    def states(self, time: Array) -> NDArray[np.intp]:
+        """How the seats of times, s, came to be."""
+        time = self._within(time)
+        states: NDArray[np.intp] = self.courses.states[self.courses.panel(time)]
+        for _, low, high in self.halts:
+            states[(low < time) & (time < high) & (states == SETTLED)] = FLOATING
+        return states
+
+    def _within(self, time: Array) -> Array:
+        """Times of the cycle that stand for any."""
+        duration = self.run.cycle.duration
+        if duration <= 0:
+            return 0.0 * time
+        return np.asarray(np.mod(time, duration) if self.run.cycle.periodic else np.clip(time, 0.0, duration))
+
+
+def seating_of(run: Run, method: FrictionMethod | None = None) -> Seating:
+    """The seats of a run, found once; what was asked of the margin of the method is left out."""
+    quick = replace(method or FrictionMethod(), margin_up_to=0.0)
+    return run.once(("seating", quick), lambda: _seating(run, quick))
+
+
+@np.errstate(all="ignore")
+def _seating(run: Run, method: FrictionMethod) -> Seating:
+    settling = _Settling(run, method)
+    if settling.paths:
+        courses = Courses.of(settling, settling.breaks(), settling.like, accuracy_of(run.cycle, RESOLVED))
+    else:
+        edges = settling.breaks()[[0, -1]]
+        courses = Courses(edges, np.zeros((1, 0, ORDER)), np.zeros(1, np.intp), edges, np.zeros(0), 0)
+    courses, links, halts, turned = settling.travelling(courses)
+    return Seating(
+        run, method, settling.fixed, settling.loads, courses, settling.paths, links, halts, turned, settling.rounds,
+        settling.change,
+    )  # fmt: skip
+
+
+class _Settling:
+    """The seats that loads press pins into, at any times: rows of offsets, m."""
+
+    def __init__(self, run: Run, method: FrictionMethod) -> None:
+        self.run, self.method, self.loads = run, method, end_loads(run, method)
+        self.fixed: dict[str, float] = {}
+        for seat in run.seats:
+            if seat.given is not None:
+                offsets = seat.play.model.paths(f"seats.{seat.joint}", seat.given)
+                self.fixed |= {path: plain(number) for path, number in offsets.items()}
+        self.seats = [seat for seat in run.seats if seat.given is None]
+        self.paths = [f"seats.{seat.joint}.{key}" for seat in self.seats for end in seat.play.model.ends for key in end]
+        self.rounds, self.change = 0, np.zeros(4)
+        self._panels: list[tuple[float, float, Array]] = []  # low, high, s, and polynomials of those that settled
+
+    def breaks(self) -> Array:
+        """Both ends of the cycle and what lies between them, s."""
+        edges = self.loads.courses.breaks
+        jumps = [cross.time for cross in self.loads.crossings if not cross.lasts]
+        times = np.concatenate([edges, jumps, self.loads.gaps.ravel()])
+        return breaks_between(self.run.cycle, times) if self.run.cycle.duration > 0 else edges
+
+    def like(self, sizes: Array) -> Array:
+        """The size of what is like each row: the offsets of the same end."""
+        radii = np.zeros(len(sizes))
+        for end in self.loads.ends:
+            radii[end.rows] = end.radius
+        return radii
+
+    # ---- the iteration ----------------------------------------------------------------------------------------
+
+    def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
+        """Offsets, (row, time), and states at the nodes of panels, s."""
+        first, last = time[::ORDER], time[ORDER - 1 :: ORDER]
+        middle, half = (first + last) / 2, (last - first) / 2 / POINTS[-1]
+        panels = list(zip(middle - half, middle + half, np.split(np.arange(len(time)), len(first)), strict=True))
+        start = np.zeros((len(self.paths), len(time)))
+        for low, high, nodes in panels:  # from the polynomials of the last wider panel that has settled
+            slack = 1e-9 * (high - low)
+            wider = [panel for panel in self._panels if panel[0] <= low + slack and high - slack <= panel[1]]
+            if wider:
+                begin, end, polynomials = wider[-1]
+                start[:, nodes] = chebyshev.chebval(2 * (time[nodes] - begin) / (end - begin) - 1, polynomials.T)
+        offsets, rounds, change, unknown = self._settled(time * (self.run.cycle.duration > 0), start)
+        states = np.where(change > TOLERANCE, UNSETTLED, SETTLED)
+        for low, high in self.loads.gaps.T:
+            states[(time > low) & (time < high)] = FLOATING
+        states[unknown] = UNKNOWN
+        self.rounds = max(self.rounds, int(np.max(rounds)))
+        np.maximum.at(self.change, states, change)
+        self._panels += [
+            (low, high, offsets[:, nodes] @ FIT.T) for low, high, nodes in panels if np.all(states[nodes] == SETTLED)
+        ]
+        return offsets, states
+
+    def _settled(self, time: Array, offsets: Array) -> tuple[Array, NDArray[np.intp], Array, NDArray[np.bool_]]:
+        """Offsets, rounds, change that one more would make, and where there are no loads; offsets: to begin with.
+
+        A round gains about as much as the one before it, so what one more would change is known from two. The steps are
+        extrapolated from the last two (Anderson's method with one step of memory, D. G. Anderson, J. ACM 12 (1965)
+        547-560, doi:10.1145/321296.321305).
+        """
+        rounds, change, unknown = np.zeros(len(time), np.intp), np.full(len(time), np.inf), np.zeros(len(time), bool)
+        left, last, smooth = np.arange(len(time)), np.full(len(time), np.nan), offsets.copy()
+        before: tuple[Array, Array] | None = None
+        for k in range(1, ROUNDS + 1):
+            here = offsets[:, left]
+            goal = self._pressed(time[left], here)
+            lost = ~np.all(np.isfinite(goal), axis=0)
+            goal[:, lost] = 0.0
+            now = np.where(lost, 0.0, self._apart(here, goal))
+            rounds[left], unknown[left[lost]] = k, True
+            change[left] = now * np.fmin(now / last, 1.0)
+            if k == 1:
+                smooth = goal.copy()  # of loads without play, or those of a wider panel
+            done = (change[left] <= EXACT) | lost
+            offsets[:, left] = goal if before is None or k == ROUNDS else self._extrapolated(*before, here, goal)
+            offsets[:, left[done]] = goal[:, done]
+            before, last, left = (here[:, ~done], goal[:, ~done]), now[~done], left[~done]
+            if not len(left):
+                break
+        offsets[:, change > TOLERANCE] = smooth[:, change > TOLERANCE]
+        return offsets, rounds, change, unknown
+
+    def _static(self, time: Array, offsets: Array) -> Backward:
+        """Motion and forces with the pins held at offsets, in the sense of the motion without play."""
+        senses: dict[str, Sense] = {joint: tuple(rows) for joint, rows in self.loads.sensed(time).items()}
+        return self.run.at(time, self._placed(offsets), self.method, senses, rests=dict.fromkeys(senses, False))
+
+    def _placed(self, offsets: Array) -> dict[str, Array | float]:
+        return {**self.fixed, **dict(zip(self.paths, offsets, strict=True))}
+
+    def _pressed(self, time: Array, offsets: Array) -> Array:
+        """Where the loads press the pins that are held at offsets, friction taken into account; NaN without loads."""
+        back, senses = self._static(time, offsets), self.loads.sensed(time)
+        loads = {seat.joint: loads_of(back, seat) for seat in self.seats}
+        size = reactions(back, [part for ends in loads.values() for load in ends for part in load])
+        least = NO_LOAD * np.maximum(size, IDLE * self.loads.largest)
+        seats = np.zeros_like(offsets) + 0.0 * size
+        for end in self.loads.ends:
+            joint = end.seat.joint
+            load, floor = self.loads.across(end, time, loads[joint][end.number], least)
+            if (share := _share(back, joint)) is not None:
+                spin = back.walk.hole_spin(joint)  # about one axis with the sense that is taken
+                load = turned_by_friction(load, share, (*spin[:-1], senses[joint][0]) if joint in senses else spin)
+            seats[end.rows] = pressed(load, end.radius, floor)
+        return np.asarray(seats)
+
+    def _apart(self, before: Array, after: Array) -> Array:
+        """The largest way of a pin from seat to seat, of the radius of its end."""
+        ways = [np.linalg.norm((after - before)[end.rows], axis=0) / end.radius for end in self.loads.ends]
+        return np.asarray(functools.reduce(np.maximum, ways, np.zeros(before.shape[1])))
+
+    def _extrapolated(self, before: Array, after: Array, here: Array, goal: Array) -> Array:
+        """The seats to which two rounds, before → after and here → goal, lead if the map between is a straight one; as
+        far from the middle as the last."""
+        step, last = goal - here, after - before
+        square = np.sum((step - last) ** 2, axis=0)
+        share = np.sum(step * (step - last), axis=0) / np.where(square > 0, square, np.inf)
+        ahead = np.asarray(goal - share * (goal - after))
+        for end in self.loads.ends:
+            size, far = (np.linalg.norm(place[end.rows], axis=0) for place in (ahead, goal))
+            ahead[end.rows] *= np.where(size > 0, far / np.where(size > 0, size, 1.0), 0.0)
+        return ahead
+
+    # ---- how the links move while the seats travel ------------------------------------------------------------
+
+    def travelling(self, courses: Courses) -> tuple[Courses, list[str], list[Halt], Array]:
+        """More rows: what the travel of the offsets adds to twist and acceleration of every link; these links, where
+        pins cannot travel so, and where the travel turns round the sense of a joint.
+
+        The twist comes of the poses, which are fed the rates of the offsets as ε parts. What play adds to the twist,
+        beside that of pins in the middle, is a course by itself, and its derivative what play adds to the acceleration.
+        """
+        run, settled = self.run, courses.states == SETTLED
+        if not (self.loads.pressed and np.any(settled)):
+            return courses, [], [], np.zeros((2, 0))
+        time, offsets = courses.nodes(settled), courses.on_nodes(settled)
+        rates, back = courses.rates(offsets, settled), self._static(time, offsets)
+        static, middle = back.walk.motions, run.walk(time).motions
+        places = {path: Dual(*both) for path, *both in zip(self.paths, offsets, rates, strict=True)}
+        twists = _added_twists(run, {**run.values, **self.fixed, **places}, time) if np.any(rates) else {}
+        travel, more = {}, np.zeros((0, len(time)))
+        for link, twist in twists.items():
+            rows = [_rows(part, time) for part in (twist, *static[link][1:], *middle[link][1:])]
+            added = courses.rates(rows[1] + rows[0] - rows[3], settled) + rows[4] - rows[2]
+            both = np.nan_to_num([rows[0], added])
+            travel[link] = Travel(
+                *(_shaped(part, numbers) for part, numbers in zip(static[link][1:], both, strict=True))
+            )
+            more = np.concatenate([more, *both])
+        moving = run.at(time, self._placed(offsets), self.method, travel=travel)
+        joints = dict.fromkeys(end.seat.joint for end, _ in self.loads.pressed)
+        halts = [
+            Halt(joint, *times.tolist())
+            for joint in joints for times in _below(courses, self._contact(joint, time, offsets, back, moving)).T
+        ]  # fmt: skip
+        turned = _below(courses, self._senses(time, moving))
+        return courses.extended(more, settled), list(travel), halts, turned
+
+    def _contact(self, joint: str, time: Array, offsets: Array, back: Backward, moving: Backward) -> list[Array]:
+        """Numbers below 0 where the load of an end of a joint points away from the wall that its pin lies at, or the
+        travel turns the load far aside, or outdoes it; back: with pins held."""
+        signs = []
+        for end, peak in self.loads.pressed:
+            if end.seat.joint == joint:
+                static, moved = (
+                    _rows(tuple(loads_of(walk, end.seat)[end.number]), time) / peak for walk in (back, moving)
+                )
+                sizes = np.linalg.norm(static, axis=0) * np.linalg.norm(moved, axis=0)
+                signs.append(np.sum(static * offsets[end.rows], axis=0) / end.radius)
+                signs.append(np.sum(static * moved, axis=0) - ASIDE * sizes)
+                signs.append(np.sum(static**2 - ((moved - static) / MOST) ** 2, axis=0))
+        return signs
+
+    def _senses(self, time: Array, moving: Backward) -> list[Array]:
+        """Numbers below 0 where joints do not move in the sense that is taken."""
+        signs = []
+        for joint, senses in self.loads.sensed(time).items():
+            for sense, number in zip(senses, moving.walk.signed_rates(joint), strict=True):
+                rate = np.broadcast_to(number, time.shape) / max(float(np.nanmax(np.abs(number), initial=0.0)), 1e-300)
+                signs.append(np.where(sense != 0, rate * sense, -np.abs(rate)))
+        return signs
+
+
+def _below(courses: Courses, signs: Sequence[Array]) -> Array:
+    """Times, s, from and to, (2, time), in which one of some numbers at the nodes of settled panels is below 0."""
+    first = courses.coefficients.shape[1]
+    rows = np.arange(first, first + len(signs))
+    if not len(rows):
+        return np.zeros((2, 0))
+    marked = courses.extended(np.nan_to_num(signs, nan=1.0), courses.states == SETTLED, elsewhere=1.0)
+    times = np.unique(np.concatenate([courses.edges, *(marked.passages(row) for row in rows)]))
+    below = np.any(marked.at((times[1:] + times[:-1]) / 2)[rows] < -ROUNDING, axis=0)
+    return np.asarray(times[np.flatnonzero(np.diff(below, prepend=False, append=False))].reshape(-1, 2).T)
+
+
+def _rows(numbers: Any, time: Array) -> Array:
+    """The numbers of a tuple at every time, (row, time)."""
+    return np.array([np.broadcast_to(primal(number), time.shape) for number in flat(numbers)], float)
+
+
+def _shaped(like: Any, rows: Array) -> Any:
+    """Rows as the numbers of such a tuple."""
+    parts = iter(rows)
+    return each(like, lambda _: next(parts))
 
 
 def _share(back: Backward, joint: str) -> Number | None:
@@ -107,163 +391,18 @@ def _share(back: Backward, joint: str) -> Number | None:
     return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 
-def settle(run: Run, seen: Lanes, method: FrictionMethod, ideal: Backward | None = None) -> Seated:
-    """The positions of some lanes with every pin in its seat.
-
-    The seats are those of the loads with the pins held; their travel comes with the last walk. ideal: motion and
-    reactions of the ideal mechanism at all lanes, if they are solved already.
-    """
-    quick = replace(method, margin_up_to=0.0)
-    ideal = ideal or run.ideal(seen.times, quick)
-    count, time = len(seen.times), seen.times[seen.own]
-    offsets, speeds = _told(run, ideal, count)
-    rounds, change = np.zeros(count, np.intp), np.zeros(count)
-    loaded = any(seat.given is None for seat in run.seats)
-    sticks = np.zeros(len(time), bool)
-    senses = np.zeros((len(rubbing(run.system)), count))
-    if loaded:
-        _iterate(run, seen.times, quick, offsets, rounds, change, np.arange(count), senses)
-
-    def moved(time: Array, offsets: Mapping[str, Array], rates: Mapping[str, Array]) -> Mapping[str, Moved]:
-        return rate.moved(run, {**run.values, **offsets}, rates, time)
-
-    moving, told = travel(run, seen, offsets, ideal.walk.motions, moved)
-    mine = {path: numbers[seen.own] for path, numbers in offsets.items()}
-    rounds, change = rounds[seen.own], change[seen.own]
-    if loaded and moving:  # where a joint turns round, the travel of the seats decides the sense of its friction
-        left = np.flatnonzero(_slow(speeds)[seen.own] & (rounds < ROUNDS))
-        part = {path: numbers[left] for path, numbers in mine.items()}
-        turned = np.sign(_pressed_at(run, time[left], part, quick, part_of(moving, left)).speeds)
-        left = left[np.any(turned != senses[:, seen.own[left]], axis=0)]
-        sticks[left] = True
-        _iterate(run, time, quick, mine, rounds, change, left, senses[:, seen.own], moving)
-    back = run.at(time, mine, method, travel=moving)
-    return Seated(mine, rounds, change, sticks, told, back, {seat.joint: loads_of(back, seat) for seat in run.seats})
-
-
-def _slow(speeds: Array) -> NDArray[np.bool_]:
-    """Where a joint with friction is about to turn round."""
-    sizes = np.abs(speeds)
-    return np.asarray(np.any(sizes <= SLOW * np.nanmax(sizes, axis=1, keepdims=True, initial=0.0), axis=0))
-
-
-def _iterate(
-    run: Run,
-    time: Array,
-    method: FrictionMethod,
-    offsets: dict[str, Array],
-    rounds: NDArray[np.intp],
-    change: Array,
-    left: NDArray[np.intp],
-    senses: Array,
-    moving: Mapping[str, Travel] | None = None,
-) -> None:
-    """Seats and reactions in turn, in place, until the positions `left` have settled or had their rounds.
-
-    senses: of the slips of the joints with friction in the last round, kept too.
-
-    A round gains about as much as the one before it, so `change`, what one more round would change, is known from
-    two; of the first alone, that took the pin into its seat, it is its square with a margin. Where rounds gain
-    little the step is extrapolated from the last two (Anderson's method with one step of memory, D. G. Anderson, J.
-    ACM 12 (1965) 547-560, doi:10.1145/321296.321305).
-    """
-    paths = list(offsets)
-    last, earlier, kept = np.full(len(left), 1 / MARGIN), None, left
-    while len(left):
-        part = {path: numbers[left] for path, numbers in offsets.items()}
-        goal, speeds = _pressed_at(run, time[left], part, method, part_of(moving, left) if moving else None)
-        senses[:, left] = np.sign(speeds)
-        rounds[left] += 1
-        now = _change(run.seats, part, goal)
-        change[left] = now * np.minimum(now / np.where(last > 0, last, 1.0), 1.0)
-        for path in paths:
-            offsets[path][left] = goal[path]
-        if earlier:
-            slow = np.flatnonzero(now > SLUGGISH * last)
-            steps = ((earlier, kept[slow]), ((part, goal), slow))
-            before, after, here, there = (
-                np.array([one[path][places] for path in paths]) for both, places in steps for one in both
-            )
-            ahead = _at_the_wall(run.seats, paths, _extrapolated(before, after, here, there), there)
-            for path, numbers in zip(paths, ahead, strict=True):
-                offsets[path][left[slow]] = numbers
-        earlier, kept = (part, goal), np.flatnonzero((change[left] > TOLERANCE) & (rounds[left] < ROUNDS))
-        last, left = now[kept], left[kept]
-
-
-def _extrapolated(
-    before: NDArray[np.float64], after: NDArray[np.float64], here: NDArray[np.float64], there: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """The seats to which two rounds, before → after and here → there, lead if the map between is a straight one."""
-    step, last = there - here, after - before
-    turn = step - last
-    square = np.sum(turn * turn, axis=0)
-    share = np.sum(step * turn, axis=0) / np.where(square > 0, square, np.inf)
-    return np.asarray(there - share * (there - after))
-
-
-def _at_the_wall(
-    found: Sequence[GivenSeat], paths: Sequence[str], ahead: NDArray[np.float64], there: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Extrapolated offsets with the lengths that pins pressed to the wall have."""
-    row = {path: i for i, path in enumerate(paths)}
-    for seat in found:
-        for end in seat.play.model.ends:
-            rows = [row[f"seats.{seat.joint}.{key}"] for key in end]
-            size, wanted = (np.sqrt(np.sum(one[rows] ** 2, axis=0)) for one in (ahead, there))
-            ahead[rows] = np.where(size > 0, ahead[rows] * (wanted / np.where(size > 0, size, 1.0)), there[rows])
-    return ahead
-
-
-def _pressed_at(
-    run: Run,
-    time: Array,
-    offsets: Mapping[str, Array],
-    method: FrictionMethod,
-    travel: Mapping[str, Travel] | None = None,
-) -> Pressed:
-    """What reactions press with the pins at offsets, as they travel there."""
-    return _told(run, run.at(time, offsets, method, travel=travel), len(time))
-
-
-def _told(run: Run, back: Backward, count: int) -> Pressed:
-    """What a walk says of the seats; a pin whose load is not known (locked, not assembled) is left in the middle."""
-    rows = {path: _row(number, count) for path, number in _wanted(run.seats, back).items()}
-    offsets = {path: np.where(np.isfinite(row), row, 0.0) for path, row in rows.items()}
-    speeds = [_row(back.slips[joint].speed, count) for joint in rubbing(run.system)]
-    return Pressed(offsets, np.array(speeds).reshape(len(speeds), count))
-
-
-def _row(number: Number, count: int) -> Array:
-    return np.array(np.broadcast_to(primal(number), (count,)), float)
-
-
-def _wanted(found: Sequence[GivenSeat], back: Backward) -> dict[str, Number]:
-    """The seats into which the reactions of a walk press the pins, and those that are given."""
-    least = NO_LOAD * _largest_reaction(back)
-    offsets: dict[str, Number] = {}
-    for seat in found:
-        own = seat.given if seat.given is not None else _pressed(back, seat, loads_of(back, seat), least)
-        offsets |= seat.play.model.paths(f"seats.{seat.joint}", own)
-    return offsets
-
-
-def _largest_reaction(back: Backward) -> Number:
-    """Largest component of a force in any joint, N."""
-    count = back.walk.system.mechanism.coordinates
-    parts = (np.abs(primal(part)) for one in back.reactions.values() for part in tuple(flat(tuple(one)))[:count])
-    return functools.reduce(np.fmax, parts, 0.0)
-
-
-def _change(
-    found: Sequence[GivenSeat], before: Mapping[str, NDArray[np.float64]], after: Mapping[str, NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """Largest way of a pin from seat to seat, of the radius of its end."""
-    worst: Number = 0.0
-    for seat in found:
-        for end, radius in zip(seat.play.model.ends, seat.play.radii, strict=True):
-            paths = [f"seats.{seat.joint}.{key}" for key in end]
-            square = functools.reduce(operator.add, ((after[path] - before[path]) ** 2 for path in paths))
-            size = np.asarray(primal(radius), float)
-            worst = np.maximum(worst, np.sqrt(square) / np.where(size > 0, size, 1.0))
-    return np.asarray(worst)
+def _added_twists(run: Run, values: Values, time: Array) -> dict[str, Any]:
+    """Twist of every link by the ε parts of the values; poses alone are worked out."""
+    system = run.system
+    walk = kinematics.start(system, values)
+    walk.time = time
+    twists: dict[str, Any] = {}
+    still = walk.motions[system.mechanism.fixed_link]
+    for number, module in enumerate(system.plan.modules):
+        pose = kinematics.pose_of(walk, number, run.chosen.assembly[number], time)
+        for link, frame in zip(module.links, pose.frames, strict=True):
+            twists[link] = walk.frame_rate(frame)
+            walk.motions[link] = still._replace(frame=frame)
+        twists.update(walk.unspun(number, pose, twists))
+        walk.poses.append(pose)
+    return twists

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from trunnion.algebra.namespace import Number
 from trunnion.joints.clearance import described, pressed
 from trunnion.solve.shifts import Play, play_of
 from trunnion.solve.system import System, Values
-
-if TYPE_CHECKING:
-    pass
-
-from trunnion.algebra.namespace import Number
 
 __all__ = ["GivenSeat", "given_offsets", "seats"]
 

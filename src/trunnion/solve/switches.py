@@ -43,7 +43,7 @@ PANELS = 6  # of a turn: the widest that is integrated in one go
 MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
 NEARLY = 0.1  # of the range of what decides where a load begins
 TRACKED = 72  # of a turn: how far to either side a bend of one mechanism is looked for in others
-SEATED = Accuracy(1e-5, 1e-7, shortest=1e-7, rounds=16)  # pins settle in their seats to 1e-6 of their clearance
+SEATED = Accuracy(1e-7, 1e-9, shortest=1e-7, rounds=16)  # what the travel of seats adds is known to so many digits
 MARGINS = Accuracy(1e-4, 1e-6, shortest=1e-5, rounds=8)  # a margin is followed, which takes long
 SETTLED = 1e-11  # of the cycle
 CLOSE = 1e-10  # of the cycle: edges that are one

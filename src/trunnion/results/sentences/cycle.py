@@ -232,10 +232,4 @@ CYCLE: dict[str, Sentence] = {
         "positions of a pin",
         "the pin floats there: treat it as loss of contact",
     ),
-    "seat.held": Sentence(
-        NOTE,
-        "the load of a pin changes its direction {at}, so that the pin jumps across its play: the pin of {joint} moves "
-        "by {jump:~m} from one position to the next; velocities and accelerations there leave out this motion",
-        "take velocities and accelerations from the positions beside these",
-    ),
 }

@@ -19,11 +19,10 @@ from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.rig.identification.unknowns import Unknown
 from trunnion.solve import shifts
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.seating import settle
+from trunnion.solve.seating import seating_of
 from trunnion.solve.seats import given_offsets
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
@@ -326,8 +325,7 @@ class SeatedModel(Model):
             lost = dict.fromkeys(self.measures, np.full(size, np.nan))
             return lost, np.full(size, Status.NOT_ASSEMBLED, np.int8), np.zeros(size, bool)
         with np.errstate(all="ignore"):
-            seen = lanes(self.phases[k] * run.cycle.duration, run.cycle)
-            seated = settle(run, seen, self.friction)
+            seated = seating_of(run, self.friction).at(self.phases[k] * run.cycle.duration, self.friction)
             status = status_of(seated.back, (size,))
             found = {
                 name: np.array(np.broadcast_to(primal(self._course(measure, seated.back)), (size,)), float)

@@ -17,10 +17,9 @@ from trunnion.cycle.positions import positions
 from trunnion.errors import Status
 from trunnion.measures.measures import Measure
 from trunnion.solve.backward import Backward
-from trunnion.solve.eccentricity_rate import lanes
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.seating import settle
+from trunnion.solve.seating import seating_of
 from trunnion.solve.status import status_of
 
 __all__ = ["MOST_EXACT", "SampledSignals", "Solved", "cycle_efficiency", "phases", "sampled", "solved"]
@@ -74,8 +73,8 @@ def solved(run: Run, measures: Sequence[Measure], time: Array) -> Solved:
 def _back(run: Run, time: Array) -> Backward:
     if not run.seats:
         return run.solve(time)
-    seen, method = lanes(time, run.cycle), FrictionMethod()
-    return settle(run, seen, method).back
+    method = FrictionMethod()
+    return seating_of(run, method).at(time, method).back
 
 
 def cycle_efficiency(run: Run) -> float:

@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.panels import CANCELLED
+
 __all__ = ["CANCELLED", "Effort", "Integrals", "Nodes", "integrals", "nodes"]
 
 Array = NDArray[np.float64]
@@ -25,7 +27,6 @@ Integrands = Callable[[Rows, Array], Array]
 
 PARTS = 8  # a round costs about as much for many nodes as for few
 MOST_PANELS = 4000  # of one mechanism: beyond it the error that is left is told
-CANCELLED = 1e-12  # of a mean of magnitudes: less than this is what rounding leaves of one that is zero
 ROUNDING = 50 * float(np.finfo(float).eps)
 
 # abscissae and weights of the half from the outermost node to the middle, as QK15 has them

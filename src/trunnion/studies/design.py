@@ -124,7 +124,7 @@ def design(mechanism: Mechanism, steps: int = 720) -> Design:
     steps = len(time)
     driver = next(iter(mechanism.drivers), "")
     rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
-    asked = motor(run, driver, steps) if driver else Motor()
+    asked = motor(run, driver) if driver else Motor()
     if not math.isfinite(asked.peak_power):  # of the positions that have an answer
         asked = asked._replace(peak_power=_largest(back.efforts[driver] * rate))
     return Design(

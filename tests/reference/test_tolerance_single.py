@@ -17,6 +17,7 @@ from mechanisms_parts import Data
 from toleranced import alone, sampler, varied
 from trunnion.measures.measures import Measure, coordinate_unit
 from trunnion.measures.over_cycle import figures_of
+from trunnion.measures.positions import moved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.run import Run, prepare
@@ -126,9 +127,9 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
 
 def deviations(nominal: Run, other: Run, measure: Measure) -> tuple[Array, Array]:
     """Least and largest of what a course is off the nominal one at many positions: of a path its distance, twice."""
-    courses = []
+    courses, time = [], nominal.cycle.times(DENSE)
     for run in (nominal, other):
-        parts = measure.curve(run.solve(run.cycle.times(DENSE)))
+        parts = measure.curve(run.solve(moved(nominal, run.values, time)))
         courses.append(np.array([np.broadcast_to(np.asarray(part, float), DENSE) for part in parts]))
     change = courses[1] - courses[0]
     if measure.kind == "path_error":

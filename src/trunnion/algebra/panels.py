@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 
 __all__ = [
@@ -157,11 +157,11 @@ def extreme(
     lane, panel = np.nonzero(known[:, None] & (tops >= (high - NEAR * (high - low))[:, None]))
     middle = GRID[np.clip(np.argmax(sign * grid.values[lane, panel], axis=1), 1, len(GRID) - 2)]
     width, pairs = np.full(len(lane), CELL), linear(coefficients, lambda array: array[:, lane, panel])
-    own = _fitted(pairs, of, sign, middle, width)
-    middle, width = _narrowed(primal(pairs), of, sign, (np.asarray(primal(own)), middle, width))
+    own = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
+    middle, width = _narrowed(primal(pairs), of, sign, (own, middle, width))
     if np.any(width < CELL):
-        own = _fitted(pairs, of, sign, middle, width)
-    spot, value, level = _top(np.asarray(primal(own)))
+        own = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
+    spot, value, level = _top(own)
     best = np.maximum.reduceat(value, np.searchsorted(lane, np.flatnonzero(known))) if len(lane) else value
     most = np.full(len(tops), np.nan)
     most[known] = best
@@ -171,13 +171,14 @@ def extreme(
     slack = np.where(level, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
     first[known] = _first(lane, value >= most[lane] - slack)
     pick = first
-    if isinstance(own, Dual):
-        changes = _at(own.dual, spot)
+    if isinstance(pairs, Dual):
+        slopes = np.broadcast_to(derivative(_fitted(pairs, of, sign, middle, width)), own.shape)
+        changes = _at(slopes, spot)
         tied = value >= (most - flat - TIED * (high - low))[lane]
         larger = np.lexsort((-np.abs(changes), ~tied, lane)) if len(lane) else lane
         pick = first.copy()
         pick[known] = larger[np.searchsorted(lane, np.flatnonzero(known))]
-        slope, bend = _at(own.dual @ RATE, spot), _at(own.real @ RATE @ RATE, spot)
+        slope, bend = _at(slopes @ RATE, spot), _at(own @ RATE @ RATE, spot)
         place = Dual(
             place,
             width * np.where((np.abs(spot) == 1.0) | (bend >= 0.0), 0.0, -slope / np.where(bend == 0.0, 1.0, bend)),
@@ -185,7 +186,7 @@ def extreme(
         taken: Number = Dual(sign * most, _picked(sign * changes, pick, known))
     else:
         taken = sign * most
-    panels = np.where(known, _picked(panel, first, known), 0)
+    panels = np.where(known, _picked(panel.astype(float), first, known), 0)
     return Top(
         taken,
         panels.astype(np.intp),
@@ -271,7 +272,7 @@ def above(coefficients: Number, level: float) -> Number:
     """How much of every panel, of the length 2 of its spots, a number, (lane, panel, coefficient), is above a level."""
     own = coefficients - level * (np.arange(ORDER) == 0)
     real = np.asarray(primal(own))
-    values = real @ ON_GRID
+    values: Array = real @ ON_GRID
     up = values >= 0.0
     share = CELL * np.sum(up[..., 1:] & up[..., :-1], axis=-1).astype(float)
     moved = np.zeros(share.shape)
@@ -309,7 +310,8 @@ def _crossings(real: Array, values: Array, up: NDArray[np.bool_]) -> Any:
         spot, most, _ = _top(
             signs[:, None] * _fitted(real[None, lane, panel], lambda rows: rows[0], 1.0, GRID[middle + 1], width)
         )
-        lane, panel, middle, spot, signs = (part[most > 0.0] for part in (lane, panel, middle, spot, signs))
+        turned = most > 0.0
+        lane, panel, middle, spot, signs = lane[turned], panel[turned], middle[turned], spot[turned], signs[turned]
         place, counted = GRID[middle + 1] + CELL * spot, np.where(signs < 0.0, 1.0, 0.0)
         yield lane, panel, GRID[middle], place, counted * (place - GRID[middle])
         yield lane, panel, place, GRID[middle + 2], counted * (GRID[middle + 2] - place)

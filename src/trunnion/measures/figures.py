@@ -205,7 +205,8 @@ class Reading:
         for sign in (SIGNS[rule],) if rule in SIGNS else (1.0, -1.0):
             tops = grid.most if sign > 0 else -grid.least
             found |= tops + 2.0 * tails >= np.max(tops, axis=1, keepdims=True)
-        return found & (tails > limit) & (primal(panels.half) > NARROW * np.sum(primal(panels.half), 1)[:, None])
+        wide = primal(panels.half) > NARROW * np.sum(primal(panels.half), 1)[:, None]
+        return np.asarray(found & (tails > limit) & wide)
 
     def number(self, panels: Panels) -> tuple[Panels, Made]:
         """What an extreme is of: rows and the number made of them."""

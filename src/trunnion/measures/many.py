@@ -426,7 +426,7 @@ class _Group:
                 kernel.courses(some, linear(there, lambda array: array[0]) if len(primal(there)) == 1 else there)
             )
         curves = {
-            one.name: _joined_parts(
+            one.name: _pieced(
                 [part[0][one.name] for part in pieces], [len(np.atleast_2d(part[1])) for part in pieces], width
             )
             for one in self.measures
@@ -481,7 +481,7 @@ class _Group:
         rough = np.flatnonzero(np.any(tails > limit, axis=1) & np.all(np.isfinite(tails), axis=1))
         if len(rough):
             found[rough] |= self.reading(measure).offending(panels.picked(rough), limit)
-        return found
+        return np.asarray(found)
 
     @cached_property
     def _sizes(self) -> dict[str, float]:
@@ -497,7 +497,7 @@ class _Group:
         """What the numbers of each measure are like."""
         return alike(self.run, self.measures, {one.name: slice(k, k + 1) for k, one in enumerate(self.measures)})
 
-    def _read(self, measure: Measure, panels: Panels, status: Array, times: Mapping[str, Array]) -> Read:
+    def _read(self, measure: Measure, panels: Panels, status: NDArray[np.int8], times: Mapping[str, Array]) -> Read:
         reading = self.reading(measure, self.figures.get(measure.name, float("nan")))
         figure, least, most = reading.read(panels)
         shown: Number = np.zeros((len(status), 0))
@@ -506,7 +506,7 @@ class _Group:
             shown = linear(reading.shown(panels, time), lambda array: np.broadcast_to(array, (len(status), len(time))))
         return Read(figure, least, most, np.asarray(status, np.int8), shown)
 
-    def _at_place(self, kernel: Kernel, values: Values, count: int) -> tuple[dict[str, Read], NDArray[np.int8]]:
+    def _at_place(self, kernel: Kernel, values: Values, count: int) -> dict[str, Read]:
         time = (
             np.array(self.ends) % self.run.cycle.duration
             if self.run.cycle.periodic and self.run.cycle.duration > 0
@@ -541,40 +541,14 @@ class _Group:
         plain = {path: primal(value) for path, value in values.items()}
         own = self._of_their_own(_picked(plain, lanes), times)
         if dual:
-            count = len(next(iter(reads.values())).status)
-            step = step_of(self.run, values, count)[lanes]
+            step = step_of(self.run, values, len(next(iter(reads.values())).status))
             slopes = {path: derivative(value) for path, value in values.items() if isinstance(value, Dual)}
-            sides = [
-                self._of_their_own(
-                    _picked(
-                        {
-                            **plain,
-                            **{
-                                path: plain[path] + way * step_of(self.run, values, count) * slope
-                                for path, slope in slopes.items()
-                            },
-                        },
-                        lanes,
-                    ),
-                    {},
-                )
-                for way in (-1.0, 1.0)
-            ]
-            for name, read in own.items():
-                changes = [
-                    np.where(
-                        step[:, 0] > 0,
-                        (getattr(sides[1][name], part) - getattr(sides[0][name], part)) / (2 * step[:, 0]),
-                        0.0,
-                    )
-                    for part in ("figure", "least", "most")
-                ]
-                own[name] = read._replace(
-                    **{
-                        part: Dual(getattr(read, part), change)
-                        for part, change in zip(("figure", "least", "most"), changes, strict=True)
-                    }
-                )
+
+            def beside(way: float) -> dict[str, Read]:
+                moves = {path: plain[path] + way * step * slope for path, slope in slopes.items()}
+                return self._of_their_own(_picked({**plain, **moves}, lanes), {})
+
+            own = _differing(own, beside(-1.0), beside(1.0), step[lanes, 0])
         return {name: _put(read, lanes, own[name]) for name, read in reads.items()}
 
     def _of_their_own(self, values: Values, times: Mapping[str, Array]) -> dict[str, Read]:
@@ -644,21 +618,30 @@ class _Group:
         return Courses.many(solve, breaks, lambda sizes: np.maximum(sizes, scales), accuracy_of(run.cycle, accuracy))
 
 
-def _joined_parts(parts: Sequence[Sequence[Number]], counts: Sequence[int], width: int) -> tuple[Number, ...]:
+def _differing(reads: dict[str, Read], below: dict[str, Read], above: dict[str, Read], step: Array) -> dict[str, Read]:
+    """What is read with derivatives by differences."""
+    found = {}
+    for name, read in reads.items():
+        numbers = []
+        for middle, low, high in zip(read[:3], below[name][:3], above[name][:3], strict=True):
+            change = np.divide(high - low, 2 * step, out=np.zeros_like(step), where=step > 0)
+            numbers.append(Dual(middle, change))
+        found[name] = Read(numbers[0], numbers[1], numbers[2], read.status, read.shown)
+    return found
+
+
+def _pieced(parts: Sequence[Sequence[Number]], counts: Sequence[int], width: int) -> tuple[Number, ...]:
     """The parts of a course, (lane, time), of pieces one after another."""
     if len(parts) == 1:
         return tuple(parts[0])
-    found = []
-    for each in zip(*parts, strict=True):
-        whole = [
-            linear(part, lambda array, n=n: np.broadcast_to(array, (n, width)))
-            for part, n in zip(each, counts, strict=True)
-        ]  # type: ignore[misc]
-        if isinstance(whole[0], Dual):
-            found.append(Dual(np.concatenate([one.real for one in whole]), np.concatenate([one.dual for one in whole])))
-        else:
-            found.append(np.concatenate(whole))
-    return tuple(found)
+
+    def wide(part: Number, count: int) -> Number:
+        return linear(part, lambda array: np.broadcast_to(array, (count, width)))
+
+    return tuple(
+        _joined(*(wide(part, count) for part, count in zip(each, counts, strict=True)), axis=0)
+        for each in zip(*parts, strict=True)
+    )
 
 
 def lanes_of(values: Values) -> int:
@@ -700,9 +683,7 @@ def _picked(values: Values, lanes: Lanes) -> dict[str, Number]:
 
 def _taken(number: Number, lanes: Lanes) -> Number:
     """Some lanes of a number, which may be one for all."""
-    return linear(
-        number, lambda array: array if np.shape(array)[0] == 1 < len(lanes) or len(array) == 1 else array[lanes]
-    )
+    return linear(number, lambda array: array if len(array) == 1 else array[lanes])
 
 
 def _shaped(number: Number, shape: tuple[int, ...]) -> Number:
@@ -711,11 +692,7 @@ def _shaped(number: Number, shape: tuple[int, ...]) -> Number:
 
     def of(array: Array) -> Array:
         array = np.asarray(array, float)
-        if array.ndim == 2 and array.shape[0] == 1 and array.shape[1] == flat[0] * flat[1]:
-            return array.reshape(shape)
-        if array.ndim == 1 and array.size == flat[0] * flat[1]:
-            return array.reshape(shape)
-        return np.broadcast_to(array, flat).reshape(shape)
+        return array.reshape(shape) if array.size == flat[0] * flat[1] else np.broadcast_to(array, flat).reshape(shape)
 
     return linear(number, of)
 
@@ -730,12 +707,13 @@ def _sorted(number: Number) -> Number:
     return linear(number, lambda array: np.take_along_axis(np.broadcast_to(array, order.shape), order, axis=-1))
 
 
-def _joined(*parts: Number) -> Number:
-    """Columns one after another."""
+def _joined(*parts: Number, axis: int = 1) -> Number:
+    """Numbers one after another."""
     if any(isinstance(part, Dual) for part in parts):
-        both = [(part.real, part.dual) if isinstance(part, Dual) else (part, 0.0 * part) for part in parts]
-        return Dual(*(np.concatenate(side, axis=1) for side in zip(*both, strict=True)))
-    return np.concatenate(parts, axis=1)
+        reals = [np.asarray(primal(part)) for part in parts]
+        duals = [np.broadcast_to(derivative(part), real.shape) for part, real in zip(parts, reals, strict=True)]
+        return Dual(np.concatenate(reals, axis), np.concatenate(duals, axis))
+    return np.concatenate(parts, axis)
 
 
 def _clipped(number: Number, low: float, high: float) -> Number:
@@ -752,16 +730,8 @@ def _within(array: Array, edges: Array) -> Array:
 
 def _whole(parts: Sequence[Read]) -> Read:
     """Of all lanes one after another."""
-
-    def joined(name: str) -> Number:
-        each = [getattr(part, name) for part in parts]
-        if isinstance(each[0], Dual):
-            return Dual(
-                np.concatenate([one.real for one in each]), np.concatenate([one.dual + 0.0 * one.real for one in each])
-            )
-        return np.concatenate(each)
-
-    return Read(*(joined(name) for name in Read._fields))
+    figure, least, most, shown = (_joined(*(part[k] for part in parts), axis=0) for k in (0, 1, 2, 4))
+    return Read(figure, least, most, np.concatenate([part.status for part in parts]), shown)
 
 
 def _put(read: Read, lanes: Lanes, own: Read) -> Read:
@@ -769,9 +739,14 @@ def _put(read: Read, lanes: Lanes, own: Read) -> Read:
 
     def replaced(whole: Number, part: Number) -> Number:
         if isinstance(whole, Dual):
-            return Dual(replaced(whole.real, part.real), replaced(whole.dual, part.dual))
-        whole = np.array(whole)
-        whole[lanes] = part
-        return whole
+            dual = np.broadcast_to(derivative(part), np.shape(primal(part)))
+            return Dual(replaced(whole.real, primal(part)), replaced(whole.dual, dual))
+        changed = np.array(whole)
+        if np.shape(whole)[1:] == np.shape(part)[1:]:  # there may be nothing to show
+            changed[lanes] = part
+        return changed
 
-    return Read(*(replaced(one, other) for one, other in zip(read, own, strict=True)))
+    numbers = [replaced(read[k], own[k]) for k in (0, 1, 2, 4)]
+    status = np.array(read.status)
+    status[lanes] = own.status
+    return Read(numbers[0], numbers[1], numbers[2], status, numbers[3])

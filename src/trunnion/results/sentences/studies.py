@@ -231,11 +231,6 @@ TOLERANCE = {
     "tolerance.negative": Sentence(
         WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
     ),
-    "tolerance.zero": Sentence(
-        WARNING,
-        "it is 0, and no tolerance changes it, so that its limits say nothing",
-        "check its sign (as: minimum, or largest), where it is taken, and whether the loads act",
-    ),
     "tolerance.range_fixed": Sentence(
         WARNING,
         "the tolerance of {numbers} does not move the range of {driver} in the samples, which are all at the same "

@@ -131,7 +131,6 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _range_ends(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
-        yield from _zero(outcome, of)
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
     if counted is not None:
@@ -276,18 +275,6 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
         yield finding_for("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
-
-
-def _zero(outcome: Outcome, of: Of) -> Iterator[Finding]:
-    """A measure with limits that is 0 whatever the numbers: nothing is known of it that way."""
-    measure, searched = (
-        of.measure,
-        [] if outcome.worst is None else outcome.worst[outcome.study.linear.measures.index(of)],
-    )
-    ends = [*map(float, of.total[:2]), *(corner.value for corner in searched)]
-    bounds = measure.at_least is not None or measure.at_most is not None
-    if bounds and of.reference.figure == 0 and not np.any(np.nan_to_num(ends)):
-        yield finding_for("tolerance.zero", f"measures.{measure.name}")
 
 
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:

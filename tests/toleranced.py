@@ -210,7 +210,7 @@ def sampler(found: ToleranceStudy, samples: int = 512, method: Any = "monte-carl
         found.run.system.mechanism.data(), found.measures, found.steps, method, samples, seed, "numpy", found.friction,
         len(found.plan.times), ((0.0, 1.0),) * len(found.measures), tuple(unknown),
     )  # fmt: skip
-    return Sampler(job, found.inputs, found.plan, found.kernel, found.references)
+    return job.prepare()
 
 
 def drawn(mechanism: Mechanism, u: Array) -> dict[str, Array]:

@@ -29,11 +29,11 @@ _ALGEBRA = (
         ("tests/algebra/test_screw.py",),
     ),
     Fault(
-        "quadrature-error-without-difference",
-        "algebra/quadrature.py",
-        "off = half * np.abs(values @ (KRONROD - GAUSS))",
-        "off = 0.0 * half * np.abs(values @ (KRONROD - GAUSS))",
-        ("tests/reference/test_means.py::test_the_rule_is_exact_for_polynomials_and_tells_its_error",),
+        "course-mean-of-even-panels",
+        "algebra/course.py",
+        "np.tensordot(self.half, integrals, 1)",
+        "np.tensordot(np.full_like(self.half, np.mean(self.half)), integrals, 1)",
+        ("tests/algebra/test_course.py",),
     ),
 )
 

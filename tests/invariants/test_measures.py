@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 import mechanisms
 import mechanisms_space
-from measured import figures, references
+from measured import figures, many
 from mechanisms import build, four_bar, slider_crank
 from trunnion.measures.measures import Measure
+from trunnion.measures.positions import path_of, plan
 from trunnion.solve.run import Run, prepare
 
 STATISTICS = ("maximum", "minimum", "peak-to-peak", "mean", "rms", "largest")
@@ -122,17 +123,14 @@ def test_windows_are_part_of_the_cycle(first: float, wide: float) -> None:
     run = RUN
     over = Measure("over", "rotation", "D", over=(first, first + wide), statistic="rms")
     whole = Measure("whole", "rotation", "D", statistic="maximum")
-    positions, nominal = references(run, [over, whole], 60)
-    window = positions.windows["over"]
+    window = plan(run, [over, whole], 60).windows["over"]
     assert np.all(np.diff(window.time) > 0)
-    assert (window.coordinate[0] - first + np.pi) % (2 * np.pi) - np.pi == pytest.approx(0, abs=1e-12)
-    assert window.coordinate[-1] - window.coordinate[0] == pytest.approx(wide, abs=1e-12)
-    walk = run.solve(window.time).walk
-    frame = walk.motions["rocker"].frame
-    ground = walk.motions["ground"].frame
-    assert ground.s == 0
-    angle = np.arctan2(frame.s, frame.c)
-    change = (nominal["over"].parts[0] - angle + np.pi) % (2 * np.pi) - np.pi
+    place = path_of(run, window.time[[0, -1]])
+    assert (place[0] - first + np.pi) % (2 * np.pi) - np.pi == pytest.approx(0, abs=1e-12)
+    assert place[1] - place[0] == pytest.approx(wide, abs=1e-12)
+    read = many(run, [over]).read(run.values, {"over": window.time})["over"]
+    frame = run.solve(window.time).walk.motions["rocker"].frame
+    change = (read.shown[0] - np.arctan2(frame.s, frame.c) + np.pi) % (2 * np.pi) - np.pi
     np.testing.assert_allclose(change, 0, atol=1e-10)
 
 

@@ -140,17 +140,22 @@ def test_powers_and_energy_of_friction() -> None:
     run, result = prepare(mechanism), trunnion.analyse(mechanism, 24)
     time = result["time"].values
     np.testing.assert_allclose(course(run, "power:O", time), result["drive_power"].sel(driver="O"), rtol=1e-12)
-    energies = {}
+    names = [str(joint) for joint in result["joint"].values]
+    asked = [
+        *(Measure(joint, "friction_energy", joint) for joint in names),
+        Measure("driven", "power", "O", statistic="mean"),
+    ]
+    found, energies = figures(run, asked, 24), {}
     for joint in result["joint"].values:
         lost = course(run, f"friction_power:{joint}", time)
         np.testing.assert_allclose(lost, result["friction_power"].sel(joint=joint), rtol=1e-12)
-        energy = figures(run, [Measure("energy", "friction_energy", str(joint))], 24)["energy"]
+        energy = found[str(joint)]
         mean = float(result["friction_power_mean"].sel(joint=joint))
         # A measure goes by fixed nodes, `analyse` by nodes that are added: they part where the guide changes its side.
         assert energy == pytest.approx(mean * run.cycle.duration, rel=5e-4 if joint == "S" else 1e-6)
         energies[joint] = energy
     # Over a whole cycle all that the driver gives is lost to friction: nothing else takes power here.
-    driven = figures(run, [Measure("driven", "power", "O", statistic="mean")], 24)["driven"] * run.cycle.duration
+    driven = found["driven"] * run.cycle.duration
     assert sum(energies.values()) == pytest.approx(driven, rel=1e-12)
     parts = [
         figures(run, [Measure("part", "friction_energy", "O", over=over)], 720)["part"]

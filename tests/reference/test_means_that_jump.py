@@ -13,11 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 import trunnion
-from trunnion.measures.evaluation import NumpyKernel, at_corner, sharpened
-from trunnion.measures.figures import reference
+from measured import many
 from trunnion.measures.measures import named
 from trunnion.measures.over_cycle import figures_of
-from trunnion.measures.positions import plan
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 
@@ -68,21 +66,12 @@ def sampled(model: trunnion.Mechanism, **numbers: Array) -> dict[str, Array]:
     """The figures of many presses at once, as a study has them."""
     run = prepare(model)
     measures = named(run.system.mechanism, FIGURES, run.values)
-    places = plan(run, measures, 24)
-    kernel = NumpyKernel(run, measures, FrictionMethod())
-    courses, _ = kernel.courses(run.values, places.times)
     spread = {
         "drivers.O.speed" if name == "speed" else f"dimensions.{name}": value[:, None]
         for name, value in numbers.items()
     }
-    values = run.system.mechanism.parameter_set.evaluate(spread)
-    count, found = len(next(iter(numbers.values()))), {}
-    for measure in measures:
-        nominal = reference(measure, courses[measure.name], places.windows[measure.name], run.system)
-        known = sharpened(nominal, kernel, places, run.values)
-        assert known.corner
-        found[measure.name] = at_corner(kernel, places, values, known, np.zeros((count, 1)), np.zeros(count))
-    return found
+    reads = many(run, measures).read(run.system.mechanism.parameter_set.evaluate(spread))
+    return {name: np.asarray(read.figure) for name, read in reads.items()}
 
 
 @pytest.mark.parametrize("start", [0.0, 326.9, 327.1, 100.0])

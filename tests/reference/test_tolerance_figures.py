@@ -9,7 +9,6 @@ import pytest
 
 from toleranced import FOURBAR, fourbar, fourbar_angle, rssr
 from trunnion import tolerance
-from trunnion.measures.extremes import Grid, largest
 
 ERROR = {"transmission_error": "D"}
 PATH = {"path_error": "coupler.C"}
@@ -57,16 +56,6 @@ def test_mean_path_error_by_corners() -> None:
     signs = np.array(np.meshgrid(*[(-1, 1)] * 4)).reshape(4, -1).T
     means = [np.mean(np.abs(path(tuple(np.array(nominal) + 5e-5 * one)) - path(nominal))) for one in signs]
     assert found.searched_upper.item() == pytest.approx(max(means), rel=1e-9)
-
-
-def test_place_with_a_gap_is_not_known() -> None:
-    """Where a curve has no answer at a position, neither its largest value nor its place is known."""
-    at = np.linspace(0.0, 1.0, 24, endpoint=False)
-    curve = np.stack([np.sin(2 * np.pi * at), np.sin(2 * np.pi * at)])
-    curve[1, 20] = np.nan
-    found = largest(curve, Grid(at, 1.0))
-    assert np.isfinite(found.of(at, 1.0)[0])
-    assert np.isnan(found.of(at, 1.0)[1])
 
 
 def test_figure_that_does_not_exist() -> None:

@@ -217,13 +217,3 @@ def test_a_tolerance_of_the_range_of_a_driver_is_told(numbers: dict[str, str], t
     warned = [one for one in found.trunnion.findings if one.code == "tolerance.range_fixed"]
     assert [one.figures["numbers"] for one in warned] == ([told] if told else [])
     assert (float(found["worst_case_upper"][0]) == 0) == bool(told)
-
-
-@pytest.mark.parametrize(("statistic", "told"), [("maximum", True), ("minimum", False), ("largest", False)])
-def test_a_limit_on_a_figure_that_is_always_zero_is_told(statistic: str, told: bool) -> None:
-    """The torque of a crank that turns backwards against a resistance is below zero, its maximum 0."""
-    loads = {"press": {"joint": "C", "resisting_force": "100 N * between(piston.P.x, 0.2 m, 1 m)", "only": "positive"}}
-    measures = {"torque": {"effort": "A", "as": statistic, "at_most": "9 N m"}}
-    model = slider_crank(loads=loads, measures=measures, gravity=[0, 0], drivers={"A": {"speed": -5.0}})
-    found = tolerance(model, methods=["linear", "worst-case"], steps=24).trunnion.findings
-    assert ("tolerance.zero" in [one.code for one in found]) == told

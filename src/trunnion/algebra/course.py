@@ -18,8 +18,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev, legendre
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
+
+from trunnion.algebra import panels as reading
+from trunnion.algebra.panels import ENDS, FIT, GAUSS_WEIGHTS, INTEGRAL, ON_GAUSS, ON_GRID, ON_POINTS, ORDER, POINTS
 
 __all__ = ["Accuracy", "Courses", "Place", "Solve"]
 
@@ -28,23 +31,10 @@ Labels = NDArray[np.intp]
 # mechanisms (lane,) and times (lane, node), s, to the rows there, (row, lane, node), and the states, (lane, node)
 Solve = Callable[[Labels, Array], tuple[Array, NDArray[np.integer]]]
 
-ORDER = 12  # coefficients of a panel
-POINTS = -np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
-ON_POINTS = chebyshev.chebvander(POINTS, ORDER - 1).T
-FIT = np.linalg.inv(chebyshev.chebvander(POINTS, ORDER - 1))
-GRID = np.linspace(-1.0, 1.0, 49)  # places of a panel among which extremes are looked for first
-ON_GRID = chebyshev.chebvander(GRID, ORDER - 1).T
-NARROWED = 4  # rounds of that search, each of them about the best place of the one before
-GAUSS, GAUSS_WEIGHTS = legendre.leggauss(ORDER)
-ON_GAUSS = chebyshev.chebvander(GAUSS, ORDER - 1).T
-ENDS = np.array([(-1.0) ** np.arange(ORDER), np.ones(ORDER)]).T
-INTEGRAL = ON_GAUSS @ GAUSS_WEIGHTS  # of every Chebyshev polynomial over a panel
 CHECKED, TORN = 5, 1e3  # times that edges are looked at; of what is small: a row that changes by more at one jumps
 TOSSED = 1e-3  # of the whole: width of panels whose state may be the gravest that they have
 CROWDED, CROWD = 1e-7, 4  # of the whole: in one place; panels of mixed states there: a break has one or two
 HALVED = 2  # rounds in which a panel is halved; then it is parted about the place where a row bends most
-NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
-FLAT = 1e-9  # of its size: a course that changes less is constant, and of tops that differ less the first counts
 BESIDE = 1e-8  # of the whole: an extreme is at a break if it is no farther from it
 ONE = 1e-7  # of the whole: passages that are one, as where a row touches a level
 REAL = 1e-7  # imaginary part of a root that counts as real: of a double root it is the square root of rounding
@@ -228,42 +218,17 @@ class Courses:
         Place
             The first of several; None where no panel has a value.
         """
-        chosen = np.arange(len(self.half)) if panels is None else np.flatnonzero(panels)
-        values = sign * of(self._on_grid[:, chosen])
-        values = np.where(np.isfinite(values), values, -np.inf)
-        if not np.any(np.isfinite(values)):
+        allowed = True if panels is None else panels
+        found = reading.extreme(np.moveaxis(self.coefficients, 1, 0)[:, None], of, sign, allowed, floor)
+        value, panel, spot = float(np.ravel(found.value)[0]), int(found.panel[0]), float(np.ravel(found.spot)[0])
+        if not np.isfinite(value):
             return None
-        high, low = float(np.max(values)), float(np.min(values[np.isfinite(values)]))
-        flat = max(FLAT * max(abs(high), abs(low)), floor)
-        if high - low <= flat:
-            return Place(sign * high, float("nan"), everywhere=True)
-        near = np.flatnonzero(np.max(values, axis=1) >= high - NEAR * (high - low))
-        chosen, values = chosen[near], values[near]
-        top, best = GRID[np.argmax(values, axis=1)], np.max(values, axis=1)
-        for k in range(1, NARROWED + 1):
-            step = GRID[1] - GRID[0]
-            spots = np.clip(top[:, None] + GRID * step ** (k - 1) * step, -1.0, 1.0)
-            values = self._signed(of, sign, chosen, spots)
-            rows, most = np.arange(len(chosen)), np.argmax(values, axis=1)
-            better = values[rows, most] > best
-            top, best = np.where(better, spots[rows, most], top), np.where(better, values[rows, most], best)
-        k = int(np.argmax(best >= np.max(best) - flat))
-        time = float(self.edges[chosen[k]] + self.half[chosen[k]] * (top[k] + 1.0))
+        if found.constant[0]:
+            return Place(value, float("nan"), everywhere=True)
+        time = float(self.edges[panel] + self.half[panel] * (spot + 1.0))
         nearest = float(self.breaks[np.argmin(np.abs(self.breaks - time))])
-        if abs(nearest - time) <= BESIDE * self.span:
-            return Place(sign * float(np.max(best)), nearest, at_break=True)
-        return Place(sign * float(np.max(best)), time)
-
-    @cached_property
-    def _on_grid(self) -> Array:
-        """Every row at the places of the grid of every panel, (row, panel, place)."""
-        return np.moveaxis(self.coefficients @ ON_GRID, 1, 0)
-
-    def _signed(self, of: Callable[[Array], Array], sign: float, panels: Labels, spots: Array) -> Array:
-        """A number at places of some panels, (panel, place), −∞ where it has no value."""
-        basis = np.moveaxis(chebyshev.chebvander(spots, ORDER - 1), 2, 1)
-        values = sign * of(np.moveaxis(self.coefficients[panels] @ basis, 1, 0))
-        return np.where(np.isfinite(values), values, -np.inf)
+        at_break = abs(nearest - time) <= BESIDE * self.span
+        return Place(value, nearest if at_break else time, at_break)
 
     def passages(self, row: int, level: float = 0.0) -> Array:
         """Times, s, rising, at which a row passes a level; where it jumps over it that of the jump."""
@@ -282,10 +247,11 @@ class Courses:
 
     def within(self, row: int, low: float, high: float) -> float:
         """Share of the time that a row is between two levels."""
-        cuts = [self.passages(row, level) for level in (low, high) if np.isfinite(level)]
-        times = np.unique(np.concatenate([self.edges, *cuts]))
-        middle = self.at((times[1:] + times[:-1]) / 2)[row]
-        return float(np.sum(np.diff(times)[(middle >= low) & (middle <= high)]) / self.span)
+        own = self.coefficients[None, :, row]
+        both = [
+            reading.above(own, level) if np.isfinite(level) else np.where(level < 0, 2.0, 0.0) for level in (low, high)
+        ]
+        return float(np.sum((both[0] - both[1]) * self.half) / self.span)
 
     def sides(self, row: int) -> tuple[Array, Array]:
         """The values before and after every inner edge; they differ where the row jumps."""

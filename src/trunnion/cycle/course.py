@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses, Place
-from trunnion.algebra.quadrature import CANCELLED
+from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.deviations import COMPARED, fill_errors
 from trunnion.cycle.fill import allocate
 from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown

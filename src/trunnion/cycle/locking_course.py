@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
-from trunnion.algebra.quadrature import CANCELLED
+from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
 from trunnion.cycle.locking_states import (
     BACK_LOCKED,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.quadrature import CANCELLED
+from trunnion.algebra.panels import CANCELLED
 from trunnion.errors import Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.loads import has_useful_work

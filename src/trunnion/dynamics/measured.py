@@ -16,7 +16,8 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.batch import figures_in_time, one_by_one
 from trunnion.dynamics.prepared import CYCLES
 from trunnion.errors import Finding
-from trunnion.measures.evaluation import Courses, NumpyKernel, shape_of
+from trunnion.measures.evaluation import Curves, NumpyKernel, shape_of
+from trunnion.measures.many import step_of
 from trunnion.measures.measures import Measure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
@@ -25,15 +26,13 @@ __all__ = ["MotionKernel", "courses_in_time", "numbers_in_time", "slow_motions",
 
 Array = NDArray[np.float64]
 
-STEP = 1e-3  # of a number, by which differences are taken
-STEP_OF_NONE = 1e-5  # of the mechanism's size, or of a radian: the step of a number that is 0
 FEW, KEPT = 256, 64  # samples of which figures are kept, and how many of them
 
 
 class MotionKernel(NumpyKernel):
     """The analysis, with the figures of motions in time."""
 
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
         """As `NumpyKernel.courses`; a measure of a motion in time is one number a sample."""
         found, status = super().courses(values, time)
         return found | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
@@ -81,7 +80,7 @@ def numbers_in_time(
         figures = _known(run, driver, own, count, duration, times)
         return {name: _row(figure, column) for name, figure in figures.items()}
     slopes = {path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1)) for path, value in dual.items()}
-    step = _steps(run, own, slopes)
+    step = step_of(run, values, count)
     moved = np.flatnonzero(np.any(np.array(list(slopes.values())) != 0.0, axis=(0, 2)))
     tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in own.items()}
     figures = _known(run, driver, tried, count + 2 * len(moved), duration, times)
@@ -120,18 +119,6 @@ def _column(value: Number, count: int) -> Number:
     if not np.ndim(value):
         return value
     return np.broadcast_to(np.asarray(value, float), (count, 1)) if np.size(value) > 1 else float(np.ravel(value)[0])
-
-
-def _steps(run: Run, own: Mapping[str, Number], slopes: Mapping[str, Array]) -> Array:
-    """By how much each row is moved along its derivatives, (row, 1)."""
-    with np.errstate(all="ignore"):
-        sizes = np.array([np.abs(own[path] / np.where(slope == 0.0, np.nan, slope)) for path, slope in slopes.items()])
-        sizes[sizes == 0.0] = np.nan
-    size = float(np.ravel(run.system.size(run.values))[0])
-    found = np.full(sizes.shape[1:], STEP_OF_NONE * size)
-    known = np.any(np.isfinite(sizes), axis=0)
-    found[known] = STEP * np.nanmedian(np.where(np.isfinite(sizes), sizes, np.nan)[:, known], axis=0)
-    return found
 
 
 def _tried(value: Number, slope: Array | None, step: Array, moved: NDArray[np.intp]) -> Number:

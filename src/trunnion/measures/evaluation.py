@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -12,13 +12,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.quadrature import NODES
 from trunnion.errors import Status
-from trunnion.measures.averages import averaged, own_edges, with_jumps
-from trunnion.measures.corners import extreme, raised, sides_of, with_corner
-from trunnion.measures.figures import Reference, known
+from trunnion.measures.figures import known
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -26,26 +22,22 @@ from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.status import pose_status, status_of
-from trunnion.solve.switches import Mechanisms, tracked
 
-__all__ = [
-    "Courses",
-    "Kernel",
-    "NumpyKernel",
-    "at_corner",
-    "courses_of",
-    "looking",
-    "sharpened",
-    "where_known",
-]
+__all__ = ["Curves", "Kernel", "NumpyKernel", "courses_of", "shape_of", "where_known"]
 
-Courses = dict[str, tuple[Number, ...]]
+Curves = dict[str, tuple[Number, ...]]  # the parts of the course of each measure
 
 
 class Kernel(Protocol):
-    """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s."""
+    """Evaluates batches: values of the mechanism, (sample, 1) where they vary, and times, s.
 
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]: ...
+    at_once: places that it takes best at a time.
+    """
+
+    @property
+    def at_once(self) -> int: ...
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]: ...
 
 
 @dataclass(frozen=True)
@@ -55,6 +47,11 @@ class NumpyKernel:
     run: Run
     measures: Sequence[Measure]
     friction: FrictionMethod
+
+    @property
+    def at_once(self) -> int:
+        """Places whose arrays stay in cache."""
+        return CHUNK
 
     @cached_property
     def forces(self) -> bool:
@@ -75,7 +72,7 @@ class NumpyKernel:
             walk = posed if all(measure.of_places for measure in self.measures) else forward
             return walk(self.run.system, values, self.run.chosen.assembly, time)
 
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
         """Course of each measure by name, parts that broadcast to (sample, position), and the status of each.
 
         NaN where a status rules it out.
@@ -94,7 +91,7 @@ class NumpyKernel:
 
 def courses_of(
     run: Run, measures: Sequence[Measure], time: NDArray[np.float64], method: FrictionMethod
-) -> tuple[Courses, NDArray[np.int8]]:
+) -> tuple[Curves, NDArray[np.int8]]:
     """The course of each measure of the mechanism itself at some times, s, and their statuses; pins lie in their seats.
 
     What was asked of the method's margin is left to the measures.
@@ -111,69 +108,6 @@ def courses_of(
             for measure in measures
         }
     return found, status
-
-
-def at_corner(
-    kernel: Kernel,
-    plan: PositionPlan,
-    values: Mapping[str, Number],
-    known: Reference,
-    course: NDArray[np.float64],
-    figures: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Figures, (sample,), of a measure whose extreme is at a corner or may be, of plain numbers.
-
-    course: (sample, position); figures: what is made of it without corners.
-    """
-    run, look = plan.run, looking(kernel, plan, values, known.measure)
-    of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle] * len(course))
-    if known.window.edges is not None:
-        return _averaged(kernel, plan, known, of)
-    times = tracked(of, known.bends, lambda own, time: replace(plan, times=time).moved(own))
-    beside = sides_of(known, times, run.cycle)
-    return extreme(known, course, look, beside) if known.corner else raised(known, course, look, beside, figures)
-
-
-def _averaged(kernel: Kernel, plan: PositionPlan, known: Reference, of: Mechanisms) -> NDArray[np.float64]:
-    """Means of a course that jumps, (sample,), so many samples at a time that their arrays stay in cache."""
-    edges = own_edges(known, of, plan)
-    found = []
-    for rows in np.array_split(np.arange(len(edges)), -(-edges.size * len(NODES) // CHUNK)):
-        look = _parts_at(kernel, plan, of.picked(rows), known.measure)
-        found.append(averaged(known, look, edges[rows]))
-    return np.concatenate(found)
-
-
-def _parts_at(
-    kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number], measure: Measure
-) -> Callable[[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """The parts of the course of a measure, at times as of `looking`."""
-
-    def look(time: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        time = time % plan.run.cycle.duration if plan.run.cycle.periodic else time
-        courses, _ = kernel.courses(values, replace(plan, times=time).moved(values))
-        return [np.broadcast_to(np.asarray(primal(part), float), time.shape) for part in courses[measure.name]]
-
-    return look
-
-
-def sharpened(known: Reference, kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number]) -> Reference:
-    """The nominal mechanism with what is to be known of corners and jumps of its course."""
-    if known.window.edges is not None:
-        return with_jumps(known, _parts_at(kernel, plan, values, known.measure), plan, values)
-    return with_corner(known, looking(kernel, plan, values, known.measure), plan.run)
-
-
-def looking(
-    kernel: Kernel, plan: PositionPlan, values: Mapping[str, Number], measure: Measure
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """The course of a measure at the times of the nominal mechanism, or those that are the same of others."""
-
-    def look(time: NDArray[np.float64]) -> NDArray[np.float64]:
-        courses, _ = kernel.courses(values, replace(plan, times=time).moved(values))
-        return np.broadcast_to(np.asarray(primal(courses[measure.name][0]), float), time.shape)
-
-    return look
 
 
 def shape_of(values: Mapping[str, Number], time: Number) -> tuple[int, ...]:

@@ -1,301 +1,410 @@
-"""The figure of a measure: one number a sample, made of its course over the positions.
+"""The figure of a measure: one number a mechanism, read of its courses over the cycle or a window.
 
-A course is what `Measure.curve` gives at the positions of a `positions.Plan`; `reference` keeps that of the
-nominal mechanism once, `figure` makes the numbers of many samples. Angles follow those of the nominal mechanism, from
-which they are less than half a turn away. Extremes lie between positions too (`extremes`: value off by O(h⁷), place by
-O(h⁶), h the step, where the course is smooth); means are integrals between the places where the mechanism switches
-(`quadrature`, `averages`). A figure is NaN where a position that it needs has no answer, and a dead centre that is not
-within its range is NaN.
-
-With dual numbers a figure has its exact derivatives. That of a largest |deviation| or of a distance from the nominal
-place has none at the nominal mechanism itself, where it is 0 whatever way one goes: take those of the course there.
+`Panels` are the courses of one mechanism or of many, between breaks of their own, over the times of the nominal
+mechanism: other speeds of the drive change how much time a panel counts, not where it is. Angles follow those of the
+nominal mechanism, from which they are less than half a turn away. A figure is NaN where a place that it needs has no
+answer, and a dead centre that is not within its range is NaN. With dual numbers a figure has its exact derivatives, the
+motion of the breaks included.
 """
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Courses
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.quadrature import CANCELLED
+from trunnion.algebra.panels import (
+    CANCELLED,
+    ENDS,
+    GAUSS_WEIGHTS,
+    ON_GAUSS,
+    ORDER,
+    Made,
+    OnGrid,
+    Top,
+    above,
+    extreme,
+    linear,
+    selected,
+    spread_out,
+    weighted,
+)  # fmt: skip
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Status
-from trunnion.measures.dwell import share_within
-from trunnion.measures.extremes import FLAT, Extreme, Grid, largest, shape_of
-from trunnion.measures.lines import distances, total, turn
+from trunnion.measures.lines import direction, turn
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import Window
-from trunnion.solve.switches import Bend
-from trunnion.solve.system import System
+from trunnion.measures.positions import gain_of, path_of
+from trunnion.solve.run import Run
 
-__all__ = [
-    "RULES", "SHORTEST", "Curve", "Reference", "course_of", "figure", "follow", "judged", "kept",
-    "known", "moment", "reference", "shown", "span",
-]  # fmt: skip
+__all__ = ["Panels", "Reading", "columns", "follow", "known", "near", "rows_of", "within_limits"]
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
-
-
-class Curve(NamedTuple):
-    """What a figure is made of: one number, (…, position), at rising times, s.
-
-    coordinate: of the first driver there, which gains so much in a period; there is no period of a range. band: of a
-    dwell.
-    """
-
-    number: Number
-    grid: Grid
-    coordinate: Array
-    gain: float
-    band: tuple[float, float] = (-np.inf, np.inf)
-
-    def largest(self, sign: float = 1.0) -> Extreme:
-        """The largest value, or the least one with its sign changed."""
-        return largest(self.number if sign == 1.0 else sign * self.number, self.grid)
-
-    def both(self) -> tuple[Number, Number]:
-        """The largest value, and the least one with its sign changed."""
-        found = largest(_both_ways(self.number), self.grid).value
-        return found[0], found[1]
-
-    def place(self, sign: float = 1.0) -> Number:
-        """The coordinate at which it is largest."""
-        return self.largest(sign).of(self.coordinate, self.gain)
-
-
-def _both_ways(number: Number, shape: tuple[int, ...] | None = None) -> Number:
-    """The number and its negative, one after the other along a new first axis."""
-    shape = shape or shape_of(number)
-    if isinstance(number, Dual):
-        return Dual(_both_ways(number.real, shape), _both_ways(number.dual, shape))
-    found = np.empty((2, *shape))
-    found[0] = number
-    np.negative(found[0], out=found[1])
-    return found
-
-
-# ---- rules ----------------------------------------------------------------------------------------------------
-
-
-def _largest(course: Curve) -> Number:
-    """The largest |value|."""
-    above, below = course.both()
-    return namespace(above, below).maximum(above, below)
-
-
-def _dead_centre(course: Curve, sign: float = 1.0) -> Number:
-    """The place of the largest value within the range; NaN if it is at an end, where the motion does not turn back."""
-    found = course.largest(sign)
-    return found.of(course.coordinate, course.gain) + np.where(found.inside, 0.0, np.nan)
-
-
-def _time_ratio(course: Curve) -> Number:
-    """The longer of the two ways between the places of its largest and its least value over the shorter.
-
-    At an even drive it is that of their times: (1 − s)/s or s/(1 − s), s being their distance over that of a period.
-    NaN where the motion does not come again, is none, or jumps.
-    """
-    ways = _dead_centre(course) - _dead_centre(course, -1.0)
-    if course.grid.period is None or not course.gain:
-        return ways * np.nan
-    share = ways * (1.0 / course.gain)
-    share = share - np.floor(primal(share))
-    xp = namespace(share)
-    longer = xp.maximum(share, 1.0 - share)
-    return longer / xp.where(primal(longer) < 1 - SHORTEST, 1.0 - longer, np.nan)
-
-
-def _rms(course: Curve) -> Number:
-    square = total(course.number * course.number, course.grid.weights)
-    return namespace(square).sqrt(square)
-
-
-RULES: dict[str, Callable[[Curve], Number]] = {
-    "value": lambda course: course.number[..., 0],
-    "maximum": lambda course: course.largest().value,
-    "minimum": lambda course: -course.largest(-1.0).value,
-    "peak-to-peak": lambda course: operator.add(*course.both()),
-    "mean": lambda course: total(course.number, course.grid.weights),
-    "rms": _rms,
-    "largest": _largest,
-    "place-of-maximum": lambda course: course.place(),
-    "place-of-minimum": lambda course: course.place(-1.0),
-    "dead centre": _dead_centre,
-    "dead centre, least": lambda course: _dead_centre(course, -1.0),
-    "time ratio": _time_ratio,
-    "deviation": _largest,  # of the course less that of the nominal mechanism
-    "dwell": lambda course: share_within(course.number, course.grid, course.band),
-}
-
-
-def _ratio(useful: Number, driven: Number, course: Curve) -> Number:
-    """Useful over drive work of the cycle; NaN where the loads drive.  [D 1]"""
-    work = total(driven, course.grid.weights)
-    share = _net(useful, course) / namespace(work).where(primal(work) > 0, work, np.nan)
-    return namespace(share, work).where(primal(_net(driven, course)) > 0, share, np.nan)
-
-
-def _net(power: Number, course: Curve) -> Number:
-    """The mean of a power, 0 where it is no more than rounding or the error of its integral: it cancels.
-
-    The error as QUADPACK tells it from two rules; see `quadrature`.
-    """
-    value, real = total(power, course.grid.weights), primal(power)
-    size = total(np.abs(real), course.grid.weights)
-    off = np.abs(primal(value) - total(real, course.grid.rough)) / np.where(size > 0, size, 1.0)
-    error = size * np.maximum(CANCELLED, np.minimum(off, (200 * off) ** 1.5))
-    return namespace(value).where(np.abs(primal(value)) <= error, 0.0, value)
-
-
-# ---- the nominal mechanism and others -------------------------------------------------------------------------
+BESIDE = 1e-9  # of the cycle: on a side of a break
+NARROW = 1e-9  # of the courses: panels that hold no place
+SIGNS = {"maximum": 1.0, "minimum": -1.0, "place-of-maximum": 1.0, "place-of-minimum": -1.0, "dead centre": 1.0,
+         "dead centre, least": -1.0}  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Reference:
-    """A measure of the nominal mechanism.
+class Panels:
+    """Courses of mechanisms, a lane each.
 
-    parts: its course, (position,) each, angles without jumps; turning: whether it is an angle; attitude: whether it is
-    the turn of a link in space; turns: what an angle gains in a period, rad; figure: its figure, 0 for what is a
-    deviation by itself; NaN where it has none. corner: whether that is an extreme at a corner of the course, `corners`;
-    bends: of the forces, beside which it may be.
+    low, half: start and half width of every panel, s, (lane, panel); coefficients: (row, lane, panel, coefficient);
+    weights: how much time every Gauss node of a panel counts, (lane, panel, node or 1). endless: panels where a number
+    is infinite; left_out: where extremes are not looked for.
     """
 
+    low: Number
+    half: Number
+    coefficients: Number
+    weights: Number
+    endless: NDArray[np.bool_]
+    left_out: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, courses: Courses, endless: NDArray[np.bool_], left_out: NDArray[np.bool_]) -> Panels:
+        """Those of one mechanism."""
+        low, half = courses.edges[None, :-1], courses.half[None]
+        coefficients = np.moveaxis(courses.coefficients, 1, 0)[:, None]
+        return cls(low, half, coefficients, half[..., None], endless[None], left_out[None])
+
+    @classmethod
+    def constant(cls, rows: Number) -> Panels:
+        """Numbers at a place, (row, lane), as courses that do not change."""
+        coefficients = linear(rows, lambda array: array[..., None, None] * (np.arange(ORDER) == 0))
+        half = np.full((np.shape(primal(rows))[1], 1), 0.5)
+        return cls(0.0 * half, half, coefficients, half[..., None], half < 0, half < 0)
+
+    def rows(self, rows: slice) -> Panels:
+        """Some of the rows."""
+        return replace(self, coefficients=linear(self.coefficients, lambda array: array[rows]))
+
+    def made(self, coefficients: Number) -> Panels:
+        """The same panels with other rows."""
+        return replace(self, coefficients=coefficients)
+
+    def mean(self, of: Made) -> Number:
+        """Mean over time of a number made of the rows, (lane,)."""
+        return weighted(of(linear(self.coefficients, lambda array: array @ ON_GAUSS)), self.weights)
+
+    def tails(self, rows: slice = slice(None)) -> Array:
+        """Last coefficients of the polynomials, (lane, panel): what they may be off by."""
+        return np.asarray(np.max(np.abs(primal(self.coefficients)[rows, ..., -2:]), axis=(0, -1)))
+
+    def error(self, rows: slice = slice(None)) -> Array:
+        """How far means of rows may be off, by the last coefficients, (lane,)."""
+        tails = self.tails(rows)
+        half = np.broadcast_to(primal(self.half), tails.shape)
+        return np.asarray(np.sum(2.0 * tails * half, axis=-1) / np.sum(2.0 * half, axis=-1))
+
+    def picked(self, lanes: Any) -> Panels:
+        """Some of the lanes, of plain numbers."""
+
+        def taken(array: Array) -> Array:
+            return array if len(array) == 1 else array[lanes]
+
+        return Panels(
+            taken(primal(self.low)), taken(primal(self.half)), primal(self.coefficients)[:, lanes],
+            taken(primal(self.weights)), self.endless[lanes], self.left_out[lanes],
+        )  # fmt: skip
+
+    def on_grid(self, of: Made) -> OnGrid:
+        """A number made of the rows at the places of the grid, worked out once."""
+        known: dict[Made, OnGrid] = self.__dict__.setdefault("_on_grid", {})
+        if of not in known:
+            known[of] = OnGrid.of(self.coefficients, of)
+        return known[of]
+
+    def top(self, of: Made, sign: float = 1.0) -> Top:
+        """The largest value of a number made of the rows, or with sign −1 its least."""
+        half = primal(self.half)
+        wide = half > NARROW * np.sum(half, -1)[:, None]
+        return extreme(self.coefficients, of, sign, wide & ~self.left_out, 0.0, self.on_grid(of))
+
+    def time(self, top: Top) -> Number:
+        """Where an extreme is, s, (lane,); that of a constant is at the start."""
+        lanes = np.arange(len(top.panel))
+        low, half = (
+            linear(part, lambda array: np.broadcast_to(array, (len(lanes), np.shape(array)[-1]))[lanes, top.panel])
+            for part in (self.low, self.half)
+        )
+        start = np.broadcast_to(primal(self.low), np.shape(primal(self.coefficients))[1:3])[:, 0]
+        return selected(~top.constant, low + half * (top.spot + 1.0), start)
+
+    def at(self, time: Array) -> Number:
+        """The rows at times, s, (row, lane, time)."""
+        low, half = np.asarray(primal(self.low)), np.asarray(primal(self.half))
+        return linear(self.coefficients, lambda array: spread_out(array, low, half, time))
+
+
+def first(rows: Any) -> Number:
+    """The first row, which most measures are of."""
+    return rows[0]
+
+
+def length(rows: Any) -> Number:
+    """The length of a vector."""
+    square: Number = rows[0] * rows[0]
+    for k in range(1, np.shape(primal(rows))[0]):
+        square = square + rows[k] * rows[k]
+    return namespace(square).sqrt(square)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the figure of a measure is read of its courses.
+
+    ends: times, s, of the window; none of a whole cycle. nominal: the figure of the nominal mechanism, near which
+    places lie; NaN of none.
+    """
+
+    run: Run
     measure: Measure
-    window: Window
-    positions: int
-    turning: bool
-    attitude: bool
-    parts: tuple[Array, ...]
-    turns: float = 0.0
-    figure: float = 0.0
-    corner: bool = False
-    bends: tuple[Bend, ...] = ()
+    ends: tuple[float, ...] = ()
+    nominal: float = float("nan")
 
-    @property
-    def against(self) -> bool:
-        """Whether the course is taken less that of the nominal mechanism."""
-        return self.measure.of.against or self.attitude or self.measure.rule == "deviation"
+    def figure(self, panels: Panels) -> Number:
+        """SI, (lane,); NaN where a part of the courses has no answer."""
+        return self.read(panels)[0]
 
-    @property
-    def opened(self) -> bool:
-        """Whether the course gains whole turns in a period, so that its end is another value than its start."""
-        return bool(self.window.period is not None and self.turns and not self.against)
+    def read(self, panels: Panels) -> tuple[Number, Number, Number]:
+        """The figure, and the least and largest signed deviation from the nominal mechanism: of the figure, which is
+        both, or over the courses where the figure is a largest |deviation|."""
+        rule = self.measure.rule
+        gone = np.any(np.isnan(primal(panels.coefficients)[..., 0]), axis=0)
+        lost = np.any(gone & ~panels.endless, axis=1)
+        with np.errstate(all="ignore"):
+            if rule == "deviation":
+                panels, of = self.number(panels)
+                ends = [selected(~lost, panels.top(of, sign).value, np.nan) for sign in (-1.0, 1.0)]
+                return namespace(*ends).maximum(-ends[0], ends[1]), ends[0], ends[1]
+            found = selected(~lost, self._of_rule(panels), np.nan)
+            if np.any(panels.endless):
+                endless = np.all(panels.endless, axis=1) if rule == "minimum" else np.any(panels.endless, axis=1)
+                found = selected(lost | ~endless, found, np.inf)
+        return found, found - self.nominal, found - self.nominal
 
-    @cached_property
-    def grid(self) -> Grid:
-        """The positions as the places of a curve."""
-        time, period = self.window.time, self.window.period
-        if not self.opened or period is None:
-            return Grid(time, period, self.window.weights)
-        return Grid(np.append(time, time[0] + period))
+    def offending(self, panels: Panels, limit: float) -> NDArray[np.bool_]:
+        """Panels that do not resolve the courses, so that the figure may be off by more than a limit, (lane, panel): of
+        an extreme those that may have the highest value."""
+        rule, tails = self.measure.rule, panels.tails()
+        if rule in ("mean", "rms", "ratio", "work", "dwell"):
+            half = np.broadcast_to(primal(panels.half), tails.shape)
+            parts = tails * half / np.sum(half, axis=1, keepdims=True)
+            return np.asarray((np.sum(parts, axis=1, keepdims=True) > limit) & (parts > limit / len(parts[0])))
+        panels, of = self.number(panels)
+        grid, found = panels.on_grid(of), np.zeros(tails.shape, bool)
+        for sign in (SIGNS[rule],) if rule in SIGNS else (1.0, -1.0):
+            tops = grid.most if sign > 0 else -grid.least
+            found |= tops + 2.0 * tails >= np.max(tops, axis=1, keepdims=True)
+        wide = primal(panels.half) > NARROW * np.sum(primal(panels.half), 1)[:, None]
+        return np.asarray(found & (tails > limit) & wide)
 
+    def number(self, panels: Panels) -> tuple[Panels, Made]:
+        """What an extreme is of: rows and the number made of them."""
+        if self.measure.rule == "line":
+            return _across(panels)
+        return panels, length if self.measure.kind == "path_error" else first
 
-def reference(
-    measure: Measure, curve: Sequence[Number], window: Window, system: System, rate: Number | None = None
-) -> Reference:
-    """A measure of the nominal mechanism from its course over all positions of the plan.
+    def shown(self, panels: Panels, time: Array) -> Number:
+        """One number at times, s, (lane, time), that the figure is a statistic of; for pictures."""
+        if self.measure.rule == "ratio":
+            rows = panels.at(time)
+            return rows[0] / selected(primal(rows[1]) > 0, rows[1], np.nan)
+        panels, of = self.number(panels)
+        return of(panels.at(time))
 
-    rate: of the course by time, `Measure.rate`, so that an angle is followed over more than half a turn a step.
-    """
-    positions = max(shape_of(part)[-1] if shape_of(part) else 1 for part in curve)
-    positions = max(positions, int(np.max(window.index)) + 1)
-    parts = tuple(_row(window.of(primal(part), positions), len(window.index)) for part in curve)
-    turning, turns = measure.turning(system), 0.0
-    if turning:
-        rates = None if rate is None else _row(window.of(primal(rate), positions), len(window.index))
-        followed, turns = _followed(parts[0], window, rates)
-        parts = (followed,)
-    found = Reference(measure, window, positions, turning, measure.of_attitude(system), parts, turns)
-    if measure.rule == "deviation":
-        return replace(found, figure=0.0 if all(np.all(np.isfinite(part)) for part in parts) else np.nan)
-    return replace(found, figure=float(np.ravel(_figure(found, parts))[0]))
-
-
-def figure(curve: Sequence[Number], nominal: Reference) -> Number:
-    """The figure of a measure, (sample,), from its course, (sample, position) each, over all positions of the plan.
-
-    Floats, arrays or dual numbers; any leading axes. NaN where a position needed has no answer.
-    """
-    with np.errstate(all="ignore"):
-        return _turned(_figure(nominal, _parts(curve, nominal)), nominal)
-
-
-def _turned(found: Number, nominal: Reference) -> Number:
-    """A figure, or a place in the period in which the nominal mechanism has it."""
-    if nominal.measure.of_place and nominal.window.period is not None and nominal.window.gain:
-        return _near(found, nominal.figure, abs(nominal.window.gain))
-    return found
-
-
-def shown(curve: Sequence[Number], nominal: Reference) -> Number:
-    """One number a position of the window, (sample, position), that the figure is a statistic of; for pictures.
-
-    Of a path error the distance, of the efficiency of the cycle that of the instant, of a straightness the distance
-    from the line through the path, of what is judged against the nominal mechanism the deviation from it.
-    """
-    with np.errstate(all="ignore"):
-        parts, measure = _parts(curve, nominal), nominal.measure
-        if measure.rule == "line":
-            return distances(parts, nominal.grid.weights)
-        if measure.rule == "ratio":
-            useful, driven = parts
-            xp = namespace(driven)
-            return useful / xp.where(primal(driven) > 0, driven, np.nan)
-        return _single(nominal, parts)
-
-
-def moment(nominal: Reference) -> float:
-    """Time, s, at which the nominal mechanism has the extreme that is its figure; NaN of other figures.
-
-    Rising with the times of the window; NaN as well where the course does not change, or is a deviation, so 0.
-    """
-    rule = nominal.measure.rule
-    if rule not in ("maximum", "minimum", "largest") or nominal.against or len(nominal.window.index) < 2:
-        return float("nan")
-    with np.errstate(all="ignore"):
-        course = course_of(nominal, _single(nominal, nominal.parts))
-        sizes = np.abs(course.number)
-        if not np.ptp(course.number) > FLAT * np.max(sizes):
+    def time(self, panels: Panels) -> float:
+        """Time, s, of the extreme that is the figure of the first lane, at a break on the side that has it; NaN of
+        other figures, and of a constant."""
+        rule = self.measure.rule
+        if rule not in ("maximum", "minimum", "largest"):
             return float("nan")
-        sign = -1.0 if rule == "minimum" else 1.0
+        panels, of = self.number(panels)
+        sign = SIGNS.get(rule, 1.0)
         if rule == "largest":
-            above, below = course.both()
-            sign = 1.0 if above >= below else -1.0
-        return float(np.ravel(course.largest(sign).place)[0])
+            above, below = (float(panels.top(of, way).value[0]) for way in (1.0, -1.0))
+            sign = 1.0 if above >= -below else -1.0
+        top = panels.top(of, sign)
+        if top.constant[0]:
+            return float("nan")
+        low, width = primal(panels.low)[0, top.panel[0]], 2.0 * primal(panels.half)[0, top.panel[0]]
+        beside = min(BESIDE * self.run.cycle.duration, width / 2)
+        return float(np.clip(np.ravel(primal(panels.time(top)))[0], low + beside, low + width - beside))
+
+    # ---- rules --------------------------------------------------------------------------------------------
+
+    def _of_rule(self, panels: Panels) -> Number:
+        rule = self.measure.rule
+        if rule == "ratio":
+            return self._ratio(panels)
+        if rule == "work":
+            return panels.mean(first) * panels.mean(lambda rows: rows[1]) * self._share
+        panels, of = self.number(panels)
+        if rule in ("mean", "value"):
+            return panels.mean(of)
+        if rule == "rms":
+            square = panels.mean(lambda rows: of(rows) * of(rows))
+            return namespace(square).sqrt(square)
+        if rule == "dwell":
+            return self._dwell(panels)
+        if rule in ("maximum", "minimum"):
+            return panels.top(of, SIGNS[rule]).value
+        if rule == "line" and of is length:
+            return 2.0 * panels.top(of).value
+        if rule in ("peak-to-peak", "line"):
+            return panels.top(of).value - panels.top(of, -1.0).value
+        if rule == "largest":
+            ends = panels.top(of).value, -panels.top(of, -1.0).value
+            return namespace(*ends).maximum(*ends)
+        if rule == "time ratio":
+            return self._time_ratio(panels, of)
+        place = panels.time(panels.top(of, SIGNS[rule]))
+        found = self._dead_centre(panels, place) if rule.startswith("dead") else self._coordinate(place)
+        gain = abs(gain_of(self.run))
+        return near(found, self.nominal, gain) if self._around and gain and np.isfinite(self.nominal) else found
+
+    @property
+    def _around(self) -> bool:
+        """Whether it comes again."""
+        return self.run.cycle.periodic and not self.ends
+
+    @property
+    def _share(self) -> float:
+        """Of the cycle."""
+        return (self.ends[1] - self.ends[0]) / self.run.cycle.duration if self.ends else 1.0
+
+    def _ratio(self, panels: Panels) -> Number:
+        """Useful over drive work of the cycle; NaN where the loads drive.  [D 1]
+
+        Of either 0 where it is no more than rounding or the error of its integral: it cancels.
+        """
+        means = [panels.mean(lambda rows, k=k: rows[k]) for k in (0, 1)]  # type: ignore[misc]
+        sizes = [primal(panels.mean(lambda rows, k=k: np.abs(primal(rows[k])))) for k in (0, 1)]  # type: ignore[misc]
+        errors = [np.maximum(panels.error(slice(k, k + 1)), CANCELLED * sizes[k]) for k in (0, 1)]
+        useful, driven = (
+            selected(np.abs(primal(mean)) > error, mean, 0.0) for mean, error in zip(means, errors, strict=True)
+        )
+        return useful / selected(primal(driven) > 0, driven, np.nan)
+
+    def _dwell(self, panels: Panels) -> Number:
+        """Share of the time within the band."""
+        row = linear(panels.coefficients, lambda array: array[0])
+        low, high = self.measure.within or (-np.inf, np.inf)
+        share: Number = above(row, low) if np.isfinite(low) else 2.0
+        share = share - above(row, high) if np.isfinite(high) else share
+        shape = np.shape(primal(row))[:-1]
+        times = linear(panels.weights, lambda array: np.broadcast_to(array, (*shape, ORDER)) @ GAUSS_WEIGHTS / 2)
+        return linear(share * times, lambda array: np.sum(array, -1)) / linear(
+            2.0 * times, lambda array: np.sum(array, -1)
+        )
+
+    def _coordinate(self, time: Number) -> Number:
+        """The coordinate of the first driver at times, s, which may be beyond the cycle."""
+        duration = self.run.cycle.duration
+        if not self.run.cycle.periodic:
+            return path_of(self.run, time)
+        laps = np.floor(primal(time) / duration + 1e-12)
+        within = time - laps * duration
+        return path_of(self.run, within) + (laps if self.ends else 0.0) * gain_of(self.run)
+
+    def _dead_centre(self, panels: Panels, time: Number) -> Number:
+        """The coordinate of an extreme; NaN at an end of the range, where the motion does not turn back."""
+        real = primal(panels.coefficients)[0]
+        around = np.full(len(real), self._around)
+        if self.measure.turning(self.run.system):
+            around &= np.abs(real[:, -1] @ ENDS[:, 1] - real[:, 0] @ ENDS[:, 0]) <= np.pi
+        start, end = self.ends or (0.0, self.run.cycle.duration)
+        place = np.asarray(primal(time))
+        at_end = np.minimum(np.abs(place - start), np.abs(place - end)) <= NARROW * (end - start)
+        return selected(around | ~at_end, self._coordinate(time), np.nan)
+
+    def _time_ratio(self, panels: Panels, of: Made) -> Number:
+        """The longer of the two ways between the places of its largest and its least value over the shorter.
+
+        NaN where the motion does not come again, is none, or jumps.
+        """
+        ways = [self._dead_centre(panels, panels.time(panels.top(of, sign))) for sign in (1.0, -1.0)]
+        gain = gain_of(self.run)
+        if not self._around or not gain:
+            return (ways[0] - ways[1]) * np.nan
+        share = (ways[0] - ways[1]) * (1.0 / gain)
+        share = share - np.floor(primal(share))
+        longer = namespace(share).maximum(share, 1.0 - share)
+        return longer / selected(primal(longer) < 1 - SHORTEST, 1.0 - longer, np.nan)
 
 
-def span(curve: Sequence[Number], nominal: Reference) -> tuple[Number, Number]:
-    """Least and largest signed deviation of each sample from the nominal mechanism: of its figure, which is both, or
-    over the positions where the figure is a largest |deviation|."""
-    if nominal.measure.rule != "deviation":
-        change = figure(curve, nominal) - nominal.figure
-        return change, change
-    with np.errstate(all="ignore"):
-        course = course_of(nominal, _single(nominal, _parts(curve, nominal)))
-        most, least = course.both()
-        return -least, most
+def _across(panels: Panels) -> tuple[Panels, Made]:
+    """Distances of a path from its least-squares line: in the plane a row, positive to the left; in space vectors."""
+    count = np.shape(primal(panels.coefficients))[0]
+    unit = (np.arange(ORDER) == 0) * 1.0
+    rows = [linear(panels.coefficients, lambda array, k=k: array[k]) for k in range(count)]  # type: ignore[misc]
+    offset = [row - _wide(panels.mean(lambda rows, k=k: rows[k])) * unit for k, row in enumerate(rows)]  # type: ignore[misc]
+    path = panels.made(_stacked(offset))
+    moments = [[path.mean(lambda rows, i=i, j=j: rows[i] * rows[j]) for j in range(count)] for i in range(count)]  # type: ignore[misc]
+    along = [_wide(part) for part in direction(moments)]
+    if count == 2:
+        return panels.made(_stacked([offset[1] * along[0] - offset[0] * along[1]])), first
+    way: Number = 0.0
+    for part, share in zip(offset, along, strict=True):
+        way = way + part * share
+    return panels.made(_stacked([part - way * share for part, share in zip(offset, along, strict=True)])), length
 
 
-def kept(curve: Sequence[Number], nominal: Reference, figures: Number | None = None) -> NDArray[np.bool_]:
-    """Whether each sample is within the limits and bounds of the measure; not where its figure is NaN."""
-    figures = primal(figure(curve, nominal) if figures is None else figures)
-    if nominal.measure.rule != "deviation":
-        return _within(nominal.measure, figures, figures - nominal.figure, figures - nominal.figure)
-    least, most = span(curve, nominal)
-    return _within(nominal.measure, figures, primal(least), primal(most))
+def _wide(number: Number) -> Number:
+    """A number of the lanes with axes for panels and coefficients."""
+    return linear(number, lambda array: np.asarray(array)[..., None, None])
 
 
-def _within(measure: Measure, figures: Array, least: Array, most: Array) -> NDArray[np.bool_]:
-    """least, most: signed deviations from the nominal mechanism."""
+def _stacked(rows: Sequence[Number]) -> Number:
+    """Rows along a new first axis."""
+    if any(isinstance(row, Dual) for row in rows):
+        parts = [(row.real, row.dual) if isinstance(row, Dual) else (row, 0.0 * row) for row in rows]
+        return Dual(*(np.stack(np.broadcast_arrays(*side)) for side in zip(*parts, strict=True)))
+    return np.stack(np.broadcast_arrays(*rows))
+
+
+# ---- deviations, limits ---------------------------------------------------------------------------------------
+
+
+def rows_of(parts: Sequence[Number], nominal: Sequence[Number] | None, axis: str = "") -> Number:
+    """The rows that a figure is read of, (row, …), from the parts of a course.
+
+    nominal: those of the nominal mechanism, which are taken off where a measure is judged against that; axis: of the
+    turn from them, where the parts are the axes of a link in space.
+    """
+    if nominal is None:
+        return _stacked(parts)
+    if axis:
+        return _stacked([turn(parts, nominal, axis)])
+    return _stacked([part - before for part, before in zip(parts, nominal, strict=True)])
+
+
+def columns(parts: Sequence[Number], lanes: int) -> Number:
+    """Numbers at one place, (row, lane)."""
+    return _stacked(
+        [linear(part, lambda array: np.broadcast_to(np.asarray(array, float).reshape(-1), lanes)) for part in parts]
+    )
+
+
+def near(number: Number, to: Any, turn: float) -> Number:
+    """The number and so many whole turns that it is as near as can be to another."""
+    return number - turn * np.rint((primal(number) - to) / turn)
+
+
+def within_limits(measure: Measure, figures: Array, least: Array, most: Array) -> NDArray[np.bool_]:
+    """Whether each mechanism is within the limits and bounds of the measure; not where its figure is NaN.
+
+    least, most: signed deviations from the nominal mechanism.
+    """
     good = np.isfinite(figures)
     if measure.lower is not None:
         good &= least >= measure.lower
@@ -308,23 +417,6 @@ def _within(measure: Measure, figures: Array, least: Array, most: Array) -> NDAr
     return np.asarray(good)
 
 
-def judged(curve: Sequence[Number], nominal: Reference) -> tuple[Number, NDArray[np.bool_], Number]:
-    """`figure`, `kept` and `shown` of plain numbers at once, each piece worked out once."""
-    measure = nominal.measure
-    if measure.rule in ("line", "ratio", "work"):
-        figures = figure(curve, nominal)
-        return figures, kept(curve, nominal, figures), shown(curve, nominal)
-    with np.errstate(all="ignore"):
-        number = _single(nominal, _parts(curve, nominal))
-        course = course_of(nominal, number)
-        if measure.rule == "deviation":
-            above, below = course.both()
-            figures = np.maximum(above, below)
-            return figures, _within(measure, figures, -below, above), number
-        figures = _turned(RULES[measure.rule](course), nominal)
-        return figures, _within(measure, figures, figures - nominal.figure, figures - nominal.figure), number
-
-
 def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Where a course has an answer, by the status of the positions; it is to be NaN elsewhere."""
     if measure.of_motion:
@@ -332,81 +424,6 @@ def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
     if measure.wants_margin:
         return status < Status.LOAD_UNDEFINED
     return status < Status.NOT_CONVERGED
-
-
-# ---- from course to figure ------------------------------------------------------------------------------------
-
-
-def _figure(nominal: Reference, parts: Sequence[Number]) -> Number:
-    rule = nominal.measure.rule
-    if rule == "line":
-        course = course_of(nominal, parts[0])
-        away = course._replace(number=distances(parts, course.grid.weights))
-        return RULES["peak-to-peak"](away) if len(parts) == 2 else 2.0 * RULES["maximum"](away)
-    if rule == "ratio":
-        return _ratio(parts[0], parts[1], course_of(nominal, parts[0]))
-    if rule == "work":
-        course = course_of(nominal, parts[0])
-        mean, duration = (total(part, course.grid.weights) for part in parts)
-        return mean * duration * nominal.window.share
-    number = _single(nominal, parts)
-    return RULES[rule](course_of(nominal, number))
-
-
-def _single(nominal: Reference, parts: Sequence[Number]) -> Number:
-    """The one number of the course, less that of the nominal mechanism where it is judged against that."""
-    if nominal.measure.kind == "path_error":
-        square: Number = 0.0
-        for part, meant in zip(parts, nominal.parts, strict=True):
-            square = square + (part - meant) * (part - meant)
-        return namespace(square).sqrt(square)
-    if nominal.attitude:
-        return turn(parts, nominal.parts, nominal.measure.axis)
-    return parts[0] - nominal.parts[0] if nominal.against else parts[0]
-
-
-def course_of(nominal: Reference, number: Number) -> Curve:
-    """A course over the window; one that gains whole turns in a period with the end of the period, as a range."""
-    window, band = nominal.window, nominal.measure.within or (-np.inf, np.inf)
-    if not nominal.opened:
-        return Curve(number, nominal.grid, window.coordinate, window.gain, band)
-    again = np.append(np.arange(len(window.time)), 0)
-    gains = np.append(np.zeros(len(window.time)), nominal.turns)
-    coordinate = np.append(window.coordinate, window.coordinate[0] + window.gain)
-    return Curve(number[..., again] + gains, nominal.grid, coordinate, window.gain, band)
-
-
-def _parts(curve: Sequence[Number], nominal: Reference) -> tuple[Number, ...]:
-    """The course over the window; an angle as near as can be to that of the nominal mechanism."""
-    parts = tuple(nominal.window.of(part, nominal.positions) for part in curve)
-    return (_near(parts[0], nominal.parts[0], TURN),) if nominal.turning else parts
-
-
-def _near(number: Number, to: Number, turn: float) -> Number:
-    return number - turn * np.rint((primal(number) - to) / turn)
-
-
-def _row(number: Number, count: int) -> Array:
-    """One row of plain numbers, a copy."""
-    return np.array(np.broadcast_to(np.asarray(number, float).reshape(-1, np.shape(number)[-1])[0], count))
-
-
-def _followed(angle: Array, window: Window, rate: Array | None) -> tuple[Array, float]:
-    """An angle without jumps, and the whole turns that it gains in a period, rad."""
-    periodic = window.period is not None and len(angle) > 1
-    time = np.append(window.time, window.time[0] + (window.period or 0.0)) if periodic else window.time
-    angles = np.append(angle, angle[0]) if periodic else angle
-    if rate is None:
-        sound = np.isfinite(angles)
-        angles[sound] = np.unwrap(angles[sound])
-    else:
-        # rates for a step of 1: the step of a window is another at its ends
-        ahead = np.append(rate, rate[0]) if periodic else rate
-        follow(angles, ahead, time)
-    if not periodic:
-        return angles, 0.0
-    gained = angles[-1] - angles[0]
-    return angles[:-1], float(TURN * np.rint(gained / TURN)) if np.isfinite(gained) else 0.0
 
 
 def follow(angles: Array, rate: Array, time: Array) -> None:

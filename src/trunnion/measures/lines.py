@@ -1,4 +1,4 @@
-"""How straight a path is: its distances from the least-squares line through it; how far a link in space has turned.
+"""How straight a path is: the direction of the least-squares line through it; how far a link in space has turned.
 
 ISO 12780-1:2011 has this reference line, for which the sum of the squares of the local deviations, at right angles to
 it, is least, and the straightness as the width from the lowest to the highest of them. The positions count by the time
@@ -17,35 +17,23 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.duallinalg import eigh
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["distances", "total", "turn"]
+__all__ = ["direction", "turn"]
 
 Array = NDArray[np.float64]
-
 SMALL = 1e-3  # below it six terms of the series are exact to rounding
 
 
-def distances(path: Sequence[Number], weights: Array) -> Number:
-    """Distances of a path, its coordinates (…, position) each, m, from its least-squares line; (…, position).
+def direction(moments: Sequence[Sequence[Number]]) -> list[Number]:
+    """Direction of the least-squares line through a path, of its second moments about its middle; a component each.
 
-    In the plane positive to the left of the line.
-    weights: of the positions, their sum is 1. The direction has no derivative where the path is as wide as long.
+    It has no derivative where the path is as wide as long.
     """
-    offset = [part - _wide(total(part, weights)) for part in path]
-    if len(offset) == 2:
-        x, y = offset
-        twice = 2.0 * total(x * y, weights), total(x * x, weights) - total(y * y, weights)
+    if len(moments) == 2:
+        twice = 2.0 * moments[0][1], moments[0][0] - moments[1][1]
         xp = namespace(*twice)
         angle = 0.5 * xp.arctan2(*twice)
-        return y * _wide(xp.cos(angle)) - x * _wide(xp.sin(angle))
-    along = _direction(offset, weights)
-    way: Number = 0.0
-    square: Number = 0.0
-    for part, share in zip(offset, along, strict=True):
-        way = way + part * _wide(share)
-    for part, share in zip(offset, along, strict=True):
-        rest = part - way * _wide(share)
-        square = square + rest * rest
-    return namespace(square).sqrt(square)
+        return [xp.cos(angle), xp.sin(angle)]
+    return _axis(moments)
 
 
 def turn(axes: Sequence[Number], before: Sequence[Number], axis: str) -> Number:
@@ -74,9 +62,8 @@ def turn(axes: Sequence[Number], before: Sequence[Number], axis: str) -> Number:
     return sines["xyz".index(axis)] * factor
 
 
-def _direction(offset: Sequence[Number], weights: Array) -> list[Number]:
+def _axis(moments: Sequence[Sequence[Number]]) -> list[Number]:
     """The axis of least inertia of the path: the eigenvector of the largest eigenvalue of its moments."""
-    moments = [[total(one * other, weights) for other in offset] for one in offset]
     real = np.stack([np.stack([np.asarray(primal(n)) for n in row], axis=-1) for row in moments], axis=-2)
     if not any(isinstance(n, Dual) for row in moments for n in row):
         vectors = _eigenvectors(real)
@@ -92,19 +79,3 @@ def _eigenvectors(matrices: Array) -> Array:
     sound = np.all(np.isfinite(matrices), axis=(-2, -1), keepdims=True)
     vectors: Array = np.linalg.eigh(np.where(sound, matrices, np.eye(3))).eigenvectors
     return np.where(sound, vectors, np.nan)
-
-
-def _wide(number: Number) -> Number:
-    """A number of the lanes with an axis for the positions."""
-    if isinstance(number, Dual):
-        return Dual(_wide(number.real), _wide(number.dual))
-    return np.asarray(number)[..., None]
-
-
-def total(number: Number, weights: Array) -> Number:
-    """Weighted sum over the positions, the last axis. weights: (position,), or those of each row, (row, position)."""
-    if isinstance(number, Dual):
-        return Dual(total(number.real, weights), total(number.dual, weights))
-    if weights.ndim > 1:
-        return np.sum(number * weights, axis=-1)
-    return (np.asarray(number) if np.shape(number)[-1:] == weights.shape else number + 0.0 * weights) @ weights

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,25 +11,21 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.quadrature import Nodes, nodes
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure
-from trunnion.measures.turning_back import REVERSING, turning_back
 from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import UnitError
-from trunnion.solve.switches import Mechanisms, bends, tracked
 from trunnion.solve.system import System, Values
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["PositionPlan", "Window", "ends_of", "gain_of", "path_of", "place_of", "plan"]
+__all__ = ["PositionPlan", "Window", "ends_of", "gain_of", "moved", "path_of", "place_of", "plan"]
 
 Array = NDArray[np.float64]
 
-ALIKE = 1e-10  # of the cycle: times that are one
 CLOSE = 0.25  # of a step: a position of the grid that is closer to the end of a window gives way to it
 NEWTONS = 4  # steps to a time, one of which is exact at a constant speed, before it is looked for by bisection
 BISECTIONS = 60
@@ -41,34 +36,11 @@ class Window:
     """The positions of one measure.
 
     index: into the times of the plan, in order; time: theirs, s, rising (beyond the end of the cycle where the window
-    runs over it); coordinate: of the first driver if it runs one way (else the time), in the same way; period: after
-    which they repeat, s, None for a range; gain: of the coordinate in a period; weights: of the positions in a mean,
-    and those of a rougher rule, where they are the places of a rule; edges: times, s, between which the rule's places
-    lie; share: of the cycle.
+    runs over it).
     """
 
     index: NDArray[np.intp]
     time: Array
-    coordinate: Array
-    period: float | None = None
-    gain: float = 0.0
-    weights: tuple[Array, Array] | None = None
-    edges: Array | None = None
-    share: float = 1.0
-
-    @cached_property
-    def everything(self) -> bool:
-        """Whether it takes all positions as they are."""
-        return bool(np.array_equal(self.index, np.arange(len(self.index))))
-
-    def of(self, number: Number, positions: int) -> Number:
-        """The part of a number over all positions of the plan, (…, position), that the measure is of."""
-        if isinstance(number, Dual):
-            return Dual(self.of(number.real, positions), self.of(number.dual, positions))
-        if np.ndim(number) == 0 or np.shape(number)[-1] == 1 < positions:
-            whole = np.broadcast_to(number, (*np.shape(number)[:-1], len(self.index)))
-            return whole
-        return number if self.everything and len(self.index) == positions else number[..., self.index]
 
 
 @dataclass(frozen=True)
@@ -80,29 +52,26 @@ class PositionPlan:
     windows: Mapping[str, Window]
 
     def moved(self, values: Values) -> Number:
-        """The times with other numbers of the drivers, (position,) or (sample, position): of the same positions.
+        """The times with other numbers of the drivers; see `moved`."""
+        return moved(self.run, values, self.times)
 
-        The first driver has the same coordinates if it runs one way; else times are the same parts of its cycle.
-        Dual numbers give derivatives of the times, of a law that runs one way.
-        """
-        system, before = self.run.system, self.run.values
-        paths = [path for path in before if path.startswith("drivers.")]
-        if all(values[path] is before[path] or _same(values[path], before[path]) for path in paths):
-            return self.times
-        name = next(iter(system.mechanism.drivers))
-        before_span, span = system.span(before, name), system.span(values, name)
-        scaled = self.times * (span.duration / before_span.duration)
-        if not span.one_way:
-            return scaled
-        return _reached(system, values, name, system.drive(before, name, self.times)[0], scaled, span.duration)
 
-    def bends(self, values: Values) -> Array:
-        """Times, s, at which a mechanism with other numbers, but the same drivers, bends or jumps, in no order."""
-        run = self.run
-        of = Mechanisms(run.system, run.chosen.assembly, values, [run.cycle])
-        found = tracked(of, run.bends, lambda own, time: replace(self, times=time).moved(own))[0]
-        lost = np.isnan(found)
-        return np.concatenate([found[~lost], bends(of)[0]]) if np.any(lost) else found
+def moved(run: Run, values: Values, times: Number) -> Number:
+    """Times, s, with other numbers of the drivers, (position,) or (sample, position): of the same positions.
+
+    The first driver has the same coordinates if it runs one way; else times are the same parts of its cycle. Dual
+    numbers give derivatives of the times, of a law that runs one way.
+    """
+    system, before = run.system, run.values
+    paths = [path for path in before if path.startswith("drivers.")]
+    if all(values[path] is before[path] or _same(values[path], before[path]) for path in paths):
+        return times
+    name = next(iter(system.mechanism.drivers))
+    before_span, span = system.span(before, name), system.span(values, name)
+    scaled = times * (span.duration / before_span.duration)
+    if not span.one_way:
+        return scaled
+    return _reached(system, values, name, system.drive(before, name, times)[0], primal(scaled), primal(span.duration))
 
 
 def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
@@ -120,7 +89,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
         if findings:
             raise MechanismError(findings)
         nothing = np.zeros(1)
-        one = Window(np.zeros(1, np.intp), nothing, nothing)
+        one = Window(np.zeros(1, np.intp), nothing)
         return PositionPlan(run, nothing, {measure.name: one for measure in measures})
     ends: dict[str, tuple[float, ...]] = {}
     for measure in measures:
@@ -130,71 +99,15 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
             findings += error.findings
     if findings:
         raise MechanismError(findings)
-    averaging = [measure.name for measure in measures if len(ends[measure.name]) != 1 and _averages(run, measure)]
-    averaged = {name: _edges_within(run, ends[name]) for name in averaging}
-    rules = {name: nodes(edges) for name, edges in averaged.items()}
-    asked = [found for name, found in ends.items() if name not in averaged]
-    grid = run.cycle.times(steps) if any(len(found) != 1 for found in asked) else np.zeros(0)
-    extra = [np.array(found) for name, found in ends.items() if name not in averaged]
-    extra = [_within(run, at) for at in (*extra, *(rule.at for rule in rules.values()))]
+    grid = run.cycle.times(steps) if any(len(found) != 1 for found in ends.values()) else np.zeros(0)
+    extra = [_within(run, np.array(found)) for found in ends.values()]
     times = np.unique(np.concatenate([grid, *extra]))
-    known = path_of(run, times), gain_of(run)
-    windows = {name: _window(run, found, times, grid, known) for name, found in ends.items() if name not in averaged}
-    windows |= {name: _of_rule(run, ends[name], edges, rules[name], times, known) for name, edges in averaged.items()}
-    return _with_dead_centres(PositionPlan(run, times, windows), measures)
+    return PositionPlan(run, times, {name: _window(run, found, times, grid) for name, found in ends.items()})
 
 
 def _within(run: Run, times: Array) -> Array:
     """Times within the cycle, s, of such as may run over its end."""
     return times % run.cycle.duration if run.cycle.periodic else times
-
-
-def _edges_within(run: Run, ends: tuple[float, ...]) -> Array:
-    """The edges of the run, s, within a window and its ends; all of them if it has none."""
-    if not ends:
-        return run.edges
-    duration = run.cycle.duration
-    laps = np.arange(ends[0] // duration, ends[1] // duration + 1) if run.cycle.periodic else np.zeros(1)
-    found = (laps[:, None] * duration + run.edges).ravel()
-    apart = ALIKE * duration
-    inner = found[(found > ends[0] + apart) & (found < ends[1] - apart)]
-    inner = inner[np.append(np.diff(inner) > apart, True)] if len(inner) else inner  # the end of a lap starts the next
-    return np.concatenate([ends[:1], inner, ends[1:]])
-
-
-def _of_rule(
-    run: Run, ends: tuple[float, ...], edges: Array, rule: Nodes, times: Array, known: tuple[Array, float]
-) -> Window:
-    """The places of the rule of a mean: over the cycle, or between two times."""
-    (coordinates, gain), duration = known, run.cycle.duration
-    within = _within(run, rule.at)
-    index, laps = np.searchsorted(times, within), np.rint((rule.at - within) / duration)
-    period = duration if run.cycle.periodic and not ends else None
-    coordinate, share = coordinates[index] + laps * gain, (edges[-1] - edges[0]) / duration
-    gained = gain if not ends else 0.0
-    return Window(index, rule.at, coordinate, period, gained, (rule.weights, rule.inside), edges, share)
-
-
-def _with_dead_centres(plan: PositionPlan, measures: Sequence[Measure]) -> PositionPlan:
-    """The same with positions about the dead centres that measures are of, where the motion turns back sharply."""
-    run, windows = plan.run, dict(plan.windows)
-    for measure in measures:
-        window = windows[measure.name]
-        more = turning_back(run, measure, window.time, window.period) if measure.kind in REVERSING else np.zeros(0)
-        if not len(more):
-            continue
-        laps = np.floor(more / run.cycle.duration) if run.cycle.periodic else 0.0 * more
-        within = more - laps * run.cycle.duration
-        times = np.union1d(plan.times, within)
-        now = np.searchsorted(times, plan.times)
-        windows = {name: replace(one, index=now[one.index]) for name, one in windows.items()}
-        time = np.concatenate([window.time, more])
-        index = np.concatenate([windows[measure.name].index, np.searchsorted(times, within)])
-        coordinate = np.concatenate([window.coordinate, path_of(run, within) + laps * gain_of(run)])
-        order = np.argsort(time)
-        windows[measure.name] = replace(window, index=index[order], time=time[order], coordinate=coordinate[order])
-        plan = replace(plan, times=times, windows=windows)
-    return plan
 
 
 def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
@@ -215,20 +128,11 @@ def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
     return value, kind.unit == "s"
 
 
-def _averages(run: Run, measure: Measure) -> bool:
-    """Whether a figure is a mean; that of an angle which gains turns needs the end of the cycle too.
-
-    Samples are taken at the nodes of the nominal mechanism, but where its course jumps, see `averages`.
-    """
-    return measure.rule in ("mean", "rms", "ratio", "work") and not measure.turning(run.system)
-
-
-def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known: tuple[Array, float]) -> Window:
+def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array) -> Window:
     """The positions of one measure: a place, a window between two times, or all of the grid."""
-    duration, (coordinates, gain) = run.cycle.duration, known
+    duration = run.cycle.duration
     if not ends:
-        index = np.searchsorted(times, grid)
-        return Window(index, grid, coordinates[index], duration if run.cycle.periodic else None, gain)
+        return Window(np.searchsorted(times, grid), grid)
     laps = [np.floor(moment / duration) if run.cycle.periodic else 0.0 for moment in ends]
     found = [np.searchsorted(times, moment - lap * duration) for moment, lap in zip(ends, laps, strict=True)]
     between, between_laps = np.zeros(0, np.intp), np.zeros(0)
@@ -241,8 +145,7 @@ def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array, known:
         between_laps = np.repeat(reach, len(grid))[inside]
     index = np.concatenate([found[:1], between, found[1:]]).astype(np.intp)
     lap = np.concatenate([laps[:1], between_laps, laps[1:]])
-    share = (ends[-1] - ends[0]) / duration
-    return Window(index, times[index] + lap * duration, coordinates[index] + lap * gain, share=share)
+    return Window(index, times[index] + lap * duration)
 
 
 # ---- places and windows as they are stated --------------------------------------------------------------------
@@ -355,8 +258,9 @@ def _reached(system: System, values: Values, name: str, target: Number, guess: N
             late = way * error(time)[0] > 0
             low, high = np.where(late, low, time), np.where(late, time, high)
     value, rate, _ = system.drive(values, name, time)
-    if isinstance(value, Dual):
-        return time - Dual(np.zeros(value.shape), (value - target).dual) / primal(rate)
+    if isinstance(value - target, Dual):
+        off = value - target
+        return time - Dual(np.zeros(off.shape), off.dual) / primal(rate)
     return np.asarray(time)
 
 
@@ -366,13 +270,13 @@ def gain_of(run: Run) -> float:
     return float(ends[1] - ends[0])
 
 
-def path_of(run: Run, times: Array) -> Array:
+def path_of(run: Run, times: Number) -> Number:
     """Coordinate of the first driver if it runs one way, else the time."""
     name = next(iter(run.system.mechanism.drivers), "")
     if not name or not run.system.span(run.values, name).one_way:
         return times
-    found = np.broadcast_to(np.asarray(primal(run.system.drive(run.values, name, times)[0]), float), times.shape)
-    return np.array(found)
+    found = run.system.drive(run.values, name, times)[0]
+    return found if isinstance(found, Dual) else np.array(np.broadcast_to(np.asarray(found, float), np.shape(times)))
 
 
 def _same(number: Number, other: Number) -> bool:

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import ON_GRID, Accuracy, Courses
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
+from trunnion.algebra.panels import ON_GRID
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.backward import Backward

@@ -21,10 +21,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import FIT, ORDER, POINTS, Accuracy, Courses
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, flat
+from trunnion.algebra.panels import FIT, ORDER, POINTS
 from trunnion.joints.clearance import pressed, turned_by_friction
 from trunnion.solve import forward as kinematics
 from trunnion.solve.backward import Backward, Sense

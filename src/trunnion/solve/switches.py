@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy
-from trunnion.algebra.dual import primal
+from trunnion.algebra.dual import derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.roots import root
 from trunnion.model.parts import Spring
@@ -29,7 +29,7 @@ from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
     "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "knots_of",
-    "nearly_passed", "parted", "stated_bends", "tracked",
+    "parted", "slopes_of", "stated_bends", "tracked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -41,11 +41,11 @@ MOST_SCANNED = 20_000
 MOST_LEVELS = 720  # of one table in a turn: of more points every n-th, so that no node of a panel is far from any
 PANELS = 6  # of a turn: the widest that is integrated in one go
 MOST_EDGES = 2000  # of a cycle of very many turns: the error of its means is told
-NEARLY = 0.1  # of the range of what decides where a load begins
 TRACKED = 72  # of a turn: how far to either side a bend of one mechanism is looked for in others
 SEATED = Accuracy(1e-7, 1e-9, shortest=1e-7, rounds=16)  # what the travel of seats adds is known to so many digits
 MARGINS = Accuracy(1e-4, 1e-6, shortest=1e-5, rounds=8)  # a margin is followed, which takes long
 SETTLED = 1e-11  # of the cycle
+SLOPED = 1e-6  # of the cycle: step of a difference
 CLOSE = 1e-10  # of the cycle: edges that are one
 NOISE = 1e-9  # of the largest value: zero but for rounding
 
@@ -156,21 +156,32 @@ def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Arra
     return found
 
 
-def nearly_passed(of: Mechanisms) -> bool:
-    """Whether a load of one mechanism that does not begin or end would do so with slightly other numbers: what decides
-    it comes within NEARLY of its own range to the level."""
-    scan, cycle = _scans(of.system)[0], of.cycles[0]
-    if not scan.wanted(of.system):
-        return False
-    time = np.linspace(0.0, cycle.duration, SCANNED + 1)[None]
-    for switch in scan.look(scan.walk(of.system, of.values, of.assembly, of.lanes(time))):
-        course = of.shaped(switch.number, time)
-        span = float(np.nanmax(course) - np.nanmin(course)) if np.any(np.isfinite(course)) else 0.0
-        levels = np.array([of.row(level)[0] for level in switch.levels])[[0, -1]]
-        away = np.array([np.nanmin(course) - levels[-1], levels[0] - np.nanmax(course)]) if span > 0 else np.zeros(0)
-        if np.any((away > 0) & (away < NEARLY * span)):
-            return True
-    return False
+def slopes_of(of: Mechanisms, known: Sequence[Bend], times: Array, moved: Callable[[Values, Array], Number]) -> Array:
+    """Derivatives of times of bends that were `tracked`, (mechanism, bend), by what the values are dual numbers of.
+
+    What passes its level there goes on to do so: dt = −(∂g/∂p)/(∂g/∂t) of its number g.
+    """
+    cycle, found = of.cycles[0], np.zeros(times.shape)
+    for k, scan in enumerate(_scans(of.system)):
+        own = np.flatnonzero([one.scan == k for one in known])
+        if not len(own):
+            continue
+        rows, which = np.repeat(np.arange(len(times)), len(own)), np.tile(own, len(times))
+        values, lanes, function = of.picked(rows), np.arange(len(rows)), np.array([known[i].function for i in which])
+
+        def numbers(time: Array, values: Values = values, scan: _Scan = scan) -> list[Number]:
+            time = time % cycle.duration if cycle.periodic else np.clip(time, 0.0, cycle.duration)
+            walk = scan.walk(of.system, values, of.assembly, moved(values, time))
+            return [switch.number for switch in scan.look(walk)]
+
+        def column(number: Number, count: int = len(rows)) -> Array:
+            return np.broadcast_to(np.asarray(number, float), (count, 1))[:, 0]
+
+        time, step = times[rows, which][:, None], SLOPED * cycle.duration
+        change = np.array([column(derivative(number)) for number in numbers(time)])[function, lanes]
+        ends = [np.array([column(primal(number)) for number in numbers(time + way)]) for way in (step, -step)]
+        found[rows, which] = -change / ((ends[0] - ends[1])[function, lanes] / (2 * step))
+    return found
 
 
 def _width(of: Bend, known: Sequence[Bend], cycle: Cycle) -> float:

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trunnion.algebra.course import INTEGRAL
-from trunnion.algebra.quadrature import CANCELLED
+from trunnion.algebra.panels import CANCELLED, INTEGRAL
 from trunnion.cycle.course import course_of, magnitude
 from trunnion.cycle.means import Mean
 from trunnion.solve.friction_method import FrictionMethod

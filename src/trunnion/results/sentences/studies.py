@@ -92,12 +92,6 @@ PLAY = {
         "the {statistic} is at {at}: the worst case of {measure} to first order, ±{worst:~{unit}}, is of that place; "
         "the figure and the files show the whole cycle besides",
     ),
-    "play.beside_jump": Sentence(
-        NOTE,
-        "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
-        "positions ({figure:~~{unit}}; {coarse:~~{unit}} at the positions); what play does to the place of the corner "
-        "is included",
-    ),
     "play.no_effect": Sentence(
         NOTE,
         "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
@@ -237,23 +231,12 @@ TOLERANCE = {
     "tolerance.negative": Sentence(
         WARNING, "its tolerance includes negative values, down to {least:~{unit}}", "narrow the tolerance"
     ),
-    "tolerance.zero": Sentence(
-        WARNING,
-        "it is 0, and no tolerance changes it, so that its limits say nothing",
-        "check its sign (as: minimum, or largest), where it is taken, and whether the loads act",
-    ),
     "tolerance.range_fixed": Sentence(
         WARNING,
         "the tolerance of {numbers} does not move the range of {driver} in the samples, which are all at the same "
         "places of the drive",
         "state the deviation in the link that it moves, as a dimension e in its points, such as [r*cos(e), r*sin(e)]; "
         "`trunnion sweep` moves the range",
-    ),
-    "tolerance.corner": Sentence(
-        NOTE,
-        "the figure is at a corner of its course, such as the beginning of a load, and is located between the "
-        "positions (nominal {figure:~~{unit}}; {coarse:~~{unit}} at the positions); the motion of the corner is "
-        "included",
     ),
     "tolerance.impossible": Sentence(
         WARNING, "its tolerance includes {value:~{unit}}, which no model may have: {why}", "narrow the tolerance"

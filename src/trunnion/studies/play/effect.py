@@ -26,10 +26,9 @@ class Effect:
     """What play does over the cycle. measures; plays by joint; time, s, (position,); value (measure, position);
     worst_case and deviation (measure, joint, position); loads (measure, joint, end, axis, position), others: the same
     with seats on the other links, where the model does not say which carry them; on_others (measure, joint, position):
-    where these do more, and so count; status. extremes: of each measure
-    whose figure is a maximum or minimum, or at a stated place, by name, what play does to it alone there; corner: of
-    such an effect at a corner of its course, the figure and what the positions have of it. figure: of a maximum or
-    minimum the extreme itself, (sample,), with pins at offsets, (sample, 1), by path.
+    where these do more, and so count; status. extremes: of each measure whose figure is a maximum or minimum, or at a
+    stated place, by name, what play does to it alone there. figure: of a maximum or minimum the extreme itself,
+    (sample,), with pins at offsets, (sample, 1), by path.
     """
 
     run: Run
@@ -44,7 +43,6 @@ class Effect:
     on_others: NDArray[np.bool_]
     status: NDArray[np.int8]
     extremes: Mapping[str, Effect] = field(default_factory=dict)
-    corner: tuple[float, float] | None = None
     figure: Callable[[Mapping[str, Array]], Array] | None = None
 
     def of(self, i: int) -> tuple[Effect, int]:

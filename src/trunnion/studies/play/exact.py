@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity, Status
-from trunnion.measures.evaluation import NumpyKernel, at_corner
-from trunnion.measures.figures import Reference, figure
+from trunnion.measures.evaluation import NumpyKernel
+from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
 from trunnion.measures.motion import MOTIONS
-from trunnion.measures.positions import PositionPlan
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
@@ -126,15 +125,9 @@ def one_sided(effect: Effect, i: int) -> Iterator[Finding]:
         yield finding_for("play.one_sided", where, found=most, unit=measure.unit(run.system), at=dial.at(0))
 
 
-def figures_with(kernel: NumpyKernel, places: PositionPlan, one: Reference, offsets: Mapping[str, Array]) -> Array:
-    """An extreme, (sample,), with pins at offsets by path, m, (sample, 1); at a corner if it is at one."""
-    values = {**kernel.run.values, **offsets}
-    curve = kernel.courses(values, places.times)[0][one.measure.name]
-    found = np.atleast_1d(np.asarray(primal(figure(curve, one)), float))
-    if not (one.corner or one.bends):
-        return found
-    course = np.broadcast_to(np.asarray(primal(curve[0]), float), (len(found), places.times.size))
-    return at_corner(kernel, places, values, one, course[:, one.window.index], found)
+def figures_with(many: Many, measure: Measure, offsets: Mapping[str, Array]) -> Array:
+    """An extreme, (sample,), with pins at offsets by path, m, (sample, 1)."""
+    return np.asarray(many.read({**many.run.values, **offsets})[measure.name].figure)
 
 
 def _value(run: Run, measure: Measure, time: Array, offsets: dict[str, Array]) -> Array:

@@ -32,12 +32,11 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
-from trunnion.measures.corners import change_by_step, switch, with_corner
-from trunnion.measures.evaluation import NumpyKernel, looking
-from trunnion.measures.figures import Reference, moment, reference
+from trunnion.measures.evaluation import NumpyKernel
+from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
-from trunnion.measures.positions import PositionPlan, place_of, plan
+from trunnion.measures.positions import place_of, plan
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
@@ -61,7 +60,6 @@ __all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
 
 CHUNK = 4096  # positions at a time
 EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
-STEP = 1e-5  # of the size of the mechanism: of a difference
 
 Array = NDArray[np.float64]
 Loads = dict[str, list[Vector]]  # load at each end, by joint
@@ -106,16 +104,11 @@ def by_duals(
     return _by_end(known, np.broadcast_to(derivative(number), (len(rows), len(time))))
 
 
-def of_corner(
-    kernel: NumpyKernel, places: PositionPlan, one: Reference, known: Mapping[str, Play], carrier: str = HOLE
-) -> Loads:
-    """The same of an extreme at a corner of the course, which moves with the pins: by differences."""
+def of_figure(many: Many, measure: Measure, known: Mapping[str, Play], carrier: str = HOLE) -> Loads:
+    """The same of an extreme, whose place moves with the pins."""
     rows = _offsets(known, carrier)
-    step = STEP * float(np.ravel(primal(kernel.run.system.size(kernel.run.values)))[0])
-    figures = [
-        figures_with(kernel, places, one, {path: by * row for path, row in rows.items()}) for by in (-step, 0.0, step)
-    ]
-    return _by_end(known, change_by_step(*figures)[:, None] / step)
+    values = {**many.run.values, **{path: Dual(0.0 * row, row) for path, row in rows.items()}}
+    return _by_end(known, np.reshape(derivative(many.read(values)[measure.name].figure), (len(rows), 1)))
 
 
 def _offsets(known: Mapping[str, Play], carrier: str) -> dict[str, Array]:
@@ -174,7 +167,7 @@ def play(
     _check(known)
     if at is None:
         effect = _over(run, found, known, run.cycle.times(steps if run.cycle.duration > 0 else 1), progress)
-        effect = replace(effect, extremes=_extremes(run, found, known, steps))
+        effect = replace(effect, extremes=_extremes(run, found, known))
     else:
         value, timed = place_of(mechanism, at)
         there = plan(run, [replace(found[0], at=value, over=None, timed=timed)], 1)
@@ -210,12 +203,12 @@ def _covered(run: Run, measure: Measure) -> bool:
     return (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
 
 
-def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], steps: int) -> dict[str, Effect]:
+def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play]) -> dict[str, Effect]:
     """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole;
     and to a measure at a stated place.
 
     To first order an extreme changes as its course does there: where the course turns back, to move along it does
-    nothing. One at a corner of its course changes as the corner moves too. None of a course that does not change.
+    nothing. One at a break of its course changes as the break moves too. None of a course that does not change.
     """
     found = {}
     for measure in measures:
@@ -223,24 +216,16 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play], 
             found[measure.name] = _over(run, [measure], known, plan(run, [measure], 1).times)
         if measure.rule not in EXTREMES:
             continue
-        places = plan(run, [measure], steps)
-        kernel = NumpyKernel(run, [measure], FrictionMethod())
-        course = kernel.courses(run.values, places.times)[0][measure.name]
-        rate = measure.rate_of_course(forward(run.system, run.values, run.chosen.assembly, places.times))
-        one = reference(measure, course, places.windows[measure.name], run.system, rate)
-        time = moment(one)
+        many = Many(run, [measure], run.values, lambda some: NumpyKernel(run, some, FrictionMethod()))
+        time = many.times[measure.name]
         if not np.isfinite(time):
             continue
-        look = looking(kernel, places, run.values, measure)
-        sharp = with_corner(one, look, run)
-        time = switch(sharp, look, run.edges, run.cycle, time) if sharp.corner else time
         time = time % run.cycle.duration if run.cycle.periodic else time
         there = _over(run, [measure], known, np.array([time]))
-        if sharp.corner:
-            loads, others = _both(run, known, partial(of_corner, kernel, places, sharp))
+        if measure.kind not in MOTIONS:
+            loads, others = _both(run, known, partial(of_figure, many, measure))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)
-            there = replace(there, corner=(sharp.figure, one.figure))
-        found[measure.name] = replace(there, figure=partial(figures_with, kernel, places, sharp))
+        found[measure.name] = replace(there, figure=partial(figures_with, many, measure))
     return found
 
 
@@ -455,9 +440,6 @@ def _places(run: Run, effect: Effect) -> Iterator[Finding]:
         worst = float(relied_on(there.total[0], there.status)[0])
         at = run.system.dial(run.values, there.time).at(0)
         told: dict[str, Any] = {"measure": measure.name, "at": at, "worst": worst, "unit": unit}
-        if there.corner is not None:
-            figure, coarse = there.corner
-            yield finding_for("play.beside_jump", where, figure=figure, coarse=coarse, unit=unit)
         if measure.at is not None:
             yield finding_for("play.at_a_place", f"{where}.at", **told)
         else:

@@ -16,7 +16,6 @@ from trunnion.cycle.findings import model_notes
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
-from trunnion.measures.figures import RULES, course_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.parameters import measured
 from trunnion.model.tolerances import variations
@@ -65,7 +64,8 @@ def _of_measure(outcome: Outcome, of: Of, i: int, unit: str, dial: Any) -> Itera
         yield Figure(f"{name}.nominal", f"{name}, nominal", of.reference.figure, unit)
     placed = of.place >= 0 and outcome.study.run.cycle.duration > 0
     course = np.asarray(of.course.spread.half if of.measure.rule == "deviation" else of.curve, float)
-    at = f"at {dial.at(of.reference.window.index[of.place])}" if placed else ""
+    run = outcome.study.run
+    at = f"at {run.system.dial(run.values, np.array([of.time])).at(0)}" if placed else ""
     at = at and extreme_place(course, at, scales_of(outcome.study.run).floor(unit))
     lower, upper, rss, _, deviation = map(float, of.total)
     yield Figure(f"{name}.worst_case", f"{name}, worst case, linear", max(-lower, upper), unit, place=at)
@@ -131,8 +131,6 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     yield from _range_ends(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
-        yield from _zero(outcome, of)
-        yield from _corner(outcome, of)
         yield from _first_order(outcome, of)
         yield from _carried(outcome, of)
     if counted is not None:
@@ -277,27 +275,6 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
         yield finding_for("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
-
-
-def _zero(outcome: Outcome, of: Of) -> Iterator[Finding]:
-    """A measure with limits that is 0 whatever the numbers: nothing is known of it that way."""
-    measure, searched = (
-        of.measure,
-        [] if outcome.worst is None else outcome.worst[outcome.study.linear.measures.index(of)],
-    )
-    ends = [*map(float, of.total[:2]), *(corner.value for corner in searched)]
-    bounds = measure.at_least is not None or measure.at_most is not None
-    if bounds and of.reference.figure == 0 and not np.any(np.nan_to_num(ends)):
-        yield finding_for("tolerance.zero", f"measures.{measure.name}")
-
-
-def _corner(outcome: Outcome, of: Of) -> Iterator[Finding]:
-    """An extreme at a corner, with what the positions have of it, as `analyse` tabulates them."""
-    known, unit = of.reference, of.measure.figure_unit(outcome.study.run.system, outcome.study.run.values)
-    if known.corner and known.window.edges is None:
-        coarse = float(RULES[of.measure.rule](course_of(known, known.parts[0])))
-        where = f"measures.{of.measure.name}"
-        yield finding_for("tolerance.corner", where, figure=known.figure, coarse=coarse, unit=unit)
 
 
 def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from trunnion.cycle.positions import check_steps
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
-from trunnion.measures.figures import Reference
+from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.mechanism import Mechanism
@@ -22,8 +22,8 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import references
-from trunnion.studies.tolerance.linear import Linear, linear, searched
+from trunnion.studies.tolerance.kernel import many_of
+from trunnion.studies.tolerance.linear import Linear, Reference, linear, references, searched
 from trunnion.studies.tolerance.sampling import Sampler, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
 
@@ -62,18 +62,23 @@ class ToleranceStudy:
         return effects_of(self.inputs)
 
     @cached_property
+    def many(self) -> Many:
+        """The measures of the nominal mechanism, to be read of others."""
+        return many_of(self.run, self.measures, self.inputs, self.friction, "numpy")
+
+    @cached_property
     def references(self) -> dict[str, Reference]:
-        """The measures of the nominal mechanism."""
-        return references(self.kernel, self.plan, self.inputs)
+        """The measures of the nominal mechanism, at the positions of the plan too."""
+        return references(self.kernel, self.plan, self.many)
 
     @cached_property
     def linear(self) -> Linear:
         """First order of every measure."""
-        return linear(self.kernel, self.plan, self.effects, self.references)
+        return linear(self.kernel, self.plan, self.effects, self.references, self.many)
 
     def worst(self) -> list[tuple[Corner, Corner]]:
         """Least and largest deviation of every measure on the mechanism itself."""
-        return [searched(self.kernel, self.linear, of) for of in self.linear.measures]
+        return [searched(self.many, self.linear, of) for of in self.linear.measures]
 
     def sampling(self, method: Any, samples: int, seed: int, engine: str = "numpy") -> Sampling:
         """The run of a sampling method."""

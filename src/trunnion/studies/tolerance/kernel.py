@@ -12,20 +12,21 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures.evaluation import Courses, Kernel, NumpyKernel, sharpened, where_known
-from trunnion.measures.figures import Reference, known, reference
+from trunnion.measures.evaluation import Curves, Kernel, NumpyKernel, where_known
+from trunnion.measures.figures import known
+from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.walk_kernel import WalkKernel
+from trunnion.statistics.streams import uniforms
 from trunnion.studies.tolerance.inputs import Inputs
 
-__all__ = ["batch_of", "engine_for", "kernel_of", "references"]
+__all__ = ["batch_of", "engine_for", "kernel_of", "many_of"]
 
 AT_ONCE = {"numpy": 10_000, "compiled": 1 << 20}  # numbers in an array, by engine
+PILOTS = 24  # samples that tell how finely the courses of all have to be resolved
 WORTH_COMPILING = 500_000  # configurations; NumPy does as many in the time that compiling takes at most
 
 
@@ -34,6 +35,11 @@ class CompiledCourses:
     """The same, compiled; what that cannot decide NumPy computes again. numpy: the kernel it stands for."""
 
     numpy: NumpyKernel
+
+    @property
+    def at_once(self) -> int:
+        """Places that it takes best at a time."""
+        return AT_ONCE["compiled"]
 
     @cached_property
     def _parts(self) -> dict[str, tuple[Measure, int]]:
@@ -57,10 +63,10 @@ class CompiledCourses:
         """MechanismError for a mechanism that only NumPy takes."""
         self._compiled.check(values)
 
-    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Courses, NDArray[np.int8]]:
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
         """As `NumpyKernel.courses`, of plain numbers."""
         curves, status = self._compiled.curves(values, np.asarray(time, float))
-        found: Courses = {measure.name: () for measure in self.numpy.measures}
+        found: Curves = {measure.name: () for measure in self.numpy.measures}
         for name, (measure, _) in self._parts.items():
             found[measure.name] += (where_known(known(measure, status), curves[name]),)
         return found, status
@@ -98,16 +104,15 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
     raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(AT_ONCE)}"))
 
 
-def references(kernel: NumpyKernel, plan: PositionPlan, inputs: Inputs) -> dict[str, Reference]:
-    """Every measure of the nominal mechanism, pins in the middle of their holes where no seat is given."""
-    run = kernel.run
-    values = inputs.nominal
-    walk = forward(run.system, values, run.chosen.assembly, plan.times)
-    courses, _ = kernel.courses(values, plan.times)
-    system, found = run.system, {}
-    for measure in kernel.measures:
-        turns = measure.of_motion and measure.turning(system)
-        rate = measure.coordinate(system).rate(walk) if turns else None
-        one = reference(measure, courses[measure.name], plan.windows[measure.name], system, rate)
-        found[measure.name] = sharpened(one, kernel, plan, values)
-    return found
+def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: FrictionMethod, engine: str) -> Many:
+    """The measures of the nominal mechanism, pins in the middle of their holes where no seat is given."""
+
+    def kernels(some: Sequence[Measure]) -> Kernel:
+        return kernel_of(engine, run, some, friction)
+
+    def duals(some: Sequence[Measure]) -> Kernel:
+        return MotionKernel(run, some, friction)
+
+    many = Many(run, measures, inputs.nominal, kernels, duals)
+    many.tune(inputs.values(uniforms(0, 0, inputs.dims, PILOTS)))
+    return many

@@ -14,23 +14,45 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.measures.corners import change_by_step
-from trunnion.measures.evaluation import NumpyKernel, at_corner
-from trunnion.measures.figures import Reference, figure, shown, span
+from trunnion.algebra.panels import selected
+from trunnion.measures.evaluation import NumpyKernel
+from trunnion.measures.figures import follow
+from trunnion.measures.lines import turn
+from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan
+from trunnion.measures.positions import PositionPlan, Window, moved
+from trunnion.solve.forward import forward
 from trunnion.studies.tolerance.effects import Effects, FirstOrder
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
 
-__all__ = ["Linear", "Of", "by_position", "linear", "searched"]
+__all__ = ["Linear", "Of", "Reference", "by_position", "linear", "references", "searched"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array of one walk with dual numbers
-STEP, STEP_OF_NONE = 1e-4, 1e-5  # of a number, and of the size of the mechanism for one that is 0: of a difference
 MOST_PAIRS = 720  # positions between which a peak-to-peak deviation is looked for
+ROUNDS, AROUND = 4, 17  # in which the worst position is looked for, and places about it in each
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A measure of the nominal mechanism.
+
+    parts: its course at the positions of the window, angles without jumps; figure: 0 for what is a deviation by itself,
+    NaN where it has none; time: of an extreme, s, else NaN; turning: whether it is an angle; attitude: whether it is
+    the turn of a link in space; against: whether it is judged against the nominal mechanism.
+    """
+
+    measure: Measure
+    window: Window
+    parts: tuple[Array, ...]
+    figure: float
+    time: float
+    turning: bool
+    attitude: bool
+    against: bool
 
 
 @dataclass(frozen=True)
@@ -38,7 +60,8 @@ class Of:
     """One measure to first order.
 
     figure: of its figure; course: of the course at every position of the window, curve: the nominal one. total: of the
-    figure, all together. place: position in the window at which the figure is taken, −1 if it is of no single one.
+    figure, all together. place: position in the window nearest to where the figure is taken, −1 if it is of no single
+    one; time: of that place, and of an extreme, s.
     lead: what the search of the worst case begins with, figure where that has derivatives.
     """
 
@@ -48,6 +71,7 @@ class Of:
     total: Spread
     curve: Array
     place: int
+    time: float
     lead: FirstOrder
 
     @property
@@ -65,15 +89,41 @@ class Linear:
     status: NDArray[np.int8]
 
 
-def linear(kernel: NumpyKernel, plan: PositionPlan, effects: Effects, known: Mapping[str, Reference]) -> Linear:
+def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str, Reference]:
+    """Every measure of the nominal mechanism, at the positions of the plan too."""
+    system, values = kernel.run.system, many.values
+    curves, _ = kernel.courses(values, plan.times)
+    walk = forward(system, values, kernel.run.chosen.assembly, plan.times)
+    found = {}
+    for measure in kernel.measures:
+        window, turning = plan.windows[measure.name], measure.turning(system)
+        parts = [
+            np.array(np.broadcast_to(np.asarray(primal(part), float), plan.times.shape)[window.index])
+            for part in curves[measure.name]
+        ]
+        if turning:
+            rate = np.broadcast_to(np.asarray(primal(measure.coordinate(system).rate(walk)), float), plan.times.shape)
+            follow(parts[0], rate[window.index], window.time)
+        attitude = measure.of_attitude(system)
+        against = measure.of.against or attitude or measure.rule == "deviation"
+        figure, time = many.figures[measure.name], many.times[measure.name]
+        found[measure.name] = Reference(measure, window, tuple(parts), figure, time, turning, attitude, against)
+    return found
+
+
+def linear(
+    kernel: NumpyKernel, plan: PositionPlan, effects: Effects, known: Mapping[str, Reference], many: Many
+) -> Linear:
     """First order of every measure about the nominal mechanism."""
     values = effects.values()
     courses, status = _courses(kernel, plan, effects, values)
+    lines = {name: one.window.time for name, one in known.items() if one.measure.rule == "line"}
+    reads = many.read(values, lines)
     found = []
     for measure in kernel.measures:
-        one = known[measure.name]
-        steep = _at_corner(kernel, plan, effects, values, one)[1] if one.corner else None
-        found.append(_of(one, effects, courses[measure.name], steep))
+        one, read = known[measure.name], reads[measure.name]
+        there = _placed(replace(kernel, measures=[measure]), effects, values, one, many) if by_position(one) else None
+        found.append(_of(one, effects, courses[measure.name], read, there))
     return Linear(effects, plan, found, status[0])
 
 
@@ -100,56 +150,27 @@ def _courses(
     return found, status
 
 
-def _at_corner(
-    kernel: NumpyKernel, plan: PositionPlan, effects: Effects, values: Mapping[str, Number], known: Reference
-) -> tuple[Array, Array]:
-    """A figure at a corner of the course and its derivatives, (row,): differences, as the corner moves too."""
-    alone = replace(kernel, measures=[known.measure])
-    step = _steps(effects)
-
-    def figures(way: float) -> Array:
-        moved = {path: primal(one) + way * step[:, None] * derivative(one) for path, one in values.items()}
-        course = _courses(alone, plan, effects, moved)[0][known.measure.name][0].real
-        return at_corner(alone, plan, moved, known, course[:, known.window.index], course[:, 0])
-
-    middle, moving = figures(0.0), step > 0
-    if not np.any(moving):
-        return middle, 0.0 * step
-    found = change_by_step(figures(-1.0), middle, figures(1.0))
-    return middle, np.divide(found, step, out=np.zeros_like(found), where=moving)
-
-
-def _steps(effects: Effects) -> Array:
-    """By how much the number of each row is moved for a difference, (row,), whatever its tolerance; 0: not at all."""
-    run = effects.inputs.run
-    size = float(np.ravel(primal(run.system.size(run.values)))[0])
-    known = [abs(float(np.ravel(primal(run.values.get(row.seed, 0.0)))[0])) for row in effects.rows]
-    return np.array([
-        (STEP * value if value else STEP_OF_NONE * size) if row.seed else 0.0
-        for row, value in zip(effects.rows, known, strict=True)
-    ])  # fmt: skip
-
-
-def _of(known: Reference, effects: Effects, course: Course, steep_at_corner: Array | None = None) -> Of:
-    measure, window = known.measure, known.window
+def _of(known: Reference, effects: Effects, course: Course, read: Read, there: tuple[float, Array] | None) -> Of:
+    """First order of one measure. there: where a figure is that is taken at the worst position, and its derivatives."""
+    measure, window, time = known.measure, known.window, known.time
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
-    real, slope = _scalar(known, effects, course, parts)
+    real, slope = _scalar(known, effects, parts, read.shown)
     whole = FirstOrder(effects, effects.without_noise(slope))
-    lead = None
-    if by_position(known):
-        place, steep = _worst(measure, whole)
+    lead, place = None, -1
+    if there is not None:
+        time, steep = there
+        place = int(np.argmin(np.abs(window.time - time))) if np.isfinite(time) else -1
     elif (known.against and measure.rule not in ("mean", "value")) or measure.kind == "path_error":
-        place, steep = -1, np.full(len(real), np.nan)
+        steep = np.full(len(real), np.nan)
         lead = FirstOrder(effects, whole.slope[:, _top(whole.total.upper)])
-    elif steep_at_corner is not None:
-        place, steep = -1, steep_at_corner
     else:
-        value, steep = effects.slopes(figure(course, known), ())
+        value, steep = effects.slopes(read.figure, ())
         place = 0 if measure.rule == "value" and not measure.in_time else -1
+        time = float(window.time[0]) if place == 0 else time
         steep = np.where(np.isfinite(value), steep, np.nan)  # of what does not exist
     one = FirstOrder(effects, effects.without_noise(steep))
     total = _ends(measure, whole.total, one.total) if by_position(known) else one.total
-    return Of(known, one, whole, total, real[0], place, lead or one)
+    return Of(known, one, whole, total, real[0], place, time, lead or one)
 
 
 def _ends(measure: Measure, course: Spread, total: Spread) -> Spread:
@@ -182,85 +203,87 @@ def by_position(known: Reference) -> bool:
     return rule == "deviation" or (known.against and rule in ("maximum", "minimum", "largest", "peak-to-peak"))
 
 
-def _scalar(known: Reference, effects: Effects, course: Course, parts: Sequence[Dual]) -> tuple[Array, Array]:
-    """One number a position, (row, position), with its derivative, that stands for the course."""
-    if len(parts) == 1:
-        real = parts[0].real.copy()
-        if known.turning:
-            real += known.parts[0] - real[0]
-        return real, parts[0].dual
+def _scalar(known: Reference, effects: Effects, parts: Sequence[Dual], line: Number = 0.0) -> tuple[Array, Array]:
+    """One number a position, (row, position), with its derivative, that stands for the course.
+
+    line: the distances from the line of a path.
+    """
+    count = np.shape(parts[0].real)[1]
     if known.measure.kind == "path_error":
         slopes = np.array([part.dual for part in parts])  # (axis, row, position)
         scaled = slopes * effects.weights[:, None]
         scatter = np.einsum("arp,brp->pab", scaled, scaled)
         along = np.linalg.eigh(np.nan_to_num(scatter))[1][:, :, -1]  # (position, axis)
         return np.zeros_like(parts[0].real), np.einsum("arp,pa->rp", slopes, along)
-    number = shown(course, known)
-    return effects.slopes(number, (len(known.window.index),))
+    if known.measure.rule == "line":
+        return effects.slopes(line, (count,))
+    if known.attitude:
+        return effects.slopes(turn(parts, [primal(part)[0] for part in parts], known.measure.axis), (count,))
+    if len(parts) > 1:
+        useful, driven = parts
+        return effects.slopes(useful / selected(primal(driven) > 0, driven, np.nan), (count,))
+    real = parts[0].real.copy()
+    if known.turning and len(known.parts[0]) == count:
+        real += known.parts[0] - real[0]
+    if known.measure.of.against:
+        real -= real[:1]
+    return real, parts[0].dual
 
 
-def _worst(measure: Measure, course: FirstOrder) -> tuple[int, Array]:
-    """Where the worst case of a course is largest, and the derivatives of the figure there."""
+def _placed(
+    kernel: NumpyKernel, effects: Effects, values: Mapping[str, Number], known: Reference, many: Many
+) -> tuple[float, Array]:
+    """Time, s, at which the worst case of a course is largest, and the derivatives of the figure there, (row,).
+
+    NaN s of a peak-to-peak value, which is of two places.
+    """
+    run, measure, time = kernel.run, known.measure, many.spots(known.measure)
+    for _ in range(ROUNDS):
+        within = time % run.cycle.duration if run.cycle.periodic and run.cycle.duration > 0 else time
+        curves, _ = kernel.courses(values, moved(run, values, within))
+        parts = [Dual(*effects.slopes(part, (len(time),))) for part in curves[measure.name]]
+        course = FirstOrder(effects, effects.without_noise(_scalar(known, effects, parts)[1]))
+        if measure.rule == "peak-to-peak":
+            return float("nan"), _widest(course)
+        size = np.nan_to_num(course.total.worst)
+        top = int(np.argmax(size))
+        place, steep = float(time[top]), course.slope[:, top]
+        if len(time) == 1:
+            break
+        time = np.linspace(time[max(top - 1, 0)], time[min(top + 1, len(time) - 1)], AROUND)
+        time = np.sort(np.append(time, place))
+    return place, steep
+
+
+def _widest(course: FirstOrder) -> Array:
+    """Derivatives of the difference of a course between the two of its places where that is worst."""
     slope = course.slope
-    if measure.rule == "peak-to-peak":
-        pick = np.unique(np.linspace(0, slope.shape[1] - 1, min(slope.shape[1], MOST_PAIRS)).astype(int))
-        best, found = -1.0, slope[:, 0] * 0.0
-        for i in pick:
-            change = slope[:, pick] - slope[:, [i]]
-            upper = np.nan_to_num(FirstOrder(course.effects, change).total.upper)
-            top = int(np.argmax(upper))
-            if upper[top] > best:
-                best, found = float(upper[top]), change[:, top]
-        return -1, found
-    size = course.total.worst
-    place = int(np.nanargmax(size)) if np.any(np.isfinite(size)) else 0
-    return place, slope[:, place]
+    best, found = -1.0, slope[:, 0] * 0.0
+    for i in np.unique(np.linspace(0, slope.shape[1] - 1, min(slope.shape[1], MOST_PAIRS)).astype(int)):
+        change = slope - slope[:, [i]]
+        upper = np.nan_to_num(FirstOrder(course.effects, change).total.upper)
+        top = int(np.argmax(upper))
+        if upper[top] > best:
+            best, found = float(upper[top]), change[:, top]
+    return found
 
 
-def searched(kernel: NumpyKernel, found: Linear, of: Of) -> tuple[Corner, Corner]:
+def searched(many: Many, found: Linear, of: Of) -> tuple[Corner, Corner]:
     """The least and the largest deviation of the figure on the mechanism itself, with the numbers there.
 
     Of a figure over all positions: the least and the largest deviation of the course from nominal anywhere.
     """
-    plan, known = found.plan, of.reference
-    alone = replace(kernel, measures=[of.measure])
+    alone = many.alone(of.measure)
 
     def ends(sign: float) -> Corner:
         def objective(values: Mapping[str, Number], effects: Effects) -> tuple[Array, Array]:
-            if known.corner:
-                figures, slope = _at_corner(kernel, plan, effects, values, known)
-                return figures - known.figure, slope
-            courses, _ = _courses(alone, plan, effects, values)
-            course = courses[of.measure.name]
-            ends_of = span([part.real for part in course], known)
-            whole = np.broadcast_to(ends_of[1] if sign > 0 else ends_of[0], (len(effects.rows),))
-            if of.place < 0 or by_position(of.reference):
-                return whole, _slope_at(of, effects, course, sign)
-            return whole, effects.slopes(figure(course, known), ())[1]
+            read = alone.read(values)[of.measure.name]
+            return effects.slopes(read.most if sign > 0 else read.least, ())
 
         start = of.lead.corner(sign)
-        return search(found.effects, objective, start, sign, bool(np.isfinite(known.figure)))
+        return search(found.effects, objective, start, sign, bool(np.isfinite(of.reference.figure)))
 
     return ends(-1.0), ends(1.0)
-
-
-def _slope_at(of: Of, effects: Effects, course: Course, sign: float) -> Array:
-    """Derivatives of the figure by rows, at a corner."""
-    if not by_position(of.reference):
-        return effects.slopes(figure(course, of.reference), ())[1]
-    known = of.reference
-    if of.measure.kind == "path_error":
-        slopes = np.array([part.dual[:, known.window.index] for part in course])
-        change = np.array([part.real[0, known.window.index] for part in course]) - np.array(known.parts)
-        size = np.sqrt(np.sum(change**2, axis=0))
-        place = _top(size)
-        along: Array = sign * np.einsum("ar,a->r", slopes[:, :, place], change[:, place]) / (size[place] or 1.0)
-        return along
-    real, slope = effects.slopes(shown(course, known), (len(known.window.index),))
-    if of.measure.rule == "peak-to-peak":
-        between: Array = slope[:, _top(real[0])] - slope[:, _top(-real[0])]
-        return between
-    return np.asarray(slope[:, _top(sign * real[0])])
 
 
 def _top(numbers: Array) -> int:

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import references
 from trunnion.errors import Finding, Status
-from trunnion.measures.corners import switch
-from trunnion.measures.evaluation import looking
-from trunnion.measures.figures import moment
 from trunnion.measures.measures import Measure
 from trunnion.model.parameters import dimension_kinds
 from trunnion.results.attributes import cited, finding_rows, origin
@@ -234,12 +231,7 @@ def _linear(found: ToleranceStudy) -> dict[str, Any]:
 
 def _place(found: ToleranceStudy, of: Of) -> float:
     """The drive coordinate at which a figure is taken; NaN if it is of no single position."""
-    run, known = found.run, of.reference
-    time = known.window.time[of.place] if of.place >= 0 else moment(known)
-    if known.corner and np.isfinite(time):
-        values = found.inputs.nominal
-        look, edges = looking(found.kernel, found.plan, values, known.measure), [run.edges, found.plan.bends(values)]
-        time = switch(known, look, np.concatenate(edges), run.cycle, time)
+    run, time = found.run, of.time
     if not np.isfinite(time) or run.cycle.duration <= 0:
         return float("nan")
     time = time % run.cycle.duration if run.cycle.periodic else time

@@ -15,12 +15,11 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Status
-from trunnion.measures.evaluation import Courses, Kernel, at_corner
-from trunnion.measures.figures import Reference, judged, kept
+from trunnion.measures.figures import within_limits
+from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan, plan
+from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
@@ -28,7 +27,7 @@ from trunnion.statistics.histogram import Bins, count
 from trunnion.statistics.streams import SobolStream, uniforms
 from trunnion.statistics.tally import Tree, moments_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
-from trunnion.studies.tolerance.kernel import batch_of, kernel_of, references
+from trunnion.studies.tolerance.kernel import batch_of, many_of
 from trunnion.version import __version__
 
 __all__ = ["METHODS", "SampleTally", "Sampling", "towards"]
@@ -209,10 +208,10 @@ class Sampling:
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""
         run = prepare(Mechanism(**self.model))
-        places = plan(run, self.measures, self.steps)
         inputs = inputs_of(run)
-        known = references(MotionKernel(run, self.measures, self.friction), places, inputs)
-        return Sampler(self, inputs, places, kernel_of(self.engine, run, self.measures, self.friction), known)
+        windows = plan(run, self.measures, self.steps).windows
+        times = {name: window.time for name, window in windows.items()}
+        return Sampler(self, inputs, many_of(run, self.measures, inputs, self.friction, self.engine), times)
 
 
 def towards(gradients: Array) -> Array:
@@ -228,20 +227,14 @@ def towards(gradients: Array) -> Array:
     return rotation
 
 
-def _joined(parts: Sequence[tuple[Array, ...]]) -> tuple[Array, ...]:
-    """The courses of batches, one after the other."""
-    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
-
-
 @dataclass(frozen=True, eq=False)
 class Sampler:
-    """A run ready to draw and analyse blocks."""
+    """A run ready to draw and analyse blocks. times: at which the course of each measure is shown, s."""
 
     job: Sampling
     inputs: Inputs
-    plan: PositionPlan
-    kernel: Kernel
-    nominal: Mapping[str, Reference]
+    many: Many
+    times: Mapping[str, Array]
 
     @cached_property
     def _streams(self) -> list[SobolStream]:
@@ -261,28 +254,17 @@ class Sampler:
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def figures(self, u: Array) -> tuple[Array, Array, list[Array], NDArray[np.int8]]:
-        """Of samples drawn: figures and whether they conform, (measure, sample), curves, status (sample, position)."""
-        count, batch = u.shape[1], batch_of(self.job.engine, self.job.positions)
-        parts = [self._courses(u[:, low : low + batch]) for low in range(0, count, batch)]
-        courses = {name: _joined([part[name] for part, _ in parts]) for name in parts[0][0]}
-        status = np.concatenate([part for _, part in parts])
-        found, passed, curves = np.empty((len(self.job.measures), count)), np.empty((len(self.job.measures), count)), []
-        for i, measure in enumerate(self.job.measures):
-            course, known = courses[measure.name], self.nominal[measure.name]
-            found[i], passed[i], curve = judged(course, known)
-            if known.corner or known.bends:
-                values = self.inputs.values(u, self.job.rotation)
-                found[i] = at_corner(self.kernel, self.plan, values, known, curve, found[i])
-                passed[i] = kept(course, known, found[i])
-            curves.append(curve)
+        """Of samples drawn: figures and whether they conform, (measure, sample), curves, gravest status, (sample,)."""
+        reads = self.many.read(self.inputs.values(u, self.job.rotation), self.times)
+        count, measures = u.shape[1], self.job.measures
+        found, passed, curves = np.empty((len(measures), count)), np.empty((len(measures), count)), []
+        status = np.zeros(count, np.int8)
+        for i, measure in enumerate(measures):
+            read = reads[measure.name]
+            found[i], status = read.figure, np.maximum(status, read.status)
+            passed[i] = within_limits(measure, found[i], read.least, read.most)
+            curves.append(np.broadcast_to(np.asarray(read.shown), (count, len(self.times[measure.name]))))
         return found, passed, curves, status
-
-    def _courses(self, u: Array) -> tuple[Courses, NDArray[np.int8]]:
-        """Courses of a batch, each part (sample, position)."""
-        values = self.inputs.values(u, self.job.rotation)
-        courses, status = self.kernel.courses(values, self.plan.moved(values))
-        full = status.shape
-        return {name: tuple(np.broadcast_to(part, full) for part in course) for name, course in courses.items()}, status
 
     def evaluate(self, first: int, last: int) -> SampleTally:
         """The tally of blocks first, …, last − 1."""
@@ -301,7 +283,7 @@ class Sampler:
                 apart = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
                 own[: curve.shape[-1]] += count(apart.T, self.job.curve_bins(i))
             if np.any(lost):
-                gravest = np.max(status, axis=-1)[lost]
+                gravest = status[lost]
                 cause = np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1)
                 tally.failed[:] += np.bincount(cause, minlength=CAUSES)
             everything = np.concatenate([found, passed, np.min(passed, axis=0)[None]])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.results.attributes import attribute, findings_of
+from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
@@ -71,9 +71,8 @@ def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str,
     if limit is not None:
         axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
     if "extreme_worst_case" in result and np.isfinite(there := float(np.sum(result["extreme_worst_case"].values))):
-        # the curve is of the whole course with the pins held where it is, the figure of this place or of a corner
-        corner = any(one.code == "play.beside_jump" and one.where == f"measures.{name}" for one in findings_of(result))
-        label = "of the extreme: at a corner, which play moves" if corner else "of the extreme, at its place"
+        # the curve is of the whole course with the pins held where it is, the figure of this place, which they may move
+        label = "of the extreme, at its place"
         axes.plot([_place(result, over)], [there * factor], "o", color=INK, label=label, clip_on=False)
     axes.set_ylim(bottom=0.0)
     frame_peak(axes, most, shown, factor, unit)

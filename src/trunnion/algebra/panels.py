@@ -1,0 +1,331 @@
+"""What is read of polynomials on panels: extremes, means, shares above a level; of one mechanism or of many at once.
+
+On every panel a number is the polynomial with some Chebyshev coefficients in its spot, −1 at the start of the panel and
+1 at its end: arrays (…, lane, panel, coefficient), a lane for each mechanism, of floats or of dual numbers. Values at a
+spot that stays have the derivatives of the coefficients, so those of an extreme are these at its place, where the
+course is level; the place itself moves by −ḟ′/f̈, f′ being the dual part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev, legendre
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import Dual, derivative, primal
+from trunnion.algebra.namespace import Number
+
+__all__ = [
+    "CANCELLED", "ENDS", "FIT", "GAUSS_WEIGHTS", "GRID", "INTEGRAL", "ON_GAUSS", "ON_GRID", "ON_POINTS", "ORDER",
+    "POINTS", "RATE", "Made", "OnGrid", "Top", "above", "extreme", "linear", "selected", "spread_out", "weighted",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+Made = Callable[[Any], Number]  # of some rows, (row, …), one number, (…)
+
+ORDER = 12  # coefficients of a panel
+POINTS = -np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
+ON_POINTS = chebyshev.chebvander(POINTS, ORDER - 1).T
+FIT = np.linalg.inv(ON_POINTS.T)
+GRID = np.linspace(-1.0, 1.0, 33)  # places of a panel among which extremes are looked for first
+CELL = GRID[1] - GRID[0]
+ON_GRID = chebyshev.chebvander(GRID, ORDER - 1).T
+GAUSS, GAUSS_WEIGHTS = legendre.leggauss(ORDER)
+ON_GAUSS = chebyshev.chebvander(GAUSS, ORDER - 1).T
+ENDS = np.array([(-1.0) ** np.arange(ORDER), np.ones(ORDER)]).T
+INTEGRAL = ON_GAUSS @ GAUSS_WEIGHTS  # of every Chebyshev polynomial over a panel
+RATE = np.zeros((ORDER, ORDER))  # coefficients of a derivative by the spot
+RATE[:, :-1] = chebyshev.chebder(np.eye(ORDER), axis=1)
+NEAR = 0.02  # of the range of a course: panels whose highest place of the grid is lower by less are looked at closely
+FLAT = 1e-9  # of its size: a course that changes less is constant, and of tops that differ less the first counts
+ROUNDING = 1e-14
+TIED = 1e-7  # of its range: tops of which either may be the highest in mechanisms that differ by little
+ROUGH, NARROWED = 1e-7, 12  # last coefficients of a polynomial, of the others, and rounds in which it is narrowed
+CANCELLED = 1e-12  # of a mean of magnitudes: less than this is what rounding leaves of one that is zero
+NEWTONS, HALVINGS, LEADING, SETTLED = 5, 5, 8, 1e-3
+
+
+class Top(NamedTuple):
+    """An extreme of every lane, (lane,).
+
+    value: NaN where no panel has one; panel, spot: its place; constant: whether the course does not change.
+    """
+
+    value: Number
+    panel: NDArray[np.intp]
+    spot: Number
+    constant: NDArray[np.bool_]
+
+
+def linear(number: Number, of: Callable[[Any], Any]) -> Number:
+    """A linear function of an array, of both parts of a dual number."""
+    return Dual(linear(number.real, of), linear(number.dual, of)) if isinstance(number, Dual) else of(number)
+
+
+def selected(condition: Any, number: Number, other: Any) -> Number:
+    """`numpy.where` for numbers of any kind; the other has no derivative."""
+    if isinstance(number, Dual):
+        return Dual(np.where(condition, number.real, other), np.where(condition, number.dual, 0.0 * other))
+    return np.where(condition, number, other)
+
+
+def weighted(number: Number, weights: Number) -> Number:
+    """Mean over panels of a number at the Gauss nodes, (lane, panel, node), each with its weight of time."""
+    parts = linear(number * weights, lambda array: np.sum(array @ GAUSS_WEIGHTS, axis=-1))
+    whole = linear(weights, lambda array: np.sum(np.broadcast_to(array, np.shape(primal(number))) @ GAUSS_WEIGHTS, -1))
+    return parts / whole
+
+
+def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Array:
+    """Rows at rising times, (row, lane, time), of coefficients, (row, lane, panel, coefficient); at an edge later ones.
+
+    low, half: starts and half widths of the panels, (lane, panel), one lane if they are those of all.
+    """
+    found = np.full((*coefficients.shape[:2], len(time)), np.nan)
+    for k in range(low.shape[1]):
+        start, width, own = low[:, k, None], 2.0 * half[:, k, None], coefficients[:, :, k]
+        ends = np.searchsorted(time, [np.min(start), np.max(start + width) * (1 + 1e-15)], side="left")
+        lane = slice(ends[0], ends[1] + 1)
+        spot = 2.0 * (time[lane] - start) / np.where(width > 0.0, width, np.nan) - 1.0
+        inside = (spot >= -1.0) & (spot <= 1.0 + 1e-12)
+        if np.all(start == start[0]) and np.all(width == width[0]):
+            values = own @ chebyshev.chebvander(spot[0], ORDER - 1).T
+        else:
+            values = _clenshaw(own, spot)
+        found[..., lane] = np.where(inside, values, found[..., lane])
+    return found
+
+
+def _clenshaw(own: Array, spot: Array) -> Array:
+    """Values of polynomials, (row, lane, coefficient), at spots of each lane, (lane, place)."""
+    after: Array | float = 0.0
+    value, twice = own[..., -1:], 2.0 * spot
+    for k in range(ORDER - 2, 0, -1):
+        after, value = value, own[..., k, None] + twice * value - after
+    return np.asarray(own[..., :1] + spot * value - after)
+
+
+class OnGrid(NamedTuple):
+    """A number at the places of the grid, (lane, panel, place), and its extremes there, (lane, panel)."""
+
+    values: Array
+    least: Array
+    most: Array
+
+    @classmethod
+    def of(cls, coefficients: Number, made: Made) -> OnGrid:
+        """Of a number made of some rows."""
+        values = np.asarray(primal(made(primal(coefficients) @ ON_GRID)), float)
+        return cls(values, np.min(values, axis=2), np.max(values, axis=2))
+
+
+def extreme(
+    coefficients: Number,
+    of: Made,
+    sign: float = 1.0,
+    allowed: Any = True,
+    floor: float = 0.0,
+    grid: OnGrid | None = None,
+) -> Top:
+    """The largest value of a number made of some rows, (row, lane, panel, coefficient), or with sign −1 its least.
+
+    Every panel whose best place of a grid is nearly as high as the best of all is looked at closely: there the number
+    is taken as a polynomial between the neighbours of that place, and its top is found by Newton's method.
+
+    Parameters
+    ----------
+    of
+        Such as `lambda rows: rows[0]`.
+    allowed
+        Panels among which it is looked for, (lane, panel).
+    floor
+        What is rounding of the number: a smaller change is none.
+    grid
+        The number at the places of the grid, if they are known.
+    """
+    grid = OnGrid.of(coefficients, of) if grid is None else grid
+    tops, bottoms = (grid.most, grid.least) if sign > 0 else (-grid.least, -grid.most)
+    finite = np.isfinite(tops) & allowed
+    tops = np.where(finite, tops, -np.inf)
+    high, low = np.max(tops, axis=1), np.min(np.where(finite, bottoms, np.inf), axis=1)
+    known = np.isfinite(high)
+    high, low = np.where(known, high, 0.0), np.where(known, low, 0.0)
+    flat = np.maximum(FLAT * np.maximum(np.abs(high), np.abs(low)), floor)
+    lane, panel = np.nonzero(known[:, None] & (tops >= (high - NEAR * (high - low))[:, None]))
+    middle = GRID[np.clip(np.argmax(sign * grid.values[lane, panel], axis=1), 1, len(GRID) - 2)]
+    width, pairs = np.full(len(lane), CELL), linear(coefficients, lambda array: array[:, lane, panel])
+    own = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
+    middle, width = _narrowed(primal(pairs), of, sign, (own, middle, width))
+    if np.any(width < CELL):
+        own = np.asarray(_fitted(primal(pairs), of, sign, middle, width))
+    spot, value, level = _top(own)
+    best = np.maximum.reduceat(value, np.searchsorted(lane, np.flatnonzero(known))) if len(lane) else value
+    most = np.full(len(tops), np.nan)
+    most[known] = best
+    first = np.zeros(len(tops), np.intp)
+    place: Number = middle + width * spot
+    # one that is not level goes on rising beside its panel: only what is as high but for rounding counts there
+    slack = np.where(level, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
+    first[known] = _first(lane, value >= most[lane] - slack)
+    pick = first
+    if isinstance(pairs, Dual):
+        slopes = np.broadcast_to(derivative(_fitted(pairs, of, sign, middle, width)), own.shape)
+        changes = _at(slopes, spot)
+        tied = value >= (most - flat - TIED * (high - low))[lane]
+        larger = np.lexsort((-np.abs(changes), ~tied, lane)) if len(lane) else lane
+        pick = first.copy()
+        pick[known] = larger[np.searchsorted(lane, np.flatnonzero(known))]
+        slope, bend = _at(slopes @ RATE, spot), _at(own @ RATE @ RATE, spot)
+        place = Dual(
+            place,
+            width * np.where((np.abs(spot) == 1.0) | (bend >= 0.0), 0.0, -slope / np.where(bend == 0.0, 1.0, bend)),
+        )
+        taken: Number = Dual(sign * most, _picked(sign * changes, pick, known))
+    else:
+        taken = sign * most
+    panels = np.where(known, _picked(panel.astype(float), first, known), 0)
+    return Top(
+        taken,
+        panels.astype(np.intp),
+        linear(place, lambda array: _picked(array, first, known)),
+        known & (high - low <= flat),
+    )
+
+
+def _picked(array: Array, pick: NDArray[np.intp], known: NDArray[np.bool_]) -> Array:
+    found = np.full(len(pick), np.nan)
+    found[known] = array[pick[known]]
+    return found
+
+
+def _first(lane: NDArray[np.intp], good: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The first good entry of each lane; all lanes have one."""
+    entries = np.flatnonzero(good)
+    return np.asarray(entries[np.append(True, np.diff(lane[entries]) > 0)] if len(entries) else entries)
+
+
+def _fitted(pairs: Number, of: Made, sign: float, middle: Array, width: Array) -> Number:
+    """A number made of rows, (row, entry, coefficient), as a polynomial about a spot of each entry."""
+    basis = _basis(middle[:, None] + width[:, None] * POINTS)
+    values = sign * of(linear(pairs, lambda array: np.einsum("rec,cen->ren", array, basis)))
+    return linear(values, lambda array: array @ FIT.T)
+
+
+def _narrowed(pairs: Array, of: Made, sign: float, first: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+    """Spots and widths about them within which a number is a polynomial, or that are very narrow: it may have a corner
+    at its top, as the size of a vector that passes zero."""
+    own, middle, width = first
+    middle, width, left = middle.copy(), width.copy(), np.arange(len(middle))
+    for _ in range(NARROWED):
+        size = ROUGH * np.max(np.abs(own[:, 1:]), axis=1) + ROUNDING * np.abs(own[:, 0])
+        rough = np.max(np.abs(own[:, -2:]), axis=1) > size
+        left, own = left[rough], own[rough]
+        if not len(left):
+            break
+        best = np.clip(np.argmax(own @ ON_POINTS, axis=1), 1, ORDER - 2)
+        low, high = (middle[left] + width[left] * POINTS[best + k] for k in (-1, 1))
+        middle[left], width[left] = (low + high) / 2, (high - low) / 2
+        own = np.asarray(_fitted(pairs[:, left], of, sign, middle[left], width[left]))
+    return middle, width
+
+
+def _at(coefficients: Array, spot: Array) -> Array:
+    """Values of polynomials, (entry, coefficient), each at its spot."""
+    return np.asarray(np.einsum("ce,ec->e", _basis(spot), coefficients))
+
+
+def _top(own: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Spot and value of the largest value of polynomials that have one top, and whether they are level there."""
+    lead = own[:, :LEADING]  # what is about a top is a parabola and little more
+    slope, bend = lead @ RATE[:LEADING, :LEADING], lead @ (RATE @ RATE)[:LEADING, :LEADING]
+    spot = POINTS[np.argmax(own @ ON_POINTS, axis=1)]
+    for _ in range(NEWTONS):
+        basis = _basis(spot, LEADING)
+        rate, second = np.einsum("ce,ec->e", basis, slope), np.einsum("ce,ec->e", basis, bend)
+        step = np.where(second < 0.0, -rate / np.where(second < 0.0, second, 1.0), np.sign(rate))
+        spot = np.clip(spot + np.clip(step, -0.5, 0.5), -1.0, 1.0)
+    level = (np.abs(spot) < 1.0) & (np.abs(step) < SETTLED)
+    ends = own @ ENDS
+    value, at_ends = _at(own, spot), np.max(ends, axis=1)
+    spot = np.where(at_ends > value, np.where(ends[:, 1] >= ends[:, 0], 1.0, -1.0), spot)
+    return spot, np.maximum(value, at_ends), level & (value >= at_ends)
+
+
+def _basis(spot: Array, count: int = ORDER) -> Array:
+    """Chebyshev polynomials at spots, one after the other along a new first axis."""
+    found = np.empty((count, *spot.shape))
+    found[0], found[1] = 1.0, spot
+    twice = 2.0 * spot
+    for k in range(2, count):
+        np.multiply(twice, found[k - 1], out=found[k])
+        found[k] -= found[k - 2]
+    return found
+
+
+# ---- shares above a level -------------------------------------------------------------------------------------
+
+
+def above(coefficients: Number, level: float) -> Number:
+    """How much of every panel, of the length 2 of its spots, a number, (lane, panel, coefficient), is above a level."""
+    own = coefficients - level * (np.arange(ORDER) == 0)
+    real = np.asarray(primal(own))
+    values: Array = real @ ON_GRID
+    up = values >= 0.0
+    share = CELL * np.sum(up[..., 1:] & up[..., :-1], axis=-1).astype(float)
+    moved = np.zeros(share.shape)
+    for lane, panel, low, high, full in _crossings(real, values, up):
+        spot = _crossed(real[lane, panel], low, high)
+        falls = up_at(real[lane, panel], low)
+        np.add.at(share, (lane, panel), np.where(falls, spot - low, high - spot) - full)
+        if isinstance(own, Dual):
+            slope = np.abs(_at(real[lane, panel] @ RATE, spot))
+            np.add.at(moved, (lane, panel), _at(np.broadcast_to(own.dual, real.shape)[lane, panel], spot) / slope)
+    share = np.where(np.any(np.isnan(values), axis=-1), np.nan, share)
+    return Dual(share, moved) if isinstance(own, Dual) else share
+
+
+def up_at(own: Array, spot: Array) -> NDArray[np.bool_]:
+    """Whether polynomials are above 0 at their spots."""
+    return _at(own, spot) >= 0.0
+
+
+def _crossings(real: Array, values: Array, up: NDArray[np.bool_]) -> Any:
+    """Lane, panel, and two spots between which a number passes 0 once; how much of that is counted as above it.
+
+    Between two places of the grid, or on either side of a place at which it turns back on the other side of 0.
+    """
+    lane, panel, cell = np.nonzero(up[..., 1:] != up[..., :-1])
+    yield lane, panel, GRID[cell], GRID[cell + 1], np.zeros(len(lane))
+    sizes = np.abs(values)
+    turning = (sizes[..., 1:-1] <= sizes[..., :-2]) & (sizes[..., 1:-1] <= sizes[..., 2:])
+    turning &= (up[..., 1:-1] == up[..., :-2]) & (up[..., 1:-1] == up[..., 2:])
+    turning &= sizes[..., 1:-1] < np.max(np.abs(np.diff(values)), axis=-1, keepdims=True)
+    lane, panel, middle = np.nonzero(turning)
+    if len(lane):
+        signs = np.where(up[lane, panel, middle + 1], -1.0, 1.0)
+        width = np.full(len(lane), CELL)
+        spot, most, _ = _top(
+            signs[:, None] * _fitted(real[None, lane, panel], lambda rows: rows[0], 1.0, GRID[middle + 1], width)
+        )
+        turned = most > 0.0
+        lane, panel, middle, spot, signs = lane[turned], panel[turned], middle[turned], spot[turned], signs[turned]
+        place, counted = GRID[middle + 1] + CELL * spot, np.where(signs < 0.0, 1.0, 0.0)
+        yield lane, panel, GRID[middle], place, counted * (place - GRID[middle])
+        yield lane, panel, place, GRID[middle + 2], counted * (GRID[middle + 2] - place)
+
+
+def _crossed(own: Array, low: Array, high: Array) -> Array:
+    """Where polynomials pass 0 between two spots."""
+    before = up_at(own, low)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        same = up_at(own, middle) == before
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    spot = 0.5 * (low + high)
+    for _ in range(NEWTONS):
+        slope = _at(own @ RATE, spot)
+        spot = np.clip(spot - _at(own, spot) / np.where(slope == 0.0, np.inf, slope), low, high)
+    return spot

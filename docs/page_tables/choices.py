@@ -181,9 +181,7 @@ def groups_table() -> str:
         rows.append((code(name), code(home.removeprefix("trunnion.")), about.splitlines()[0]))
     about = inspect.getdoc(cylindrical_dyad) or ""
     rows.append(("`CCC`, in space", "`groups.cylindrical_dyad`", about.splitlines()[0]))
-    rows.append(
-        ("every other", "`groups.general`", "Any planar group, by Newton's method; drivers too")
-    )
+    rows.append(("every other", "`groups.general`", "Any planar group, by Newton's method; drivers too"))
     rows.append(("every other, in space", "`groups.spatial`", "Any spatial group, likewise; drivers too"))
     return rows_of(("module", "where", "what"), rows)
 

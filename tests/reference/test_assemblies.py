@@ -24,7 +24,8 @@ from mechanisms import MODELS, analyse, build, class_three, excavator, findings,
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Severity
-from trunnion.solve.assembly_modes import GroupModes, choices, hints, put_together
+from trunnion.solve.assembly import hints
+from trunnion.solve.assembly_modes import GroupModes, choices, put_together
 from trunnion.solve.run import prepare
 from trunnion.views.assembly.modes import places
 

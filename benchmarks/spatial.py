@@ -19,7 +19,7 @@ from rich.table import Table
 
 from benchmarks.side import Side, take_turns
 from trunnion import Mechanism
-from trunnion.solve.branches import choose
+from trunnion.solve.assembly import choose
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.space.system import SpatialSystem
 

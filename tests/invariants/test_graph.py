@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
-from trunnion.structure.graph import components, matching
+from trunnion.structure.graph import components, longest_loop, matching
 
 COUNTS = st.integers(1, 12)
 
@@ -54,3 +54,37 @@ def test_a_long_chain_and_a_long_loop() -> None:
 def test_nothing() -> None:
     assert matching([], 0) == []
     assert components([]) == []
+
+
+def loops_up_to(edges: list[tuple[int, int]], most: int) -> list[int]:
+    """All loops of at most so many edges, each a set of edges as bits."""
+    number = {pair: 1 << k for k, edge in enumerate(edges) for pair in (edge, edge[::-1])}
+    ways = [([start], 0) for start in {node for edge in edges for node in edge}]
+    loops = set()
+    while ways:
+        path, used = ways.pop()
+        for node in (other for one, other in number if one == path[-1] and not used & number[one, other]):
+            bits = used | number[path[-1], node]
+            if node == path[0]:
+                loops.add(bits)
+            elif node not in path and len(path) < most:
+                ways.append(([*path, node], bits))
+    return list(loops)
+
+
+def independent(rows: list[int]) -> int:
+    """How many sets of edges do not follow from others."""
+    basis: list[int] = []
+    for row in rows:
+        for other in basis:
+            row = min(row, row ^ other)
+        basis += [row] * bool(row)
+    return len(basis)
+
+
+@given(st.sets(st.tuples(st.integers(0, 6), st.integers(0, 6)).filter(lambda pair: pair[0] < pair[1]), max_size=12))
+def test_loops_up_to_the_longest_span_all_and_shorter_ones_do_not(pairs: set[tuple[int, int]]) -> None:
+    edges = sorted(pairs)
+    longest, all_of_them = longest_loop(edges), independent(loops_up_to(edges, 7))
+    assert independent(loops_up_to(edges, longest)) == all_of_them
+    assert independent(loops_up_to(edges, longest - 1)) < all_of_them or longest == 0

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from brief import brief
 from mechanisms_space import chain, random_rotation, rssr
 from trunnion import Mechanism, MechanismError, Status, analyse
-from trunnion.solve.branch_tracking import Follower
-from trunnion.solve.branches import Track
 from trunnion.solve.run import prepare
+from trunnion.solve.track import Follower, Track
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]

@@ -7,10 +7,15 @@ circles, and what remains, the length of the third rod, is looked at for changes
 from __future__ import annotations
 
 import copy
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.drawn import planar, spatial
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import trunnion
@@ -19,11 +24,14 @@ from mechanisms import MODELS, analyse, build, class_three, excavator, findings,
 from mechanisms_parts import Data
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Severity
-from trunnion.solve.assembly_modes import GroupModes, put_together
+from trunnion.solve.assembly import hints
+from trunnion.solve.assembly_modes import GroupModes, choices, put_together
 from trunnion.solve.run import prepare
+from trunnion.views.assembly.modes import places
 
 Array = NDArray[np.float64]
 START = np.array([0.0])
+EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
 
 def named(data: Data, **assembly: str) -> Data:
@@ -240,6 +248,73 @@ def test_a_name_survives_writing_and_new_values(tmp_path: Any, extension: str) -
     assert longer.assembly["rocker"] == "way-2"
     assert at_start(longer, "rocker", "C")[1] < 0
     assert not [path for path in mechanism.parameters() if path.startswith("assembly.rocker")]
+
+
+# ---- what `check` prints as a hint ------------------------------------------------------------------------------
+
+
+def stated(text: str) -> dict[str, Any]:
+    """The places, slides and turns of a printed way, as they would be written into a model file."""
+    unit = text.partition(";")[0].rpartition(" ")[2]
+    points = {name: [f"{n} {unit}" for n in row.split(", ")] for name, row in re.findall(r"(\S+) \(([^)]*)\)", text)}
+    slides = {name: f"{n} {unit}" for name, n in re.findall(r"(\S+) at (-?[\d.e+-]+)", text)}
+    turns = {name: f"{n} deg" for name, n in re.findall(r"(\S+) (-?[\d.e+-]+)°", text)}
+    return {**points, **slides, **turns}
+
+
+def selected_by_what_is_printed(mechanism: Mechanism) -> int:
+    """How many ways are listed; each is selected, and nothing left undecided, by its printed places alone."""
+    run, count = prepare(mechanism), 0
+    data = mechanism.data()
+    for choice in choices(run):
+        module = run.system.plan.modules[choice.module]
+        used = {key for link, name, _ in hints(run.walk(START), module) for key in (name, f"{link}.{name}")}
+        others = {key: hint for key, hint in data.get("assembly", {}).items() if key not in {*used, *choice.links}}
+        for way in choice.ways:
+            again = prepare(Mechanism(**{**data, "assembly": {**others, **stated(places(choice, way))}}))
+            same = next(listed for listed in choices(again) if listed.links == choice.links)
+            assert [listed.name for listed in same.ways if listed.taken] == [way.name]
+            undecided = [one for one in again.chosen.findings if one.code == "assembly.choice"]
+            assert list(choice.links) not in [one.figures["links"] for one in undecided]
+            count += 1
+    return count
+
+
+@pytest.mark.spread(1)
+@pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.yaml")), ids=lambda file: file.stem)
+def test_the_printed_places_of_a_way_of_an_example_select_it(file: Path) -> None:
+    selected_by_what_is_printed(trunnion.read(file))
+
+
+@pytest.mark.parametrize("space", [planar, spatial], ids=["planar", "spatial"])
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=12, deadline=None)
+def test_the_printed_places_of_a_way_of_any_mechanism_select_it(space: Any, seed: int) -> None:
+    _, data = space.drawn(seed)
+    try:
+        mechanism = Mechanism(**data)
+        prepare(mechanism)
+    except MechanismError:
+        assume(False)
+    selected_by_what_is_printed(mechanism)
+
+
+@given(turn=st.floats(-1e-3, 1e-3), crank=st.floats(0.1, 0.5), longer=st.sampled_from([0.0, 1e-9, 1e-6, 1e-3, 0.1]))
+@settings(max_examples=40, deadline=None)
+def test_ways_that_nearly_meet_are_told_apart(turn: float, crank: float, longer: float) -> None:
+    """A linkage that starts in line, or nearly so, or only closes farther on, has as many digits as it takes."""
+    data = named(four_bar(crank, 0.7, 0.6, 1.3 - crank + longer))
+    data["drivers"]["A"]["start"] = float(np.pi + turn)
+    assert selected_by_what_is_printed(build(data)) == 2
+
+
+@pytest.mark.parametrize("name", ["swash-plate-pump", "double-cardan"])
+def test_the_turn_of_a_universal_joint_is_a_hint(name: str) -> None:
+    """Its place is the same in several ways; its turn about its first pin is not."""
+    mechanism = trunnion.read(EXAMPLES / f"{name}.yaml")
+    (choice,) = trunnion.check(mechanism, 12).choices
+    assert any(mechanism.joints[joint].type == "universal" for joint in choice.ways[0].turns)
+    assert selected_by_what_is_printed(mechanism) == len(choice.ways)
 
 
 # ---- a group that comes apart and is put together again ----------------------------------------------------------

@@ -17,9 +17,9 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import flat
-from trunnion.solve.branches import Track
 from trunnion.solve.forward import Forward, Motion
 from trunnion.solve.run import Run
+from trunnion.solve.track import Track
 
 __all__ = ["Followed", "Snapshot", "follows"]
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.namespace import Number
 from trunnion.groups.gear import rotation
 from trunnion.model.mechanism import Mechanism
+from trunnion.solve.assembly import Chosen, choose
 from trunnion.solve.backward import Backward, Given, Sense, solve
-from trunnion.solve.branches import Chosen, choose
 from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod

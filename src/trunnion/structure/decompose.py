@@ -10,9 +10,8 @@ work.  [THEORY of the docs, "Structure"; D 17 for the formula]
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -20,8 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.structure.generic import GEAR, SPIN, Constraint, Generic
-from trunnion.structure.graph import matching
-from trunnion.structure.parts import Parts
+from trunnion.structure.graph import components, longest_loop, matching, ordered
 
 __all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "passive"]
 
@@ -93,18 +91,17 @@ def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     Both joints are spherical; or one is, and the axis of the other, which frees a turn, goes through its centre. A turn
     that is driven is not free.
     """
-    found: dict[str, tuple[str, str]] = {}
+    spinning: dict[str, tuple[str, str]] = {}
     if mechanism.space == "planar" or mechanism.loop:
-        return found
-    table = LinkTable(mechanism)
+        return spinning
     for link in mechanism.links:
-        joints = table.joints_of.get(link, [])
+        joints = [name for name, joint in mechanism.joints.items() if link in joint.links]
         balls = [name for name in joints if PAIRS[mechanism.joints[name].type].ball]
         if link == mechanism.fixed_link or len(joints) != 2 or not balls:
             continue
         if len(balls) == 2 or _through(mechanism, link, balls[0], *(name for name in joints if name not in balls)):
-            found[link] = (joints[0], joints[1])
-    return found
+            spinning[link] = (joints[0], joints[1])
+    return spinning
 
 
 def _through(mechanism: Mechanism, link: str, ball: str, other: str) -> bool:
@@ -126,122 +123,41 @@ def decompose(mechanism: Mechanism) -> Plan:
 
     Raises MechanismError with a finding for every part that is not determined or determined twice.
     """
-    ground = mechanism.fixed_link
-    mobility = mobility_by_formula(mechanism)
-    table = LinkTable(mechanism)
-    bodies = [link for link in mechanism.effective_links if link != ground]
-    spinning = passive(mechanism)
-    determines, unmatched = _match(mechanism, bodies, ground, spinning)
-    if mechanism.space == "spatial":
-        findings = _undriven(mechanism, mobility - len(spinning), len(spinning))
-        unheld = FREEDOMS["spatial"] * len(bodies) > len(determines)
-        if not findings and (unheld or mobility - len(spinning) < len(mechanism.drivers)):
-            return Plan((_whole(table, bodies, spinning),), mobility, tuple(spinning))
-    else:
-        findings = _undriven(mechanism, mobility, 0, exactly=True) if mobility != len(mechanism.drivers) else []
-    if findings:
-        raise MechanismError(findings)
-    dependence = [
-        (other, body)
-        for constraint, body in determines.items()
-        for other in _links_of(mechanism, constraint)
-        if other not in (body, ground)
-    ]
-    parts = Parts(bodies, dependence)
-    if mechanism.space == "planar":
-        findings = Generic(mechanism, bodies, determines).fault(unmatched, parts)
-        if findings:
-            raise MechanismError(findings)
-    gears: dict[int, list[str]] = {}
-    for (name, number), body in determines.items():
-        if number == GEAR:
-            gears.setdefault(parts.part_of[body], []).append(name)
-    known = {ground}
+    planar, drivers = mechanism.space == "planar", len(mechanism.drivers)
+    mobility, spinning = mobility_by_formula(mechanism), passive(mechanism)
+    table = LinkTable(mechanism, spinning)
+    bodies = list(table.numbers)[1:]
+    determines, left_over = table.matched()
+    moved = mobility - len(spinning)
+    if moved > drivers or (planar and moved < drivers):
+        raise MechanismError([_undriven(moved, drivers, len(spinning))])
+    if not planar and (moved < drivers or FREEDOMS["spatial"] * len(bodies) > len(determines)):
+        module = replace(table.module(bodies, {mechanism.fixed_link}, []), kind="general", redundant=True)
+        return Plan((module,), mobility, tuple(spinning))
+    after: list[set[int]] = [set() for _ in bodies]
+    for constraint, body in determines.items():
+        for link in set(table.links_of[constraint]) - {body}:
+            after[table.numbers[link] - 1].add(table.numbers[body] - 1)
+    part_of = components(after)
+    parts: list[list[str]] = [[] for _ in set(part_of)]
+    before: list[set[int]] = [set() for _ in parts]
+    for k, part in enumerate(part_of):
+        parts[part].append(bodies[k])
+        for other in after[k]:
+            before[part_of[other]] |= {part} - {part_of[other]}
+    if planar and (fault := Generic(mechanism, bodies, determines, table.links_of).fault(left_over, parts, before)):
+        raise MechanismError([fault])
+    known = {mechanism.fixed_link}
     modules: list[Module] = []
-    for part in parts.ordered():
-        modules.append(_module(table, parts.members[part], known, gears.get(part, []), spinning))
-        known |= set(parts.members[part])
+    for part in ordered(before, [table.numbers[links[0]] for links in parts]):
+        gears = [name for (name, number), body in determines.items() if number == GEAR and body in parts[part]]
+        modules.append(table.module(parts[part], known, gears))
+        known.update(parts[part])
     return Plan(tuple(modules), mobility, tuple(spinning))
 
 
-class LinkTable:
-    """The links and joints of a mechanism, looked up rather than searched for."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self.joints = mechanism.effective_joints
-
-    @cached_property
-    def numbers(self) -> dict[str, int]:
-        """Link numbers of the formula: 0 for the ground, the others in file order."""
-        others = [link for link in self.mechanism.effective_links if link != self.mechanism.fixed_link]
-        return {self.mechanism.fixed_link: 0, **{link: i for i, link in enumerate(others, 1)}}
-
-    @cached_property
-    def joints_of(self) -> dict[str, list[str]]:
-        """The joints of each link, in file order."""
-        found: dict[str, list[str]] = {}
-        for name, joint in self.joints.items():
-            for link in dict.fromkeys(joint.links):
-                found.setdefault(link, []).append(name)
-        return found
-
-    @cached_property
-    def order(self) -> dict[str, int]:
-        """Where the joints stand in the file."""
-        return {name: i for i, name in enumerate(self.joints)}
-
-    def inside(self, links: list[str], known: set[str]) -> list[str]:
-        """Joints among some links, or between them and the known ones, in file order."""
-        own = set(links)
-        touching = {name for link in links for name in self.joints_of.get(link, [])}
-        found = (name for name in touching if all(link in own or link in known for link in self.joints[name].links))
-        return sorted(found, key=self.order.__getitem__)
-
-    def symbol(self, joint: str) -> str:
-        """The letter of a joint in the formula."""
-        return PAIRS[self.joints[joint].type].symbol
-
-
-def _constraints(mechanism: Mechanism) -> list[Constraint]:
-    """Every freedom that joints, gear pairs and drivers take."""
-    found: list[Constraint] = []
-    for name in mechanism.effective_joints:
-        found += [(name, i) for i in range(taken(mechanism, name))]
-    found += [(name, GEAR) for name in mechanism.gears]
-    return found + [(name, FREEDOMS[mechanism.space]) for name in mechanism.drivers]
-
-
-def _links_of(mechanism: Mechanism, constraint: Constraint) -> list[str]:
-    """Links whose motion a constraint relates."""
-    name, number = constraint
-    if number == SPIN:
-        return [name]
-    joints = mechanism.gears[name].joints if number == GEAR else (name,)
-    return list(dict.fromkeys(link for joint in joints for link in mechanism.effective_joints[joint].links))
-
-
-def _match(
-    mechanism: Mechanism, bodies: list[str], ground: str, spinning: Iterable[str]
-) -> tuple[dict[Constraint, str], list[Constraint]]:
-    """Each constraint with the link it determines, by a maximum matching onto the links' freedoms; those left over."""
-    constraints = _constraints(mechanism) + [(link, SPIN) for link in spinning]
-    size = FREEDOMS[mechanism.space]
-    number = {body: i for i, body in enumerate(bodies)}
-    wanted: list[list[int]] = []
-    for constraint in constraints:
-        moving = (number[link] for link in _links_of(mechanism, constraint) if link != ground)
-        wanted.append([size * link + freedom for link in moving for freedom in range(size)])
-    matched = matching(wanted, size * len(bodies))
-    found = {one: bodies[k // size] for one, k in zip(constraints, matched, strict=True) if k >= 0}
-    return found, [one for one, k in zip(constraints, matched, strict=True) if k < 0]
-
-
-def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = False) -> list[Finding]:
-    """Whether the drivers are fewer than the freedoms that have an effect, or not as many."""
-    drivers = len(mechanism.drivers)
-    if mobility <= drivers and not (exactly and mobility < drivers):
-        return []
+def _undriven(mobility: int, drivers: int, spins: int) -> Finding:
+    """The finding of drivers that are not as many as the freedoms that have an effect."""
     has = "is no driver" if drivers == 0 else "is one driver" if drivers == 1 else f"are {drivers} drivers"
     remedy = (
         "drive a joint for each freedom left, as A: {speed: 10 rad/s}, or add a link or joint that removes it"
@@ -250,89 +166,115 @@ def _undriven(mechanism: Mechanism, mobility: int, spins: int, exactly: bool = F
     )
     beside = f" beside {spins} that spin a link alone" if spins else ""
     what = f"the mobility is {mobility} by Grübler's formula{beside}, but there {has}"
-    return [Finding(what, "drivers", remedy)]
+    return Finding(what, "drivers", remedy)
 
 
-def _whole(table: LinkTable, links: list[str], spinning: Mapping[str, tuple[str, str]]) -> Module:
-    """All links as one module, whose joints constrain more than its links have freedoms."""
-    module = _module(table, links, {table.mechanism.fixed_link}, [], spinning)
-    return replace(module, kind="general", redundant=True)
+class LinkTable:
+    """The links, joints and constraints of a mechanism, looked up rather than searched for.
 
+    spinning: links whose spin is free, with their two joints. numbers: of the links in the formula, 0 for the ground,
+    the others in file order; joints_of: the joints of each link; links_of: the moving links of each constraint.
+    """
 
-def _module(
-    table: LinkTable, links: list[str], known: set[str], gears: list[str], spinning: Mapping[str, tuple[str, str]]
-) -> Module:
-    """The module that the given links form on the links known so far, and through these gear pairs."""
-    mechanism, numbers = table.mechanism, table.numbers
-    joints = table.inside(links, known)
-    driven = [name for name in joints if name in mechanism.drivers]
-    symbols = (f"[{table.symbol(name)}]" if name in driven else table.symbol(name) for name in joints)
-    letters = "".join(symbols) + "G" * len(gears)
-    if len(links) == 1 and driven == joints and not gears:
-        base = next(link for link in mechanism.effective_joints[joints[0]].links if link not in links)
-        letter = table.symbol(joints[0])
-        label = f"I({numbers[base]},{numbers[links[0]]}){letter}"
-        return _assembled(mechanism, letter, links, joints, driven, 1, label)
-    rank = _class(mechanism, links, joints)
-    dyad = _dyad(mechanism, links, joints) if not driven and not gears else None
-    if dyad:
-        kind, links, joints = dyad
-        letters = kind
-    else:
-        kind = "general"
-    listed = ",".join(str(numbers[link]) for link in links)
-    label = f"{ROMAN.get(rank, rank)}({listed}){letters}"
-    module = _assembled(mechanism, kind, links, joints, driven, rank, label)
-    spoken = dict.fromkeys(joint for gear in gears for joint in mechanism.gears[gear].joints)
-    witnesses = tuple(joint for joint in spoken if joint not in joints)
-    spins = tuple((link, *spinning[link]) for link in links if link in spinning)
-    return replace(module, gears=tuple(gears), witnesses=witnesses, spinning=spins)
+    def __init__(self, mechanism: Mechanism, spinning: Mapping[str, tuple[str, str]]) -> None:
+        self.mechanism, self.spinning = mechanism, spinning
+        self.joints, ground = mechanism.effective_joints, mechanism.fixed_link
+        self.order = {name: i for i, name in enumerate(self.joints)}
+        links = [ground, *(link for link in mechanism.effective_links if link != ground)]
+        self.numbers = {link: i for i, link in enumerate(links)}
+        self.joints_of: dict[str, list[str]] = {}
+        for name, joint in self.joints.items():
+            for link in dict.fromkeys(joint.links):
+                self.joints_of.setdefault(link, []).append(name)
+        constraints = [(name, (name, i)) for name in self.joints for i in range(taken(mechanism, name))]
+        constraints += [(joint, (name, GEAR)) for name, gear in mechanism.gears.items() for joint in gear.joints]
+        constraints += [(name, (name, FREEDOMS[mechanism.space])) for name in mechanism.drivers]
+        self.links_of: dict[Constraint, list[str]] = {}
+        for name, constraint in constraints:
+            related = self.links_of.setdefault(constraint, [])
+            related += [link for link in dict.fromkeys(self.joints[name].links) if link not in (ground, *related)]
+        self.links_of |= {(link, SPIN): [link] for link in spinning}
 
+    def matched(self) -> tuple[dict[Constraint, str], list[Constraint]]:
+        """Constraints with the link each determines, matched onto the links' freedoms; those left over."""
+        size, bodies = FREEDOMS[self.mechanism.space], list(self.numbers)[1:]
+        freedoms = {body: range(size * i, size * (i + 1)) for i, body in enumerate(bodies)}
+        suitable = [[freedom for link in links for freedom in freedoms[link]] for links in self.links_of.values()]
+        places = dict(zip(self.links_of, matching(suitable, size * len(bodies)), strict=True))
+        determines = {constraint: bodies[k // size] for constraint, k in places.items() if k >= 0}
+        return determines, [constraint for constraint, k in places.items() if k < 0]
 
-def _dyad(mechanism: Mechanism, links: list[str], joints: list[str]) -> tuple[str, list[str], list[str]] | None:
-    """(kind, links, joints) of a class II group with a closed form: outer joint, inner joint, outer joint."""
-    if len(links) != 2 or len(joints) != 3:
+    def inside(self, links: list[str], known: set[str]) -> list[str]:
+        """Joints among some links, or between them and the known ones, in file order."""
+        reach = known.union(links)
+        touching = {name for link in links for name in self.joints_of.get(link, [])}
+        return sorted(
+            (name for name in touching if reach.issuperset(self.joints[name].links)), key=self.order.__getitem__
+        )
+
+    def symbol(self, joint: str) -> str:
+        """The letter of a joint in the formula."""
+        return PAIRS[self.joints[joint].type].symbol
+
+    def module(self, links: list[str], known: set[str], gears: list[str]) -> Module:
+        """The module that the given links form on the links known so far, and through these gear pairs."""
+        mechanism, numbers = self.mechanism, self.numbers
+        joints = self.inside(links, known)
+        driven = [name for name in joints if name in mechanism.drivers]
+        letters = "".join(f"[{self.symbol(name)}]" if name in driven else self.symbol(name) for name in joints)
+        letters += "G" * len(gears)
+        kind, rank, listed = "general", self.rank(links, joints), ",".join(str(numbers[link]) for link in links)
+        if len(links) == 1 and driven == joints and not gears:
+            base = next(link for link in self.joints[joints[0]].links if link not in links)
+            kind, rank, listed = self.symbol(joints[0]), 1, f"{numbers[base]},{listed}"
+            letters = kind
+        elif not driven and not gears and (dyad := self.dyad(links, joints)):
+            kind, links, joints = dyad
+            letters = kind
+        place = {link: i for i, link in enumerate(links)}
+
+        def turned_round(name: str) -> bool:
+            """A closed form takes the outer link first, and inside the group the link it lists first."""
+            first, second = self.joints[name].links
+            return kind != "general" and first in place and (second not in place or place[first] > place[second])
+
+        spoken = dict.fromkeys(joint for gear in gears for joint in mechanism.gears[gear].joints)
+        return Module(
+            kind,
+            tuple(links),
+            tuple(joints),
+            tuple(turned_round(name) for name in joints),
+            tuple(driven),
+            rank,
+            f"{ROMAN.get(rank, rank)}({listed}){letters}",
+            gears=tuple(gears),
+            witnesses=tuple(joint for joint in spoken if joint not in joints),
+            spinning=tuple((link, *self.spinning[link]) for link in links if link in self.spinning),
+        )
+
+    def dyad(self, links: list[str], joints: list[str]) -> tuple[str, list[str], list[str]] | None:
+        """(kind, links, joints) of a class II group with a closed form: outer joint, inner joint, outer joint."""
+        inner = [name for name in joints if set(self.joints[name].links) == set(links)]
+        if len(links) != 2 or len(joints) != 3 or len(inner) != 1:
+            return None
+        first, last = (name for name in joints if name != inner[0])
+        held = [link for name in (first, last) for link in self.joints[name].links if link in links]
+        if sorted(held) != sorted(links):
+            return None
+        if held[0] != links[0]:
+            first, last = last, first
+        for order, sides in (([first, inner[0], last], links), ([last, inner[0], first], links[::-1])):
+            kind = "".join(self.symbol(name) for name in order)
+            if kind in CLOSED_FORMS[self.mechanism.space]:
+                return kind, sides, order
         return None
-    pairs = {name: mechanism.effective_joints[name].links for name in joints}
-    inner = [name for name in joints if all(link in links for link in pairs[name])]
-    if len(inner) != 1:
-        return None
-    first, last = (name for name in joints if name != inner[0])
-    if pairs[first][0] in links and pairs[first][0] in pairs[last]:
-        return None
-    if links[0] not in pairs[first]:
-        first, last = last, first
-    for order, sides in (([first, inner[0], last], links), ([last, inner[0], first], links[::-1])):
-        kind = "".join(PAIRS[mechanism.effective_joints[name].type].symbol for name in order)
-        if kind in CLOSED_FORMS[mechanism.space]:
-            return kind, sides, order
-    return None
 
+    def rank(self, links: list[str], joints: list[str]) -> int:
+        """Class after Assur and Artobolevski: joints of the richest link, or of the longest loop of links, at least 2.
 
-def _class(mechanism: Mechanism, links: list[str], joints: list[str]) -> int:
-    """Class after Assur and Artobolevski: joints of the richest link, or of the longest loop of links, at least 2."""
-    own, held = set(links), Counter(link for name in joints for link in mechanism.effective_joints[name].links)
-    most = max(2, *(held[link] for link in links))
-    within = {tuple(sorted(mechanism.effective_joints[name].links)) for name in joints}
-    if len(links) <= 3:
-        return most  # no loop of more than three links
-    import networkx as nx  # loaded where it is needed: it takes a tenth of a small analysis
-
-    loops = nx.minimum_cycle_basis(nx.Graph([pair for pair in sorted(within) if own.issuperset(pair)]))
-    return max([most, *(len(loop) for loop in loops if len(loop) > 3)])
-
-
-def _assembled(
-    mechanism: Mechanism, kind: str, links: list[str], joints: list[str], driven: list[str], rank: int, label: str
-) -> Module:
-    place = {link: i for i, link in enumerate(links)}
-
-    def reversed_(name: str) -> bool:
-        """A closed form takes the outer link first, and inside the group the link it lists first."""
-        first, second = mechanism.effective_joints[name].links
-        if kind == "general":
-            return False  # its joints are as the file has them
-        return first in place and (second not in place or place[first] > place[second])
-
-    flags = tuple(reversed_(name) for name in joints)
-    return Module(kind, tuple(links), tuple(joints), flags, tuple(driven), rank, label)
+        A loop of three links counts as one link.
+        """
+        ends = Counter(link for name in joints for link in self.joints[name].links)
+        pairs = {(min(pair), max(pair)) for pair in (self.joints[name].links for name in joints)}
+        loop = longest_loop(sorted(pair for pair in pairs if set(pair) <= set(links)))
+        return max(2, *(ends[link] for link in links), loop if loop > 3 else 0)

@@ -392,7 +392,7 @@ def _others(mechanism: Numbers) -> Iterator[Finding]:
             yield from _length(len(hint), mechanism.coordinates, where)
         elif point:
             yield Finding("a point has a position, not an angle", where, f"write {coordinates(mechanism)}")
-        elif name in joints and not motions(joints[name].type):
+        elif name in joints and not (motions(joints[name].type) or PAIRS[joints[name].type].crossed):
             what = f"one number does not state how far a {joints[name].type} joint has moved"
             yield Finding(what, where, f"state where it is: {coordinates(mechanism)}")
     for name, measure in mechanism.measures.items():

@@ -25,12 +25,12 @@ from trunnion.groups.redundant import RANK, stacked
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Pose
 from trunnion.results.sentences import finding_for
+from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
-from trunnion.solve.branch_tracking import SEED, at, extent, guess_reaches, lane_of
-from trunnion.solve.branches import Chosen
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates, felt
+from trunnion.solve.track import SEED, at, extent, guess_reaches, lane_of
 
 __all__ = ["Determinacy", "ModuleDeterminacy", "look"]
 

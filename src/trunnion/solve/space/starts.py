@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups.redundant import RANK
 from trunnion.results.sentences import finding_for
-from trunnion.solve.branch_tracking import GUESSES, SEED, guess_reaches
-from trunnion.solve.branches import Chosen, choose
+from trunnion.solve.assembly import Chosen, choose, distance
 from trunnion.solve.forward import forward, start
-from trunnion.solve.hints import distance
 from trunnion.solve.space.determinacy import look
 from trunnion.solve.space.loops import Loops
 from trunnion.solve.space.system import SpatialSystem
 from trunnion.solve.system import Cycle, Values
+from trunnion.solve.track import GUESSES, SEED, guess_reaches
 
 __all__ = ["Start", "start_of"]
 
@@ -116,10 +115,6 @@ def _nearest(system: SpatialSystem, values: Values, loops: Loops) -> Array | Non
     if loops.group.free and np.all(singular[:, -1] <= RANK * singular[:, 0]):
         what = "the joints leave a freedom undetermined"
         raise MechanismError(Finding(what, "drivers", "add a driver, or joints to these links"))
-    far = distance(start(system, values), system.plan.modules[0], part.frames(q[good], none[good]), _same, _same)
+    far = distance(start(system, values), system.plan.modules[0], part.frames(q[good], none[good]))
     order = np.lexsort((gap[good], np.round(np.broadcast_to(far, good.shape) / loops.size**2, 6)))
     return np.asarray(q[good[order[0]]])
-
-
-def _same(number: Array) -> Array:
-    return number

@@ -23,7 +23,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
 from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
-from trunnion.solve.branches import choose
+from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward
 from trunnion.solve.geometry import build
 from trunnion.solve.space.cone import CLOSED, Ask, LeastPlay, least_play

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +32,9 @@ from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet
 from trunnion.solve import change_points
+from trunnion.solve.assembly import distance, hints, named_way
 from trunnion.solve.forward import pose_of, start
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.hints import distance, hints, named_way
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.switches import Mechanisms
 from trunnion.solve.system import Cycle, System, law_of, rubbing
@@ -330,18 +329,12 @@ def _as_chosen(run: Run, values: Mapping[str, Number], count: int) -> NDArray[np
         free = module.rank > 1 and len(branches) > 1 and named_way(system, module, len(branches)) is None
         if free and hints(walk, module):
             poses = [pose_of(walk, number, branch, time) for branch in branches]
-            away = [
-                np.broadcast_to(distance(walk, module, pose.frames, _every, _every), (count, 1))[:, 0] for pose in poses
-            ]
+            away = [np.broadcast_to(distance(walk, module, pose.frames), (count, 1))[:, 0] for pose in poses]
             nearest = np.where(away[1] < away[0], branches[1], branches[0])
             ours &= np.isfinite(away[0]) & np.isfinite(away[1]) & (nearest == assembly)
         walk.assembly.append(assembly)
         walk.take(number, pose_of(walk, number, assembly, time), time)
     return ours
-
-
-def _every(number: Number) -> Any:
-    return number
 
 
 def _may_change(system: System, conditions: Array, periodic: bool) -> NDArray[np.bool_]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from trunnion.results.quantities import prefixed
 
 if TYPE_CHECKING:
@@ -15,6 +18,7 @@ __all__ = ["gear_line", "lines", "places", "some"]
 
 MOST_JOINTS = 8  # named in a line
 MOST_WAYS = 24  # in lines
+EQUAL = 1e-7  # of the largest number: nearer ones are one
 
 
 def gear_line(pair: GearPair) -> str:
@@ -45,23 +49,36 @@ def some(choice: GroupModes, most: int) -> list[AssemblyMode]:
 
 
 def places(choice: GroupModes, way: AssemblyMode) -> str:
-    """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'."""
-    numbers = [abs(n) for one in choice.ways for joint in one.joints.values() for n in joint]
-    largest = max((n for n in numbers if math.isfinite(n)), default=0.0)
-    turned = [f"{name} {round(math.degrees(angle), 6):.5g}°" for name, angle in list(way.turns.items())[:MOST_JOINTS]]
+    """Where the inner joints of a group are in one of its ways: 'C (70, 130) mm'.
+
+    With as many digits as tell the ways apart: stated as a hint, it selects this one.
+    """
+    rows = np.array([[n for joint in mode.joints.values() for n in joint] for mode in choice.ways])
+    angles = np.degrees([list(mode.turns.values()) for mode in choice.ways])
+    digits = max(5, 3 + _decimals(angles))
+    turned = [f"{name} {round(math.degrees(angle), 6):.{digits}g}°" for name, angle in list(way.turns.items())]
+    turned = turned[:MOST_JOINTS]
+    largest = float(np.max(np.abs(rows), where=np.isfinite(rows), initial=0.0))
     if not largest:
-        return ", ".join(turned) or ("at the origin" if numbers else "")
+        return ", ".join(turned) or ("at the origin" if rows.size else "")
     factor, unit = prefixed(largest, "m")
-    decimals = max(0, 3 - math.floor(math.log10(largest * factor)))
+    decimals = max(0, 3 - math.floor(math.log10(largest * factor)), _decimals(rows * factor))
 
     def text(value: float) -> str:
-        shown = f"{value * factor:.{decimals}f}"
-        shown = shown.rstrip("0").rstrip(".") if decimals else shown
-        return "0" if shown == "-0" else shown
+        number = f"{value * factor:.{decimals}f}"
+        number = number.rstrip("0").rstrip(".") if decimals else number
+        return "0" if number == "-0" else number
 
-    told = [
+    placed = [
         f"{name} ({', '.join(map(text, joint))})" if len(joint) > 1 else f"{name} at {text(joint[0])}"
         for name, joint in list(way.joints.items())[:MOST_JOINTS]
     ]
-    places_ = ", ".join(told) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"
-    return "; ".join([places_, ", ".join(turned)]) if turned else places_
+    listed = ", ".join(placed) + ", …" * (len(way.joints) > MOST_JOINTS) + f" {unit}"
+    return "; ".join([listed, ", ".join(turned)]) if turned else listed
+
+
+def _decimals(rows: NDArray[np.float64]) -> int:
+    """Decimals with which the two nearest of some rows of numbers differ by ten units of the last; equal ones apart."""
+    gaps = np.max(np.abs(rows[:, None] - rows), axis=-1, initial=0.0)
+    unequal = gaps[gaps > EQUAL * np.max(np.abs(rows), initial=0.0)]
+    return math.ceil(1 - math.log10(np.min(unequal))) if len(unequal) else 0

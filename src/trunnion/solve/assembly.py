@@ -1,0 +1,421 @@
+"""How a mechanism is put together: a choice stated once, at the start of the cycle, and then carried.
+
+A closed-form group has the branches +1 and −1. A general group is solved from many guesses at the start, and the one
+that is chosen is followed along the nominal cycle (`solve.track`). A hint names an assembly, as `check` lists it, or
+states where a point is or how far a joint has moved: then the nearest is taken, at the first position at which the
+assemblies are apart. `assembly_modes` lists them at that same position, so that all it tells can be stated as a hint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
+from trunnion.algebra.nested import each
+from trunnion.errors import Finding, MechanismError, agreeing
+from trunnion.groups.gear import NUMBERS, rotation
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.spins import unspun
+from trunnion.groups.tree import OUTER
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.names import as_key
+from trunnion.results.sentences import finding_for
+from trunnion.solve import change_points
+from trunnion.solve.forward import Forward, pose_of, start
+from trunnion.solve.system import Cycle, Dial, Positions, System, Values, driven_coordinates
+from trunnion.solve.track import (
+    GUESSES,
+    SAME,
+    STRIDE,
+    Assemblies,
+    Follower,
+    Track,
+    TrackClock,
+    closed_at,
+    each_once,
+    key_of,
+    lane_of,
+)
+from trunnion.structure.decompose import Module
+
+__all__ = ["Chosen", "apart", "choose", "coordinate", "distance", "grid", "hints", "named_way", "picked", "way_name"]
+
+Array = NDArray[np.float64]
+
+GRID = 720  # intervals of one turn of the fastest driver, along which general groups are followed
+MOST_INTERVALS = 720_000
+LOOKED = 2  # of the grid every which position the assemblies are compared at
+TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
+SPREAD = 25  # such places
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Assembly of every module (±1, Track, None for a driver), how many there were, and what there is to say.
+
+    meetings: of modules, by their number, the times at which two assemblies meet in the nominal cycle, s.
+    """
+
+    assembly: tuple[Any, ...]
+    found: tuple[int, ...]
+    findings: tuple[Finding, ...]
+    meetings: Mapping[int, Sequence[change_points.Meeting]] = field(default_factory=dict)
+
+
+class Decision(NamedTuple):
+    """Assembly of a module, how many there were, whether a hint decides, and what there is to say.
+
+    pose: of the module in it at all times, where it was needed to decide.
+    """
+
+    assembly: Any
+    ways: int
+    decided: bool
+    findings: Sequence[Finding] = ()
+    pose: Any = None
+
+
+def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
+    """The assembly of every module that its hints name, or that lies nearest to them, with nominal values.
+
+    Raises MechanismError where a hint names an assembly that there is not.
+    """
+    findings: list[Finding] = []  # wrong names, of all modules whose number of assemblies is known beforehand
+    for module, group in zip(system.plan.modules, system.groups, strict=True):
+        if module.rank == 1 or group.BRANCHES:
+            findings += _misnamed(system, module, len(group.BRANCHES))
+    if findings:
+        raise MechanismError(findings)
+    times = grid(cycle)
+    walk = start(system, values)
+    chosen: list[Any] = []
+    counts: list[int] = []
+    meetings: dict[int, Sequence[change_points.Meeting]] = {}
+    with np.errstate(all="ignore"):
+        for number, module in enumerate(system.plan.modules):
+            group = system.groups[number]
+            if module.rank == 1 or not (group.BRANCHES or getattr(group, "kept", ())):  # nothing to choose
+                decision = Decision(None, 1, True)
+            elif group.BRANCHES:
+                decision = _closed_form(walk, number, times)
+            else:
+                decision = _general(walk, number, times, cycle.periodic)
+            assembly, count, decided, said, pose = decision
+            findings += said
+            if count > 1 and not decided:
+                findings.append(_undecided(walk, module, count))
+            chosen.append(assembly)
+            walk.assembly.append(assembly)
+            counts.append(count)
+            if isinstance(assembly, Track) and count == 0:
+                findings.append(_never(system, module))
+            if isinstance(assembly, Track) and len(assembly.again):
+                findings.append(_anew(module, system.dial(values, times), assembly.again))
+            assembled = module.rank > 1 and (group.BRANCHES or (isinstance(assembly, Track) and count > 0))
+            if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
+                continue
+            pose = pose_of(walk, number, assembly, times) if pose is None else pose
+            walk.stand(number, pose)  # an assembly is a matter of places
+            if assembled and (meeting := change_points.find(walk, number, assembly, times, pose)):
+                findings.append(change_points.finding(system, values, module, meeting))
+                meetings[number] = meeting
+    return Chosen(tuple(chosen), tuple(counts), tuple(findings), meetings)
+
+
+def grid(cycle: Cycle) -> Array:
+    """Times, s, at which assemblies are compared and followed."""
+    intervals = min(GRID * max(1, math.ceil(cycle.turns)), MOST_INTERVALS) if cycle.duration > 0 else 0
+    return np.linspace(0.0, cycle.duration, intervals + 1)
+
+
+# ---- closed forms ---------------------------------------------------------------------------------------------
+
+
+def _closed_form(walk: Forward, number: int, times: Array) -> Decision:
+    """+1 or −1: the one that is named, else the one nearest the hints by place."""
+    system, module = walk.system, walk.system.plan.modules[number]
+    branches = system.groups[number].BRANCHES
+    named = named_way(system, module, len(branches))
+    if len(branches) == 1 or not hints(walk, module):
+        return Decision(branches[named or 0], len(branches), named is not None)
+    poses = [pose_of(walk, number, branch, times) for branch in branches]
+    lane = apart(walk, number, poses, times)
+    away = [distance(walk, module, each(pose.frames, picked(lane or 0)), lane or 0) for pose in poses]
+    nearest, decided = int(away[1] < away[0]), lane is None or _differ(np.array(away))
+    if named is None:
+        return Decision(branches[nearest], len(branches), decided, pose=poses[nearest])
+    said = _told_twice(walk, module, named, nearest if decided else None)
+    return Decision(branches[named], len(branches), True, said, poses[named])
+
+
+def apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
+    """The first position at which all assemblies of a closed form exist and are apart, None if there is none.
+
+    Where they meet all along, the first at which they exist.
+    """
+    spread = float(np.max(primal(walk.size)))
+    shape = times.shape
+    keys = [
+        np.array([np.broadcast_to(primal(n), shape) for n in key_of(walk.system.groups[number], pose, spread)])
+        for pose in poses
+    ]
+    exist = np.isfinite(keys).all(axis=(0, 1))
+    differ = exist & (np.ptp(keys, axis=0).max(axis=0) > SAME)
+    for lanes in (np.flatnonzero(differ[::LOOKED]) * LOOKED, np.flatnonzero(exist)):
+        if len(lanes):
+            return int(lanes[0])
+    return None
+
+
+def picked(lane: int) -> Callable[[Number], Number]:
+    return lambda number: lane_of(primal(number), lane)
+
+
+# ---- general groups -------------------------------------------------------------------------------------------
+
+
+def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decision:
+    """The assembly that is named or nearest the hints, followed both ways from the first position where there is one.
+
+    Where it ends and the links can be assembled again farther on, in the same sense, the assembly nearest to what
+    was left is taken there and followed too.
+    """
+    system, module = walk.system, walk.system.plan.modules[number]
+    group, places, grid = system.groups[number], system.places[number], len(times)
+    drive, _, _ = driven_coordinates(system, module, places, walk.values, times)
+    elements = walk.pairs(places)
+    turns = _turns(walk, module, group, elements, times)
+    drive = [turns.get(slot, number) for slot, number in enumerate(drive)]
+    rows = np.full((len(group.kept), grid), np.nan)
+    clock, nowhere = TrackClock.of(system, walk.values), np.array([], np.intp)
+    begin, solved = _first_closed(group, elements, drive, grid)
+    lanes = each_once(group, solved)
+    ways = len(lanes)
+    if not ways:
+        return Decision(Track(times, rows, 0.0, periodic, clock, turns, nowhere), 0, True)
+    shape = solved.closed.shape
+    frames = each(solved.pose.frames, lambda n: np.broadcast_to(n, shape)[lanes])
+    named = named_way(system, module, ways)
+    away = np.broadcast_to(distance(walk, module, frames, begin), (ways,))
+    decided, nearest = ways > 1 and _differ(away), int(np.argmin(away))
+    best = nearest if named is None else named
+    orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
+    rows[:, begin] = solved.q[:, lanes[best]]
+    follower = Follower(group, elements, drive, orientation, STRIDE)
+    follower.both_ways(rows, begin, periodic)
+    if getattr(group, "spinning", ()) and not np.all(np.isfinite(rows)):
+        # what such a link has spun up to where it is first assembled hangs on the steps back to there: they stay narrow
+        follower = replace(follower, stride=1)
+        rows[:, np.arange(grid) != begin] = np.nan
+        follower.both_ways(rows, begin, periodic)
+    again = follower.revisit(rows, periodic)
+    if isinstance(group, SpatialGroup):
+        rows = unspun(group, elements, rows, drive)
+    track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), frames, best)
+    if named is None:
+        return Decision(track, ways, decided)
+    return Decision(track, ways, True, _told_twice(walk, module, named, nearest if decided or ways == 1 else None))
+
+
+def _first_closed(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> tuple[int, Assemblies]:
+    """The start of the cycle, else the first of some positions spread over it at which the group has an assembly."""
+    solved = closed_at(group, elements, drive, [0], GUESSES)
+    if each_once(group, solved) or grid == 1:
+        return 0, solved
+    places = np.unique(np.linspace(0, grid - 1, SPREAD).astype(np.intp))[1:]
+    tried = closed_at(group, elements, drive, places, TRIED).closed.reshape(-1, TRIED)
+    for place in places[tried.any(axis=1)]:
+        solved = closed_at(group, elements, drive, [int(place)], GUESSES)
+        if each_once(group, solved):
+            return int(place), solved
+    return 0, solved
+
+
+def _turns(walk: Forward, module: Module, group: Any, elements: Sequence[Any], times: Array) -> dict[int, Array]:
+    """Rotations of the known joints that gear pairs speak of and nothing drives, followed from that nearest to 0."""
+    turns = {}
+    for i, (name, gear) in enumerate(zip(module.gears, getattr(group, "gears", ()), strict=True)):
+        driven = walk.system.gear_joints(name)[0] in walk.system.mechanism.drivers
+        if not driven and group.joints[gear.first].sides == (OUTER, OUTER):
+            angle = np.broadcast_to(primal(rotation(elements[gear.first])), times.shape)
+            solved = np.isfinite(angle)
+            unwrapped = np.full(times.shape, np.nan)
+            unwrapped[solved] = np.unwrap(angle[solved])
+            turns[len(group.driven) + NUMBERS * i + NUMBERS - 1] = unwrapped
+    return turns
+
+
+# ---- hints ----------------------------------------------------------------------------------------------------
+
+
+def way_name(index: int) -> str:
+    """The name of an assembly, as `check` lists it and a hint may choose it."""
+    return f"way-{index + 1}"
+
+
+def _names(system: System, module: Module) -> dict[str, str]:
+    """The hints that name an assembly of a module, by link."""
+    stated = system.mechanism.assembly
+    return {key: hint for key, hint in stated.items() if key in module.links and isinstance(hint, str)}
+
+
+def named_way(system: System, module: Module, count: int) -> int | None:
+    """Which of `count` assemblies of a module its hints name, from 0 on; None if none does.
+
+    Raises MechanismError if there is no such assembly.
+    """
+    if findings := _misnamed(system, module, count):
+        raise MechanismError(findings)
+    return next((_number(name) for name in _names(system, module).values()), None)
+
+
+def _number(name: str) -> int:
+    """The place of an assembly, from 0 on, by its name."""
+    return int(name.partition("-")[2]) - 1
+
+
+def _misnamed(system: System, module: Module, count: int) -> list[Finding]:
+    """What is wrong with the hints that name one of `count` assemblies of a module."""
+    findings: list[Finding] = []
+    named = _names(system, module)
+    links = f"the link {module.links[0]} has" if len(module.links) == 1 else f"the links {', '.join(module.links)} have"
+    ways = ", ".join(way_name(i) for i in range(count))
+    for key, name in named.items():
+        first = next(iter(named))
+        if module.rank == 1:
+            what = f"the link '{key}' follows the driver {module.driven[0]}: it has only one assembly mode"
+            findings.append(Finding(what, f"assembly.{key}", "remove it"))
+        elif _number(name) >= count:
+            remedy = f"the modes are {ways}; without this line `check` shows them" if count else "check the lengths"
+            findings.append(Finding(f"{links} no assembly mode '{name}'", f"assembly.{key}", remedy))
+        elif name != named[first]:
+            what = f"'{name}' contradicts '{named[first]}' of the link '{first}', which is in the same group"
+            findings.append(Finding(what, f"assembly.{key}", "state the assembly mode of a group for one of its links"))
+    return findings
+
+
+def hints(walk: Forward, module: Module) -> list[tuple[str, str, tuple[Number, ...]]]:
+    """(link, point, place) or ("", joint, (angle or slide,)) of the hints that tell assemblies of a module apart."""
+    stated: list[tuple[str, str, tuple[Number, ...]]] = []
+    for key in walk.system.mechanism.assembly:
+        path = f"assembly.{key}"
+        if f"{path}.x" in walk.values:
+            link, name = _point_of(walk.system, module, key)
+            if link:
+                place = tuple(walk.values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in walk.values)
+                stated.append((link, name, place))
+        elif key in module.joints:
+            stated.append(("", key, (walk.values[path],)))
+    return stated
+
+
+def _point_of(system: System, module: Module, key: str) -> tuple[str, str]:
+    """The link of the module that carries the hinted point, if the place of the point is not known without it."""
+    if key in system.joints:
+        kind, links = system.joints[key]
+        inside = [link for link in links if link in module.links]
+        settled = key in module.joints and PAIRS[kind].meets and len(inside) == 1
+        return ("", "") if not inside or settled else (inside[-1], key)
+    link, _, name = key.partition(".")
+    return (link, name) if link in module.links else ("", "")
+
+
+def distance(walk: Forward, module: Module, frames: Sequence[Any], lane: int | None = None) -> Array:
+    """Sum of the squared distances of an assembly from the hints, m² and rad².
+
+    frames: of the module's links, at the position `lane` of the walk; None if at all of them.
+    """
+    total: Any = 0.0
+    for link, name, place in hints(walk, module):
+        if link:
+            point = walk.placed(frames[module.links.index(link)], link, name)
+            total = total + sum((is_ - hinted) ** 2 for is_, hinted in zip(point, place, strict=True))
+            continue
+        away = coordinate(walk, module, frames, name, lane) - place[0]
+        total = total + (np.arctan2(np.sin(away), np.cos(away)) if walk.system.turns(name) else away) ** 2
+    return np.asarray(total, float)
+
+
+def coordinate(walk: Forward, module: Module, frames: Sequence[Any], joint: str, lane: int | None) -> Number:
+    """Turn or slide of a joint of a module whose links lie in these frames."""
+
+    def element(link: str) -> Any:
+        if link in module.links:
+            return walk.composed(frames[module.links.index(link)], link, joint)
+        outer = walk.element(link, joint)
+        return outer if lane is None else each(outer, lambda n: lane_of(n, lane))
+
+    first, second = walk.system.joints[joint][1]
+    return walk.coordinate(joint, element(first), element(second))
+
+
+def _differ(distances: Array) -> bool:
+    """Whether the nearest assembly is nearer than the next, but for rounding."""
+    least, second = np.sort(np.nan_to_num(distances, nan=np.inf))[:2]
+    return bool(second - least > 1e-9 * (second + least))
+
+
+# ---- what there is to say -------------------------------------------------------------------------------------
+
+
+def _told_twice(walk: Forward, module: Module, named: int, placed: int | None) -> list[Finding]:
+    """Of an assembly that is chosen by name and by place. placed: the one that the place chooses."""
+    places = [name for _, name, _ in hints(walk, module)]
+    if not places:
+        return []
+    links, (key, name) = list(module.links), next(iter(_names(walk.system, module).items()))
+    where = f"assembly.{key}"
+    if placed is None or placed == named:
+        return [finding_for("assembly.told_twice", where, links=links, places=places)]
+    way = way_name(placed)
+    return [finding_for("assembly.contradiction", where, links=links, places=places, way=way, name=name)]
+
+
+def _undecided(walk: Forward, module: Module, count: int) -> Finding:
+    """Where neither a name nor a place decides: there is no hint, or one that does not tell the assemblies apart."""
+    system = walk.system
+    given = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
+    stated = [key for key in system.mechanism.assembly if key in module.joints and key not in given]
+    why, names = "no assembly hint selects one", given or stated
+    if names:
+        why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
+        why += agreeing(len(names), "does", "do") + " not distinguish them"
+        why += "" if given else f": {agreeing(len(names), 'its place is', 'their places are')} the same in all"
+    free = [joint for joint in module.joints if joint not in stated] or list(module.joints)
+    joint = module.joints[len(module.joints) // 2]
+    joint = joint if joint in free else free[0]
+    key = as_key(joint)
+    place, hint = "where a point is", f"{{{key}: [x, y]}}"
+    if system.mechanism.space == "spatial":
+        met = PAIRS[system.joints[joint][0]].meets and not system.mechanism.loop
+        place, hint = (place, f"{{{key}: [x, y, z]}}") if met else ("how far a joint has turned", f"{{{key}: 60 deg}}")
+    remedy = f"state roughly {place} at the start, e.g. assembly: {hint}, or one of the names listed by `check`"
+    if given:
+        remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
+    phrases = {"why": why, "remedy": remedy}
+    return finding_for("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
+
+
+def _anew(module: Module, dial: Dial, positions: Positions) -> Finding:
+    return finding_for("assembly.anew", "links", links=list(module.links), at=dial.intervals(positions))
+
+
+def _never(system: System, module: Module) -> Finding:
+    links = list(module.links)
+    if not module.redundant:
+        return finding_for("assembly.never", "links", links=links)
+    if system.mechanism.has_errors:
+        return finding_for("assembly.never_rigid", "links", links=links)
+    plan, drivers = system.plan, len(system.mechanism.drivers)
+    spinning = f" ({len(plan.passive)} of them spins of a single link)" if plan.passive else ""
+    return finding_for(
+        "assembly.over_constrained", "links", links=links, formula=plan.mobility, drivers=drivers,
+        phrases={"spinning": spinning},
+    )  # fmt: skip

@@ -178,6 +178,9 @@ class LockingCourse:
     def ranges(self, near: float = NEAR) -> list[LockingRange]:
         """The parts of the cycle in which its state stays the same, in their order; after them those that run, but with
         a margin below `near`."""
+        return self.run.once(("locking ranges", self.method, near), lambda: self._ranges(near))
+
+    def _ranges(self, near: float) -> list[LockingRange]:
         edges, code = self.courses.edges, self.courses.states
         parts = _merged(edges, code, SHORT * self.courses.span)
         ranges = [LockingRange(STATES[state], low, high, *self._least(low, high)) for state, low, high in parts]

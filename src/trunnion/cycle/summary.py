@@ -125,9 +125,9 @@ def references(mechanism: Mechanism) -> list[str]:
 def figures(cycle: Cycle) -> Iterator[Figure]:
     """The figures one looks at first. Those of the cycle are read of its course, whatever the positions are."""
     with np.errstate(all="ignore"):
-        if cycle.course is not None:
-            for figures_of in OF_CYCLE:
-                yield from figures_of(cycle, cycle.course)
+        if (course := cycle.course) is not None:
+            key = "figures of the cycle", cycle.at.method
+            yield from cycle.run.once(key, lambda: [figure for of in OF_CYCLE for figure in of(cycle, course)])
         yield from _solution(cycle)
 
 

@@ -44,7 +44,7 @@ def find(arrays: Arrays, seating: Seating, time: Array) -> None:
     joints, duration, lost = list(run.system.joints), run.cycle.duration, arrays["contact_lost"]
     step = time[1] - time[0] if len(time) > 1 else 0.0
     for halt in seating.halts:
-        lost[joints.index(halt.joint), (halt.low < time) & (time < halt.high)] = 1
+        lost[joints.index(halt.joint), (halt.low <= time) & (time < halt.high)] = 1
     times = [(cross.end, cross.low, cross.time, cross.high) for cross in loads.passages]
     for end, low, middle, high in times + [(end, low, low, high) for end, low, high in loads.idle]:
         row, away = joints.index(end.seat.joint), np.abs(time - middle)
@@ -89,7 +89,10 @@ def findings(arrays: Arrays, seating: Seating, time: Array, dial: Dial) -> Itera
     for seat in run.seats:
         joint, part = seat.joint, "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
         crossings = [cross for cross in loads.passages if cross.end.seat.joint == joint]
-        halts = [_between(run, halt.low, halt.high) for halt in seating.halts if halt.joint == joint]
+        halts = [
+            _between(run, halt.low, halt.high) for halt in seating.halts
+            if halt.joint == joint and not any(halt.low <= cross.high and cross.low <= halt.high for cross in crossings)
+        ]  # fmt: skip
         if crossings:
             at = _listed([f"at {_at(run, cross.time)}{ENDS[cross.end.place]}" for cross in crossings])
             lost.setdefault((part, at), []).append(joint)

@@ -118,7 +118,7 @@ class Seating:
         added = iter(np.where(states == SETTLED, rows[len(self.paths) :], 0.0))
         travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
         back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
-        sticks = np.any((self.turned[0] < time[:, None]) & (time[:, None] < self.turned[1]), axis=1)
+        sticks = np.any((self.turned[0] <= time[:, None]) & (time[:, None] < self.turned[1]), axis=1)
         return Seated(back, states, sticks)
 
     def offsets(self, time: Array) -> dict[str, Array]:
@@ -137,7 +137,7 @@ class Seating:
         time = self._within(time)
         states: NDArray[np.intp] = self.courses.states[self.courses.panel(time)]
         for _, low, high in self.halts:
-            states[(low < time) & (time < high) & (states == SETTLED)] = FLOATING
+            states[(low <= time) & (time < high) & (states == SETTLED)] = FLOATING
         return states
 
     def _within(self, time: Array) -> Array:

@@ -338,7 +338,8 @@ class _Group:
         ones = ones[(nominal[ones] >= start - CLOSE * end) & (nominal[ones] <= end + CLOSE * end)]
         if len(ones) == 0:
             return edges
-        return _sorted(_joined(edges, linear(others, lambda array: _within(array[:, ones], primal(edges)))))
+        low, high = primal(edges)[:, :1], primal(edges)[:, -1:]
+        return _sorted(_joined(edges, _clipped(linear(others, lambda array: array[:, ones]), low, high)))
 
     def _parted(self, own: Number, times: Array) -> Number:
         """The nominal edges and the bends of each: what is taken less the nominal mechanism jumps at both."""
@@ -731,16 +732,12 @@ def _joined(*parts: Number, axis: int = 1) -> Number:
     return np.concatenate(parts, axis)
 
 
-def _clipped(number: Number, low: float, high: float) -> Number:
+def _clipped(number: Number, low: float | Array, high: float | Array) -> Number:
     """A number held between two others, where it has no derivative."""
     inside = (primal(number) > low) & (primal(number) < high)
     if isinstance(number, Dual):
         return Dual(np.clip(number.real, low, high), np.where(inside, number.dual, 0.0))
     return np.clip(number, low, high)
-
-
-def _within(array: Array, edges: Array) -> Array:
-    return np.clip(array, edges[:, :1], edges[:, -1:])
 
 
 def _whole(parts: Sequence[Read]) -> Read:

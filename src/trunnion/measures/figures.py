@@ -105,17 +105,6 @@ class Panels:
         half = np.broadcast_to(primal(self.half), tails.shape)
         return np.asarray(np.sum(2.0 * tails * half, axis=-1) / np.sum(2.0 * half, axis=-1))
 
-    def picked(self, lanes: Any) -> Panels:
-        """Some of the lanes, of plain numbers."""
-
-        def taken(array: Array) -> Array:
-            return array if len(array) == 1 else array[lanes]
-
-        return Panels(
-            taken(primal(self.low)), taken(primal(self.half)), primal(self.coefficients)[:, lanes],
-            taken(primal(self.weights)), self.endless[lanes], self.left_out[lanes],
-        )  # fmt: skip
-
     def on_grid(self, of: Made) -> OnGrid:
         """A number made of the rows at the places of the grid, worked out once."""
         known: dict[Made, OnGrid] = self.__dict__.setdefault("_on_grid", {})

@@ -45,7 +45,7 @@ __all__ = ["Many", "Read", "step_of"]
 Array = NDArray[np.float64]
 Lanes = NDArray[np.intp]
 TURN = 2 * np.pi
-READ = 256  # mechanisms whose courses are read at a time: their arrays stay in cache
+READ = 512  # mechanisms whose courses are read at a time: their arrays stay in cache
 FINE, FINE_MOTION = 3e-7, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
 FINE_CHANGE = 1e-6  # of the size of derivatives: how far those of figures may be off
 FIRM = 0.3  # of that: where panels are tuned
@@ -494,9 +494,9 @@ class _Group:
             last = np.max(changes[..., -2:], axis=(0, 3))
             excess = np.maximum(excess, last / np.where(most > 0.0, share * FINE_CHANGE * most, np.inf))
         found = np.any(np.isinf(rows), axis=(0, 3))
-        rough = np.flatnonzero(np.any(excess > 1.0, axis=1) & np.all(np.isfinite(tails), axis=1))
-        if len(rough):
-            found[rough] |= self.reading(measure).offending(panels.picked(rough), excess[rough])
+        if np.any(excess > 1.0):
+            known = np.all(np.isfinite(tails), axis=1, keepdims=True)
+            found |= self.reading(measure).offending(panels, excess) & known
         return np.asarray(found)
 
     @cached_property

@@ -84,18 +84,18 @@ def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Arr
 
     low, half: starts and half widths of the panels, (lane, panel), one lane if they are those of all.
     """
-    found = np.full((*coefficients.shape[:2], len(time)), np.nan)
+    found, near = np.full((*coefficients.shape[:2], len(time)), np.nan), 1e-12 * np.ptp(time)
     for k in range(low.shape[1]):
         start, width, own = low[:, k, None], 2.0 * half[:, k, None], coefficients[:, :, k]
-        ends = np.searchsorted(time, [np.min(start), np.max(start + width) * (1 + 1e-15)], side="left")
-        lane = slice(ends[0], ends[1] + 1)
+        if not np.any(width > 0.0):
+            continue
+        lane = slice(*np.searchsorted(time, [np.min(start) - near, np.max(start + width) + near]))
         spot = 2.0 * (time[lane] - start) / np.where(width > 0.0, width, np.nan) - 1.0
-        inside = (spot >= -1.0) & (spot <= 1.0 + 1e-12)
         if np.all(start == start[0]) and np.all(width == width[0]):
-            values = own @ chebyshev.chebvander(spot[0], ORDER - 1).T
+            found[..., lane] = own @ _basis(spot[0])
         else:
-            values = _clenshaw(own, spot)
-        found[..., lane] = np.where(inside, values, found[..., lane])
+            inside = np.abs(spot) <= 1.0 + 1e-9
+            found[..., lane] = np.where(inside, _clenshaw(own, spot), found[..., lane])
     return found
 
 

@@ -105,17 +105,6 @@ class Panels:
         half = np.broadcast_to(primal(self.half), tails.shape)
         return np.asarray(np.sum(2.0 * tails * half, axis=-1) / np.sum(2.0 * half, axis=-1))
 
-    def picked(self, lanes: Any) -> Panels:
-        """Some of the lanes, of plain numbers."""
-
-        def taken(array: Array) -> Array:
-            return array if len(array) == 1 else array[lanes]
-
-        return Panels(
-            taken(primal(self.low)), taken(primal(self.half)), primal(self.coefficients)[:, lanes],
-            taken(primal(self.weights)), self.endless[lanes], self.left_out[lanes],
-        )  # fmt: skip
-
     def on_grid(self, of: Made) -> OnGrid:
         """A number made of the rows at the places of the grid, worked out once."""
         known: dict[Made, OnGrid] = self.__dict__.setdefault("_on_grid", {})
@@ -192,21 +181,23 @@ class Reading:
                 found = selected(lost | ~endless, found, np.inf)
         return found, found - self.nominal, found - self.nominal
 
-    def offending(self, panels: Panels, limit: float) -> NDArray[np.bool_]:
-        """Panels that do not resolve the courses, so that the figure may be off by more than a limit, (lane, panel): of
-        an extreme those that may have the highest value."""
+    def offending(self, panels: Panels, excess: Array) -> NDArray[np.bool_]:
+        """Panels that do not resolve the courses as far as the figure needs it, (lane, panel): of an extreme those that
+        may have the highest value.
+
+        excess: by how many times what polynomials may be off by is more than the figure may be.
+        """
         rule, tails = self.measure.rule, panels.tails()
+        half = np.broadcast_to(primal(panels.half), tails.shape)
         if rule in ("mean", "rms", "ratio", "work", "dwell"):
-            half = np.broadcast_to(primal(panels.half), tails.shape)
-            parts = tails * half / np.sum(half, axis=1, keepdims=True)
-            return np.asarray((np.sum(parts, axis=1, keepdims=True) > limit) & (parts > limit / len(parts[0])))
+            parts = excess * half / np.sum(half, axis=1, keepdims=True)
+            return np.asarray((np.sum(parts, axis=1, keepdims=True) > 1.0) & (parts > 1.0 / len(parts[0])))
         panels, of = self.number(panels)
         grid, found = panels.on_grid(of), np.zeros(tails.shape, bool)
         for sign in (SIGNS[rule],) if rule in SIGNS else (1.0, -1.0):
             tops = grid.most if sign > 0 else -grid.least
             found |= tops + 2.0 * tails >= np.max(tops, axis=1, keepdims=True)
-        wide = primal(panels.half) > NARROW * np.sum(primal(panels.half), 1)[:, None]
-        return np.asarray(found & (tails > limit) & wide)
+        return np.asarray(found & (excess > 1.0) & (half > NARROW * np.sum(half, axis=1, keepdims=True)))
 
     def number(self, panels: Panels) -> tuple[Panels, Made]:
         """What an extreme is of: rows and the number made of them."""

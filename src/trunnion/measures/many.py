@@ -34,7 +34,7 @@ from trunnion.solve.switches import (
     accuracy_of,
     bends,
     breaks_between,
-    slopes_of,
+    shifts_of,
     stated_bends,
     tracked,
 )
@@ -45,8 +45,9 @@ __all__ = ["Many", "Read", "step_of"]
 Array = NDArray[np.float64]
 Lanes = NDArray[np.intp]
 TURN = 2 * np.pi
-READ = 256  # mechanisms whose courses are read at a time: their arrays stay in cache
+READ = 512  # mechanisms whose courses are read at a time: their arrays stay in cache
 FINE, FINE_MOTION = 3e-7, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
+FINE_CHANGE = 1e-6  # of the size of derivatives: how far those of figures may be off
 FIRM = 0.3  # of that: where panels are tuned
 FIRST = Accuracy(1e-4, 1e-5, rounds=2)  # of the courses whose panels are tuned
 OWN = Accuracy(1e-7, 1e-8, rounds=20)  # of courses of mechanisms by themselves
@@ -55,6 +56,7 @@ ROUNDING = 1e-6  # of what numbers are like: courses that are much smaller
 CLOSE, LOCATED = 1e-9, 3e-10  # of the cycle: times that are one, and bends but for the error of their location
 LOOKED = np.linspace(-1.0, 1.0, 25)
 LOOKED[[0, -1]] *= 1 - 1e-6
+SHORT = 1e-2  # of the step of a difference: what moves bends is smooth
 STEP, STEP_OF_NONE = 1e-3, 1e-4  # of a number, and of the size of the mechanism for one that is 0: of a difference
 
 
@@ -267,13 +269,18 @@ class _Group:
 
         of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * count)
         times = tracked(of, self.bends, at)
-        slopes = [derivative(value) for value in values.values() if isinstance(value, Dual)]
+        slopes = {path: derivative(value) for path, value in values.items() if isinstance(value, Dual)}
         if not slopes:
             return times
-        changes = np.zeros_like(times)
-        if any(np.any(slope) for slope in slopes):
-            changes = slopes_of(replace(of, values=values), self.bends, times, at)
-        return Dual(times, changes)
+        if not any(np.any(slope) for slope in slopes.values()):
+            return Dual(times, np.zeros_like(times))
+        step = SHORT * step_of(run, values, count)
+        below, above = (
+            {**plain, **{path: plain[path] + way * step * slope for path, slope in slopes.items()}}
+            for way in (-1.0, 1.0)
+        )
+        shifts = shifts_of(of, self.bends, times, at, (below, above))
+        return Dual(times, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
 
     def own_edges(self, values: Values, count: int) -> tuple[Number, NDArray[np.bool_]]:
         """Edges of the panels of each, (lane, edge), or (1, edge) if they are those of all; where bends are lost."""
@@ -331,7 +338,8 @@ class _Group:
         ones = ones[(nominal[ones] >= start - CLOSE * end) & (nominal[ones] <= end + CLOSE * end)]
         if len(ones) == 0:
             return edges
-        return _sorted(_joined(edges, linear(others, lambda array: _within(array[:, ones], primal(edges)))))
+        low, high = primal(edges)[:, :1], primal(edges)[:, -1:]
+        return _sorted(_joined(edges, _clipped(linear(others, lambda array: array[:, ones]), low, high)))
 
     def _parted(self, own: Number, times: Array) -> Number:
         """The nominal edges and the bends of each: what is taken less the nominal mechanism jumps at both."""
@@ -475,12 +483,20 @@ class _Group:
         return linear(own, lambda array: np.asarray(array).reshape(-1, panels, len(POINTS)) @ FIT.T @ RATE @ ON_GAUSS)
 
     def _offending(self, measure: Measure, panels: Panels, rows: Array, share: float) -> NDArray[np.bool_]:
-        """Panels that do not resolve the courses as far as the figure needs it, or whose numbers are infinite."""
-        tails, limit = panels.tails(), share * self.fine * self._sizes[measure.name]
+        """Panels that do not resolve the courses as far as the figure needs it, or whose numbers are infinite; of dual
+        numbers those too that do not resolve the derivatives."""
+        tails = panels.tails()
+        sizes = np.maximum(self._sizes[measure.name], np.max(np.abs(rows), axis=(0, 2, 3)))[:, None]
+        excess = tails / np.where(sizes > 0.0, share * self.fine * sizes, np.inf)
+        if isinstance(panels.coefficients, Dual):
+            changes = np.abs(np.broadcast_to(panels.coefficients.dual, panels.coefficients.shape))
+            most = np.max(changes, axis=(0, 2, 3))[:, None]
+            last = np.max(changes[..., -2:], axis=(0, 3))
+            excess = np.maximum(excess, last / np.where(most > 0.0, share * FINE_CHANGE * most, np.inf))
         found = np.any(np.isinf(rows), axis=(0, 3))
-        rough = np.flatnonzero(np.any(tails > limit, axis=1) & np.all(np.isfinite(tails), axis=1))
-        if len(rough):
-            found[rough] |= self.reading(measure).offending(panels.picked(rough), limit)
+        if np.any(excess > 1.0):
+            known = np.all(np.isfinite(tails), axis=1, keepdims=True)
+            found |= self.reading(measure).offending(panels, excess) & known
         return np.asarray(found)
 
     @cached_property
@@ -716,16 +732,12 @@ def _joined(*parts: Number, axis: int = 1) -> Number:
     return np.concatenate(parts, axis)
 
 
-def _clipped(number: Number, low: float, high: float) -> Number:
+def _clipped(number: Number, low: float | Array, high: float | Array) -> Number:
     """A number held between two others, where it has no derivative."""
     inside = (primal(number) > low) & (primal(number) < high)
     if isinstance(number, Dual):
         return Dual(np.clip(number.real, low, high), np.where(inside, number.dual, 0.0))
     return np.clip(number, low, high)
-
-
-def _within(array: Array, edges: Array) -> Array:
-    return np.clip(array, edges[:, :1], edges[:, -1:])
 
 
 def _whole(parts: Sequence[Read]) -> Read:

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy
-from trunnion.algebra.dual import derivative, primal
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.roots import root
 from trunnion.model.parts import Spring
@@ -29,7 +29,7 @@ from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
     "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "knots_of",
-    "parted", "slopes_of", "stated_bends", "tracked",
+    "parted", "shifts_of", "stated_bends", "tracked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -156,10 +156,16 @@ def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Arra
     return found
 
 
-def slopes_of(of: Mechanisms, known: Sequence[Bend], times: Array, moved: Callable[[Values, Array], Number]) -> Array:
-    """Derivatives of times of bends that were `tracked`, (mechanism, bend), by what the values are dual numbers of.
+def shifts_of(
+    of: Mechanisms,
+    known: Sequence[Bend],
+    times: Array,
+    moved: Callable[[Values, Array], Number],
+    sides: tuple[Values, Values],
+) -> Array:
+    """How far times of bends that were `tracked`, (mechanism, bend), go from one side of the values to the other.
 
-    What passes its level there goes on to do so: dt = −(∂g/∂p)/(∂g/∂t) of its number g.
+    What passes its level there goes on to do so: to first order δt = −δg/(∂g/∂t), g being its number.
     """
     cycle, found = of.cycles[0], np.zeros(times.shape)
     for k, scan in enumerate(_scans(of.system)):
@@ -167,20 +173,23 @@ def slopes_of(of: Mechanisms, known: Sequence[Bend], times: Array, moved: Callab
         if not len(own):
             continue
         rows, which = np.repeat(np.arange(len(times)), len(own)), np.tile(own, len(times))
-        values, lanes, function = of.picked(rows), np.arange(len(rows)), np.array([known[i].function for i in which])
+        function, time = np.array([known[i].function for i in which]), times[rows, which][:, None]
 
-        def numbers(time: Array, values: Values = values, scan: _Scan = scan) -> list[Number]:
+        def number(
+            values: Values, time: Array, scan: _Scan = scan, rows: Rows = rows, function: Rows = function
+        ) -> Array:
+            own = replace(of, values=values).picked(rows)
             time = time % cycle.duration if cycle.periodic else np.clip(time, 0.0, cycle.duration)
-            walk = scan.walk(of.system, values, of.assembly, moved(values, time))
-            return [switch.number for switch in scan.look(walk)]
+            walk = scan.walk(of.system, own, of.assembly, of.lanes(np.asarray(primal(moved(own, time)), float)))
+            numbers = [of.shaped(switch.number, time) for switch in scan.look(walk)]
+            return np.array([numbers[k][lane, 0] for lane, k in enumerate(function)])
 
-        def column(number: Number, count: int = len(rows)) -> Array:
-            return np.broadcast_to(np.asarray(number, float), (count, 1))[:, 0]
-
-        time, step = times[rows, which][:, None], SLOPED * cycle.duration
-        change = np.array([column(derivative(number)) for number in numbers(time)])[function, lanes]
-        ends = [np.array([column(primal(number)) for number in numbers(time + way)]) for way in (step, -step)]
-        found[rows, which] = -change / ((ends[0] - ends[1])[function, lanes] / (2 * step))
+        # on both sides in time too, as what is noise beside its own size counts as zero
+        step = SLOPED * cycle.duration
+        change = [sum(sign * number(values, time + way) for values, sign in zip(sides, (-0.5, 0.5), strict=True))
+                  for way in (-step, step)]  # fmt: skip
+        rate = (number(of.values, time + step) - number(of.values, time - step)) / (2 * step)
+        found[rows, which] = -(change[0] + change[1]) / rate
     return found
 
 

@@ -22,7 +22,7 @@ def mobility_by_rank(
 
     It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank. modules:
     all links and joints in the order in which they are determined. One that holds its own links firmly takes from them
-    what it should, unless a later one that does not hangs on it: so few constraints of a long row are looked at together.
+    what it should, unless a later one that does not hangs on it: so few constraints of a row are looked at at once.
     """
     gears = gears or {}
     weak: list[Module] = []

@@ -23,7 +23,7 @@ from trunnion.solve.assembly_modes import GroupModes, choices
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
 from trunnion.structure.decompose import Plan
-from trunnion.structure.mobility import Subsystem, mobility_by_rank
+from trunnion.structure.mobility import mobility_by_rank
 
 __all__ = ["Check", "GearPair", "check"]
 
@@ -127,6 +127,5 @@ def _rank(walk: Forward) -> int | None:
         name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
         for name, gear in system.mechanism.gears.items()
     }
-    parts = [Subsystem(one.links, one.joints, one.driven, one.gears) for one in system.plan.modules]
-    links = [link for part in parts for link in part.links]
-    return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, parts)
+    links = [link for module in system.plan.modules for link in module.links]
+    return mobility_by_rank(links, system.mechanism.fixed_link, system.joints, at, gears, system.plan.modules)

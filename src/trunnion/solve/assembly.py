@@ -70,16 +70,12 @@ class Chosen:
 
 
 class Decision(NamedTuple):
-    """Assembly of a module, how many there were, whether a hint decides, and what there is to say.
-
-    pose: of the module in it at all times, where it was needed to decide.
-    """
+    """Assembly of a module, how many there were, whether a hint decides, and what there is to say."""
 
     assembly: Any
     ways: int
     decided: bool
     findings: Sequence[Finding] = ()
-    pose: Any = None
 
 
 def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
@@ -107,8 +103,8 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
                 decision = _closed_form(walk, number, times)
             else:
                 decision = _general(walk, number, times, cycle.periodic)
-            assembly, count, decided, said, pose = decision
-            findings += said
+            assembly, count, decided, remarks = decision
+            findings += remarks
             if count > 1 and not decided:
                 findings.append(_undecided(walk, module, count))
             chosen.append(assembly)
@@ -121,7 +117,7 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
             assembled = module.rank > 1 and (group.BRANCHES or (isinstance(assembly, Track) and count > 0))
             if not assembled and number == len(system.plan.modules) - 1:  # nothing stands on it
                 continue
-            pose = pose_of(walk, number, assembly, times) if pose is None else pose
+            pose = pose_of(walk, number, assembly, times)
             walk.stand(number, pose)  # an assembly is a matter of places
             if assembled and (meeting := change_points.find(walk, number, assembly, times, pose)):
                 findings.append(change_points.finding(system, values, module, meeting))
@@ -150,9 +146,10 @@ def _closed_form(walk: Forward, number: int, times: Array) -> Decision:
     away = [distance(walk, module, each(pose.frames, picked(lane or 0)), lane or 0) for pose in poses]
     nearest, decided = int(away[1] < away[0]), lane is None or _differ(np.array(away))
     if named is None:
-        return Decision(branches[nearest], len(branches), decided, pose=poses[nearest])
-    said = _told_twice(walk, module, named, nearest if decided else None)
-    return Decision(branches[named], len(branches), True, said, poses[named])
+        return Decision(branches[nearest], len(branches), decided)
+    return Decision(
+        branches[named], len(branches), True, _told_twice(walk, module, named, nearest if decided else None)
+    )
 
 
 def apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:

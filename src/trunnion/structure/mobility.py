@@ -2,84 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from trunnion.structure.decompose import Module
+from trunnion.structure.generic import Gears, Joints, Places, constraints, rank
 
-from trunnion.joints.pairs import PAIRS
-
-__all__ = ["Gears", "Joints", "Places", "Subsystem", "constraints", "mobility_by_rank", "rank"]
-
-RANK_TOLERANCE = 1e-9  # of the largest singular value
-
-Joints = Mapping[str, tuple[str, tuple[str, str]]]  # kind and links, by name
-Gears = Mapping[str, tuple[tuple[str, str], float]]  # joints and ratio, by name
-Places = Mapping[str, tuple[float, float, float, float]]  # point and direction of the slide (x, y, c, s), by joint
-
-
-def constraints(
-    links: Sequence[str],
-    ground: str,
-    joints: Joints,
-    places: Places,
-    drivers: Sequence[str] = (),
-    gears: Gears | None = None,
-) -> tuple[NDArray[np.float64], list[str]]:
-    """Constraints on the twists of the links, one row each, and the joint or gear pair that each row belongs to.
-
-    Columns: (v_x, v_y at the mean of the places, ω · length) of every link but the ground, lengths in units of the
-    spread of the places, so that the rows do not depend on where the mechanism stands nor on its size. Links of the
-    joints that are not among `links` are held.
-    """
-    number = {link: i for i, link in enumerate(link for link in links if link != ground)}
-    points = np.array([places[name][:2] for name in joints]).reshape(-1, 2)
-    middle = points.mean(axis=0) if len(points) else np.zeros(2)
-    spread = float(np.max(np.abs(points - middle), initial=0.0)) or 1.0
-    rows: list[NDArray[np.float64]] = []
-    owners: list[str] = []
-    for name, (kind, sides) in joints.items():
-        x, y = (np.asarray(places[name][:2]) - middle) / spread
-        c, s = places[name][2:]
-        at_x, at_y, turn = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x]), np.array([0.0, 0.0, 1.0])
-        across, along = c * at_y - s * at_x, c * at_x + s * at_y
-        held = [at_x, at_y] if PAIRS[kind].turns else [across, turn]
-        if name in drivers:
-            held.append(turn if PAIRS[kind].turns else along)
-        for constraint in held:
-            row = np.zeros(3 * len(number))
-            for link, sign in zip(sides, (-1.0, 1.0), strict=True):
-                if link in number:
-                    row[3 * number[link] : 3 * number[link] + 3] += sign * constraint
-            rows.append(row)
-            owners.append(name)
-    for name, (pair, ratio) in (gears or {}).items():
-        row = np.zeros(3 * len(number))
-        for joint, factor in zip(pair, (-ratio, 1.0), strict=True):
-            for link, sign in zip(joints[joint][1], (-1.0, 1.0), strict=True):
-                if link in number:
-                    row[3 * number[link] + 2] += sign * factor
-        rows.append(row)
-        owners.append(name)
-    return np.array(rows).reshape(len(rows), 3 * len(number)), owners
-
-
-def rank(matrix: NDArray[np.float64]) -> int:
-    """Rank by singular values."""
-    if not matrix.size:
-        return 0
-    values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RANK_TOLERANCE * values[0]))
-
-
-class Subsystem(NamedTuple):
-    """Links that are determined together, with what holds them: joints, those of them that are driven, gear pairs."""
-
-    links: tuple[str, ...]
-    joints: tuple[str, ...]
-    driven: tuple[str, ...] = ()
-    gears: tuple[str, ...] = ()
+__all__ = ["mobility_by_rank"]
 
 
 def mobility_by_rank(
@@ -88,32 +16,31 @@ def mobility_by_rank(
     joints: Joints,
     places: Places,
     gears: Gears | None = None,
-    parts: Sequence[Subsystem] = (),
+    modules: Sequence[Module] = (),
 ) -> int:
     """Freedoms of the links less the rank of the joints' constraints at one position.
 
-    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank. parts: all
-    links and joints in the order in which they are determined. One that holds its own links firmly takes from them what
-    it should, unless a later one that does not hangs on it: so few constraints of a long row are looked at together.
+    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank. modules:
+    all links and joints in the order in which they are determined. One that holds its own links firmly takes from them
+    what it should, unless a later one that does not hangs on it: so few constraints of a row are looked at at once.
     """
     gears = gears or {}
-    weak: list[Subsystem] = []
+    weak: list[Module] = []
     needed: set[str] = set()
     firm = 0
-    for part in reversed(parts):
-        spoken = (joint for name in part.gears for joint in gears[name][0])
-        own = {name: joints[name] for name in dict.fromkeys((*part.joints, *spoken))}
-        matrix, _ = constraints(
-            part.links, ground, own, places, part.driven, {name: gears[name] for name in part.gears}
-        )
-        if needed.isdisjoint(part.links) and rank(matrix) == int(matrix.shape[1]):
-            firm += len(part.driven)
+    for module in reversed(modules):
+        meshed = {name: gears[name] for name in module.gears}
+        spoken = (joint for pair, _ in meshed.values() for joint in pair)
+        held = {name: joints[name] for name in dict.fromkeys((*module.joints, *spoken))}
+        matrix, _ = constraints(module.links, ground, held, places, module.driven, meshed)
+        if needed.isdisjoint(module.links) and rank(matrix) == int(matrix.shape[1]):
+            firm += len(module.driven)
         else:
-            weak.append(part)
-            needed.update(link for _, sides in own.values() for link in sides)
-    if parts:
-        links = [link for part in weak for link in part.links]
-        joints = {name: joints[name] for part in weak for name in part.joints}
-        gears = {name: gears[name] for part in weak for name in part.gears}
+            weak.append(module)
+            needed.update(link for _, sides in held.values() for link in sides)
+    if modules:
+        links = [link for module in weak for link in module.links]
+        joints = {name: joints[name] for module in weak for name in module.joints}
+        gears = {name: gears[name] for module in weak for name in module.gears}
     matrix, _ = constraints(links, ground, joints, places, gears=gears)
     return firm + int(matrix.shape[1]) - rank(matrix)

@@ -158,8 +158,7 @@ def test_where_the_drive_effort_changes_sign_is_told_and_kept_in_the_result() ->
 
 def test_an_end_at_zero_is_zero() -> None:
     """Of a slide that drives the crank over its top, where its coordinate is 0: rounded to what it is known to."""
-    run = prepare(slide_hoist())
-    assert "0 mm" in [part.ends(run)[1][0] for part in course(slide_hoist()).ranges()]
+    assert "0 mm" in [part.places[0] for part in course(slide_hoist()).ranges()]
 
 
 def slide_hoist() -> Mechanism:
@@ -211,10 +210,9 @@ def test_an_analysis_without_friction_or_without_loads_has_no_ranges() -> None:
 
 def test_ends_of_ranges_are_those_of_the_friction_circle() -> None:
     """To 0.01°."""
-    run = prepare(hoist())
     limit = f"{np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
     behind = f"{180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM)):.2f}°"
-    told = [tuple(part.ends(run)[1]) for part in course(hoist()).ranges()]
+    told = [tuple(part.places) for part in course(hoist()).ranges()]
     assert told == [("0°", limit), (limit, "90°"), ("90°", behind), (behind, "143.24°")]
 
 

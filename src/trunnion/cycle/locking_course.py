@@ -29,6 +29,7 @@ from trunnion.cycle.locking_states import (
     PUSHES,
     LockingRange,
     LockingState,
+    on_dial,
     states,
 )  # fmt: skip
 from trunnion.cycle.passage import critical_multiples, passage, passed, reverse
@@ -181,17 +182,27 @@ class LockingCourse:
         return self.run.once(("locking ranges", self.method, near), lambda: self._ranges(near))
 
     def _ranges(self, near: float) -> list[LockingRange]:
-        edges, code = self.courses.edges, self.courses.states
-        parts = _merged(edges, code, SHORT * self.courses.span)
-        ranges = [LockingRange(STATES[state], low, high, *self._least(low, high)) for state, low, high in parts]
-        if self.margins is None:
-            return ranges
-        margins = self.margins.courses
-        cut = margins.parted(np.concatenate([edges, margins.passages(0, near)]))
+        parts = _merged(self.courses.edges, self.courses.states, SHORT * self.courses.span)
+        ranges: list[tuple[LockingState | None, float, float]] = [
+            (STATES[code], low, high) for code, low, high in parts
+        ]
+        if self.margins is not None:
+            ranges += [(None, low, high) for low, high in self._close_to_locking(self.margins.courses, near)]
+        values, places = on_dial(self.run, [end for _, *ends in ranges for end in ends])
+        return [
+            LockingRange(
+                state, low, high, *self._least(low, high), values[2 * k : 2 * k + 2], places[2 * k : 2 * k + 2]
+            )
+            for k, (state, low, high) in enumerate(ranges)
+        ]
+
+    def _close_to_locking(self, margins: Courses, near: float) -> list[tuple[float, float]]:
+        """Begin and end, s, of where it runs with a margin below `near`."""
+        cut = margins.parted(np.concatenate([self.courses.edges, margins.passages(0, near)]))
         middles = cut.edges[:-1] + cut.half
         close = (cut.at(middles)[0] < near) & ~np.isin(self.states_at(middles), NO_MARGIN)
         parts = _merged(cut.edges, close.astype(int), SHORT * cut.span)
-        return ranges + [LockingRange(None, low, high, *self._least(low, high)) for below, low, high in parts if below]
+        return [(low, high) for below, low, high in parts if below]
 
     def _least(self, low: float, high: float) -> tuple[float, str]:
         """The smallest margin between two times, s, and where."""
@@ -213,18 +224,15 @@ class LockingCourse:
             first = int(np.searchsorted(time, part.low - margin))
             last = len(time) if part.high >= duration else int(np.searchsorted(time, part.high - margin))
             state = "" if part.state is None else part.state.name.lower()
-            cells, ends = part.cells(self.run, near), part.ends(self.run)[0]
             place = {"first": first, "count": last - first, "times": [part.low, part.high]}
-            rows.append({"state": state, **place, "cells": cells, "ends": ends})
+            rows.append({"state": state, **place, "cells": part.cells(near), "ends": part.ends})
         return {"of": dial.of, "unit": dial.unit.strip(), "positions": len(time), "near": near, "rows": rows}
 
     def sign_figure(self) -> Figure | None:
         """Where friction no longer holds the loads that push forward: there the drive effort changes its sign."""
         ranges = [part for part in self.ranges() if part.state is not None]
         places = [
-            after.ends(self.run)[1][0]
-            for before, after in pairwise(ranges)
-            if {before.state, after.state} == HELD_AND_DRIVEN
+            after.places[0] for before, after in pairwise(ranges) if {before.state, after.state} == HELD_AND_DRIVEN
         ]
         if not places:
             return None

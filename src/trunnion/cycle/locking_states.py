@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import floor, isfinite, isnan, log10
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from trunnion.cycle.passage import Passage
     from trunnion.solve.run import Run
 
-__all__ = ["HEAD", "NEAR", "LockingRange", "LockingState", "states"]
+__all__ = ["HEAD", "NEAR", "LockingRange", "LockingState", "on_dial", "states"]
 
 Array = NDArray[np.float64]
 NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
@@ -71,7 +72,7 @@ class LockingRange(NamedTuple):
     """A part of the cycle in one state, or with a margin below the one that counts as near locking.
 
     state: None of the latter; low, high: its ends, s; margin: the smallest locking margin in it, ∞ beyond what is
-    looked for, NaN if it is not known; at: where, in words.
+    looked for, NaN if it is not known; at: where, in words; ends, places: on the dial of the drive, and in words.
     """
 
     state: LockingState | None
@@ -79,25 +80,27 @@ class LockingRange(NamedTuple):
     high: float
     margin: float
     at: str
+    ends: list[float]
+    places: list[str]
 
-    def ends(self, run: Run) -> tuple[list[float], list[str]]:
-        """Its ends on the dial of the drive, and as a person reads them."""
-        dial = run.system.dial(run.values, np.array([self.low, self.high]))
-        travel = np.ptp(run.system.dial(run.values, np.array([0.0, run.cycle.duration])).values)
-        accuracy = CLOSE if dial.unit == "°" else SHARE * float(travel)
-        digits = floor(-log10(accuracy)) if accuracy > 0 else 15
-        values = [round(float(value), digits) + 0.0 for value in dial.values]  # so that an end at 0 is 0
-        if dial.unit == "°":
-            return values, [f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".") + "°" for value in values]
-        return values, [f"{value:.5g}{dial.unit}" for value in values]
-
-    def cells(self, run: Run, near: float = NEAR) -> list[str]:
+    def cells(self, near: float = NEAR) -> list[str]:
         """The row of the table with HEAD."""
         state = f"margin below {near:g}" if self.state is None else self.state.short
         margin = (
             "—" if isnan(self.margin) else readable(self.margin) if isfinite(self.margin) else f"more than {MARGIN:g}"
         )
-        return [state, *self.ends(run)[1], margin, self.at]
+        return [state, *self.places, margin, self.at]
+
+
+def on_dial(run: Run, times: Sequence[float]) -> tuple[list[float], list[str]]:
+    """Times, s, on the dial of the drive, as accurately as they are known, and as a person reads them."""
+    dial = run.system.dial(run.values, np.array([*times, 0.0, run.cycle.duration]))
+    accuracy = CLOSE if dial.unit == "°" else SHARE * float(np.ptp(dial.values[-2:]))
+    digits = floor(-log10(accuracy)) if accuracy > 0 else 15
+    values = [round(float(value), digits) + 0.0 for value in dial.values[:-2]]  # so that an end at 0 is 0
+    if dial.unit == "°":
+        return values, [f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".") + "°" for value in values]
+    return values, [f"{value:.5g}{dial.unit}" for value in values]
 
 
 def states(ahead: Passage, back: Passage, known: NDArray[np.bool_], least: float) -> NDArray[np.int8]:

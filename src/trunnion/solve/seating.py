@@ -222,7 +222,7 @@ class _Settling:
         np.maximum.at(self.change, states, change)
         self._panels += [
             (low, high, offsets[:, nodes] @ FIT.T, int(np.max(rounds[nodes])))
-            for low, high, nodes in panels if np.all(states[nodes] == SETTLED)
+            for low, high, nodes in panels if np.all(states[nodes] <= FLOATING)
         ]  # fmt: skip
         return offsets, states
 

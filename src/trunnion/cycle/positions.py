@@ -154,7 +154,7 @@ def _fill_as_built(
     fill_chunk(arrays, back, part, window, causes)
     if seating and seated:
         causes.note_sticking(np.flatnonzero(seated.sticks) + window.start)
-        arrays["seat_rounds"][window], arrays["seat_change"][window] = seating.rounds, seating.change[seated.states]
+        arrays["seat_rounds"][window], arrays["seat_change"][window] = seated.rounds, seating.change[seated.states]
         arrays["seat_travel"][window] = seated.states == SETTLED
         status = arrays["status"][window]
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)

@@ -57,12 +57,13 @@ class Seated:
     """Pins in their seats at some times.
 
     back: motion and forces, as the pins travel; states: how the seats came to be; sticks: where the travel of the seats
-    turns round the sense of a joint.
+    turns round the sense of a joint; rounds: most that a seat about that time took.
     """
 
     back: Backward
     states: NDArray[np.intp]
     sticks: NDArray[np.bool_]
+    rounds: NDArray[np.intp]
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -85,7 +86,8 @@ class Seating:
     fixed: offsets that the model states; loads: of pins in the middle; courses: offsets of the pins that loads seat, m,
     by `paths`, then what their travel adds to the twist and to the acceleration of each of `links`; halts: in which
     pins are held; turned: times, s, from and to, in which the travel turns round the sense of a joint, (2, time);
-    rounds: most that any seat took, and the largest change, of its clearance, that one more would make, by state.
+    rounds: most that any seat of a panel took; change: the largest, of its clearance, that one more would make, by
+    state.
     """
 
     run: Run
@@ -97,7 +99,7 @@ class Seating:
     links: Sequence[str]
     halts: Sequence[Halt]
     turned: Array
-    rounds: int
+    rounds: NDArray[np.intp]
     change: Array
 
     @property
@@ -119,7 +121,7 @@ class Seating:
         travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
         back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
         sticks = np.any((self.turned[0] <= time[:, None]) & (time[:, None] < self.turned[1]), axis=1)
-        return Seated(back, states, sticks)
+        return Seated(back, states, sticks, self.rounds[self.courses.panel(time)])
 
     def offsets(self, time: Array) -> dict[str, Array]:
         """Where the pins lie at times, s, m, by the names of `shifts`."""
@@ -162,9 +164,9 @@ def _seating(run: Run, method: FrictionMethod) -> Seating:
     else:
         edges = settling.breaks()[[0, -1]]
         courses = Courses(edges, np.zeros((1, 0, ORDER)), np.zeros(1, np.intp), edges, np.zeros(0), 0)
-    courses, links, halts, turned = settling.travelling(courses)
+    rounds, (courses, links, halts, turned) = settling.rounds(courses.edges), settling.travelling(courses)
     return Seating(
-        run, method, settling.fixed, settling.loads, courses, settling.paths, links, halts, turned, settling.rounds,
+        run, method, settling.fixed, settling.loads, courses, settling.paths, links, halts, turned, rounds,
         settling.change,
     )  # fmt: skip
 
@@ -181,8 +183,9 @@ class _Settling:
                 self.fixed |= {path: plain(number) for path, number in offsets.items()}
         self.seats = [seat for seat in run.seats if seat.given is None]
         self.paths = [f"seats.{seat.joint}.{key}" for seat in self.seats for end in seat.play.model.ends for key in end]
-        self.rounds, self.change = 0, np.zeros(4)
-        self._panels: list[tuple[float, float, Array]] = []  # low, high, s, and polynomials of those that settled
+        self.change = np.zeros(4)
+        # low, high, s, polynomials and most rounds of the panels that settled
+        self._panels: list[tuple[float, float, Array, int]] = []
 
     def breaks(self) -> Array:
         """Both ends of the cycle and what lies between them, s."""
@@ -210,19 +213,26 @@ class _Settling:
             slack = 1e-9 * (high - low)
             wider = [panel for panel in self._panels if panel[0] <= low + slack and high - slack <= panel[1]]
             if wider:
-                begin, end, polynomials = wider[-1]
+                begin, end, polynomials, _ = wider[-1]
                 start[:, nodes] = chebyshev.chebval(2 * (time[nodes] - begin) / (end - begin) - 1, polynomials.T)
         offsets, rounds, change, unknown = self._settled(time * (self.run.cycle.duration > 0), start)
         states = np.where(change > TOLERANCE, UNSETTLED, SETTLED)
         for low, high in self.loads.gaps.T:
             states[(time > low) & (time < high)] = FLOATING
         states[unknown] = UNKNOWN
-        self.rounds = max(self.rounds, int(np.max(rounds)))
         np.maximum.at(self.change, states, change)
         self._panels += [
-            (low, high, offsets[:, nodes] @ FIT.T) for low, high, nodes in panels if np.all(states[nodes] == SETTLED)
-        ]
+            (low, high, offsets[:, nodes] @ FIT.T, int(np.max(rounds[nodes])))
+            for low, high, nodes in panels if np.all(states[nodes] <= FLOATING)
+        ]  # fmt: skip
         return offsets, states
+
+    def rounds(self, edges: Array) -> NDArray[np.intp]:
+        """The most rounds that a seat took between edges, s; of panels that have not settled all there are."""
+        rounds = np.full(len(edges) - 1, ROUNDS if self.paths else 0)
+        for low, high, _, most in self._panels:  # the last is the narrowest
+            rounds[(low <= (edges[1:] + edges[:-1]) / 2) & ((edges[1:] + edges[:-1]) / 2 <= high)] = most
+        return rounds
 
     def _settled(self, time: Array, offsets: Array) -> tuple[Array, NDArray[np.intp], Array, NDArray[np.bool_]]:
         """Offsets, rounds, change that one more would make, and where there are no loads; offsets: to begin with.

@@ -28,6 +28,7 @@ __all__ = ["EARLES_WU", "find", "findings"]
 
 EARLES_WU = 1.0  # rad/(N s)
 MOST_PLACES = 6  # named in one finding
+APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
 INSIDE = 1e-9  # of the cycle: positions at the ends of a time belong to it
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")
 
@@ -90,7 +91,7 @@ def findings(arrays: Arrays, seating: Seating, time: Array, dial: Dial) -> Itera
         joint, part = seat.joint, "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
         crossings = [cross for cross in loads.passages if cross.end.seat.joint == joint]
         halts = [
-            _between(run, halt.low, halt.high) for halt in seating.halts
+            (halt.low, halt.high) for halt in seating.halts
             if halt.joint == joint and not any(halt.low <= cross.high and cross.low <= halt.high for cross in crossings)
         ]  # fmt: skip
         if crossings:
@@ -99,7 +100,8 @@ def findings(arrays: Arrays, seating: Seating, time: Array, dial: Dial) -> Itera
         elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
             yield finding_for("seat.unloaded", f"joints.{joint}", part=part)
         if halts:
-            lifted.setdefault((part, _listed(list(dict.fromkeys(halts)))), []).append(joint)
+            places = [_between(run, *span) for span in _joined(halts, APART * run.cycle.duration)]
+            lifted.setdefault((part, _listed(places)), []).append(joint)
     for (part, at), names in lost.items():
         numbers = arrays["contact_loss_number"][[joints.index(name) for name in names]]
         crossings = [cross for cross in loads.passages if cross.end.seat.joint in names]
@@ -139,6 +141,17 @@ def _lost(
         "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=at,
         likely=EARLES_WU, number=number, turning=turning, count=len(names),
     )  # fmt: skip
+
+
+def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[float, float]]:
+    """Times from and to, s, in their order; those that are hardly apart as one."""
+    joined: list[tuple[float, float]] = []
+    for low, high in sorted(spans):
+        if joined and low - joined[-1][1] <= apart:
+            joined[-1] = joined[-1][0], max(joined[-1][1], high)
+        else:
+            joined.append((low, high))
+    return joined
 
 
 def _listed(places: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from measured import figures, many
 from mechanisms import build, four_bar, slider_crank
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import path_of, plan
+from trunnion.solve.forward import forward
 from trunnion.solve.run import Run, prepare
 
 STATISTICS = ("maximum", "minimum", "peak-to-peak", "mean", "rms", "largest")
@@ -135,3 +136,23 @@ def test_windows_are_part_of_the_cycle(first: float, wide: float) -> None:
 
 
 RUN = prepare(build(four_bar()))
+
+
+def test_no_figure_of_a_mechanism_that_does_not_go_together_somewhere() -> None:
+    """Of rods from too short to too long, held against many positions: however short the gap, no figure hides it."""
+    measures = [
+        Measure("least", "rotation", "D", statistic="minimum"),
+        Measure("mean", "angle", "coupler", statistic="mean"),
+        Measure("most", "effort", "A", statistic="maximum"),
+    ]
+    rods = 0.9 * np.concatenate([np.linspace(0.5, 1.6, 100), 10 / 9 + np.geomspace(1e-4, 1e-2, 20)])[:, None]
+    values = RUN.system.mechanism.parameters({"links.coupler.points.C.x": rods})
+    made, time = many(RUN, measures), RUN.cycle.times(720)
+    with np.errstate(all="ignore"):
+        frame = forward(RUN.system, values, RUN.chosen.assembly, time).motions["rocker"].frame
+    open_ = np.any(np.isnan(np.broadcast_to(frame.c, (len(rods), len(time)))), axis=1)
+    assert 10 < np.count_nonzero(open_) < 100
+    for read in made.read(values).values():
+        gone = np.isnan(read.figure)
+        assert np.all(gone[open_])
+        assert np.count_nonzero(gone & ~open_) < 3  # where the gap is shorter than a step

@@ -47,10 +47,12 @@ Lanes = NDArray[np.intp]
 TURN = 2 * np.pi
 READ = 512  # mechanisms whose courses are read at a time: their arrays stay in cache
 FINE, FINE_MOTION = 3e-7, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
+NONE = 1e-9  # of the largest derivative: less is none
 FINE_CHANGE = 1e-6  # of the size of derivatives: how far those of figures may be off
 FIRM = 0.3  # of that: where panels are tuned
 FIRST = Accuracy(1e-4, 1e-5, rounds=2)  # of the courses whose panels are tuned
 OWN = Accuracy(1e-7, 1e-8, rounds=20)  # of courses of mechanisms by themselves
+GAP, GROSS = 1 / 360, 1e-3  # of the courses: panels that hide nothing; of their size: what tells of a gap
 PARTED, MOST_PANELS = 7, 60  # rounds in which panels are halved; of panels that serve all
 ROUNDING = 1e-6  # of what numbers are like: courses that are much smaller
 CLOSE, LOCATED = 1e-9, 3e-10  # of the cycle: times that are one, and bends but for the error of their location
@@ -484,19 +486,22 @@ class _Group:
 
     def _offending(self, measure: Measure, panels: Panels, rows: Array, share: float) -> NDArray[np.bool_]:
         """Panels that do not resolve the courses as far as the figure needs it, or whose numbers are infinite; of dual
-        numbers those too that do not resolve the derivatives."""
+        numbers those too that do not resolve the derivatives. Wide ones that hardly resolve them at all are parted
+        wherever they are, as they may hide places without an answer."""
         tails = panels.tails()
         sizes = np.maximum(self._sizes[measure.name], np.max(np.abs(rows), axis=(0, 2, 3)))[:, None]
         excess = tails / np.where(sizes > 0.0, share * self.fine * sizes, np.inf)
         if isinstance(panels.coefficients, Dual):
             changes = np.abs(np.broadcast_to(panels.coefficients.dual, panels.coefficients.shape))
             most = np.max(changes, axis=(0, 2, 3))[:, None]
+            most = np.maximum(most, NONE * np.max(np.nan_to_num(most)))  # what has no effect has rounding for one
             last = np.max(changes[..., -2:], axis=(0, 3))
             excess = np.maximum(excess, last / np.where(most > 0.0, share * FINE_CHANGE * most, np.inf))
         found = np.any(np.isinf(rows), axis=(0, 3))
         if np.any(excess > 1.0):
             known = np.all(np.isfinite(tails), axis=1, keepdims=True)
-            found |= self.reading(measure).offending(panels, excess) & known
+            wide = primal(panels.half) > GAP * np.sum(primal(panels.half), axis=1, keepdims=True)
+            found |= (self.reading(measure).offending(panels, excess) | (wide & (tails > GROSS * sizes))) & known
         return np.asarray(found)
 
     @cached_property

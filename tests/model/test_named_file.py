@@ -12,7 +12,6 @@ import pytest
 import trunnion
 from trunnion import Mechanism, MechanismError
 from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS
-from trunnion.model.file import files_named
 from trunnion.model.mechanism import read_mechanism
 from trunnion.model.named_file import MOST_FILES
 from trunnion.model.rewrite import rewrite_mechanism
@@ -88,7 +87,6 @@ def test_a_driver_and_a_folder_below(tmp_path: Path) -> None:
     text = path.read_text("utf-8").replace("O: {speed: 1450 rpm}", "O: {law: table, file: data/motion.csv}")
     path.write_text(text, encoding="utf-8")
     assert read_mechanism(path).parameters()["drivers.O.points.1.time"] == 0.05
-    assert [one.name for one in files_named(path)] == ["motion.csv", "gas.csv"]
 
 
 def test_a_link_that_stays_in_the_folder(tmp_path: Path) -> None:

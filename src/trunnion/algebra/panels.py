@@ -46,6 +46,7 @@ TIED = 1e-7  # of its range: tops of which either may be the highest in mechanis
 ROUGH, NARROWED = 1e-7, 12  # last coefficients of a polynomial, of the others, and rounds in which it is narrowed
 CANCELLED = 1e-12  # of a mean of magnitudes: less than this is what rounding leaves of one that is zero
 NEWTONS, HALVINGS, LEADING, SETTLED = 5, 5, 8, 1e-3
+STILL = 1e-5  # step of Newton's method from where a course is level
 
 
 class Top(NamedTuple):
@@ -178,11 +179,9 @@ def extreme(
         larger = np.lexsort((-np.abs(changes), ~tied, lane)) if len(lane) else lane
         pick = first.copy()
         pick[known] = larger[np.searchsorted(lane, np.flatnonzero(known))]
-        slope, bend = _at(slopes @ RATE, spot), _at(own @ RATE @ RATE, spot)
-        place = Dual(
-            place,
-            width * np.where((np.abs(spot) == 1.0) | (bend >= 0.0), 0.0, -slope / np.where(bend == 0.0, 1.0, bend)),
-        )
+        slope, rate, bend = _at(slopes @ RATE, spot), _at(own @ RATE, spot), _at(own @ RATE @ RATE, spot)
+        still = (bend < 0.0) & (np.abs(rate) <= STILL * np.abs(bend))  # also at an edge that is no break
+        place = Dual(place, width * np.where(still, -slope / np.where(bend == 0.0, 1.0, bend), 0.0))
         taken: Number = Dual(sign * most, _picked(sign * changes, pick, known))
     else:
         taken = sign * most

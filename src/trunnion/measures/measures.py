@@ -103,7 +103,7 @@ class Measure:
 
     @property
     def rule(self) -> str:
-        """What makes the figure of the course: an entry of `figures.RULES`."""
+        """What makes the figure of the course: a rule of `figures.Reading`."""
         own = self.of.rule
         if own == "ratio" and self.subject != "cycle":
             own = "deviation"

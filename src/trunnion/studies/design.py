@@ -202,7 +202,7 @@ def shaking(back: Backward) -> tuple[tuple[Array, Array], Array]:
 def instant_centre(walk: Forward, first: str, second: str) -> tuple[Array, Array]:
     """Point (x, y), m, where two links have the same velocity; at infinity (±inf or NaN) where they turn alike."""
     one, two = walk.motions[first], walk.motions[second]
-    w = two.twist.w - one.twist.w
+    w = np.asarray(two.twist.w - one.twist.w, float)
     with np.errstate(all="ignore"):
         return -(two.twist.y - one.twist.y) / w, (two.twist.x - one.twist.x) / w
 

@@ -104,7 +104,7 @@ def test_corner_that_does_not_go_together_is_told() -> None:
 
 @pytest.mark.slow
 def test_samples_that_lock() -> None:
-    """By the same status as each mechanism analysed alone; an effort has no figure, a motion has."""
+    """By the gravest status of each mechanism analysed alone; an effort has no figure, a motion has."""
     data = mechanisms.model(mechanisms.slider_crank(offset=0.0), friction=0.35)
     data["tolerances"] = {"joints.C.friction.coefficient": "+4/+2"}
     data["measures"] = {"peak": {"effort": "A", "as": "maximum", "at_most": "1e6 N m"}, "way": {"stroke": "C"}}
@@ -114,9 +114,9 @@ def test_samples_that_lock() -> None:
     figures, passed, _, status = batch.figures(u)
     values = batch.inputs.values(u)
     for i in range(0, 12, 3):
-        single = trunnion.analyse(alone(mechanism, values, i), 12)
-        np.testing.assert_array_equal(single["status"].values, status[i])
-    locked = np.any(status == Status.LOCKED, axis=1)
+        single = trunnion.analyse(alone(mechanism, values, i), 360)["status"].values
+        assert np.max(single[single != Status.ZERO_SLIP]) == status[i]  # an instant at a break is no place of a course
+    locked = status == Status.LOCKED
     assert 0 < np.sum(locked) < 12
     np.testing.assert_array_equal(np.isnan(figures[0]), locked)
     np.testing.assert_array_equal(passed[0] == 0, locked)

@@ -167,9 +167,10 @@ def extreme(
     most = np.full(len(tops), np.nan)
     most[known] = best
     first = np.zeros(len(tops), np.intp)
-    place: Number = middle + width * spot
+    constant = (grid.most - grid.least)[lane, panel] <= flat[lane]  # a plateau is told by where it begins
+    place: Number = np.where(constant, -1.0, middle + width * spot)
     # one that is not level goes on rising beside its panel: only what is as high but for rounding counts there
-    slack = np.where(level, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
+    slack = np.where(level | constant, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
     first[known] = _first(lane, value >= most[lane] - slack)
     pick = first
     if isinstance(pairs, Dual):
@@ -180,7 +181,7 @@ def extreme(
         pick = first.copy()
         pick[known] = larger[np.searchsorted(lane, np.flatnonzero(known))]
         slope, rate, bend = _at(slopes @ RATE, spot), _at(own @ RATE, spot), _at(own @ RATE @ RATE, spot)
-        still = (bend < 0.0) & (np.abs(rate) <= STILL * np.abs(bend))  # also at an edge that is no break
+        still = ~constant & (bend < 0.0) & (np.abs(rate) <= STILL * np.abs(bend))  # also at an edge that is no break
         place = Dual(place, width * np.where(still, -slope / np.where(bend == 0.0, 1.0, bend), 0.0))
         taken: Number = Dual(sign * most, _picked(sign * changes, pick, known))
     else:

@@ -46,7 +46,8 @@ Array = NDArray[np.float64]
 Lanes = NDArray[np.intp]
 TURN = 2 * np.pi
 READ = 512  # mechanisms whose courses are read at a time: their arrays stay in cache
-FINE, FINE_MOTION = 3e-7, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
+FINE, FINE_MOTION = 1e-8, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
+FINE_PLACE = 1e-11  # and where a place of forces is read
 NONE = 1e-9  # of the largest derivative: less is none
 FINE_CHANGE = 1e-6  # of the size of derivatives: how far those of figures may be off
 FIRM = 0.3  # of that: where panels are tuned
@@ -195,10 +196,11 @@ class _Group:
         curves, status = self.kernel.courses(self.values, time)
         return curves, np.zeros_like(status)
 
-    @cached_property
-    def fine(self) -> float:
-        """Of the size of courses: how far figures may be off."""
-        return 100.0 * MARGINS.tolerance if self.measures[0].wants_margin else FINE_MOTION if self.of_motion else FINE
+    def fine(self, measure: Measure) -> float:
+        """Of the size of courses: how far figures may be off; a place is off by the root of that."""
+        if measure.wants_margin:
+            return 100.0 * MARGINS.tolerance
+        return FINE_MOTION if self.of_motion else FINE_PLACE if measure.of_place else FINE
 
     @cached_property
     def of_motion(self) -> bool:
@@ -490,7 +492,7 @@ class _Group:
         wherever they are, as they may hide places without an answer."""
         tails = panels.tails()
         sizes = np.maximum(self._sizes[measure.name], np.max(np.abs(rows), axis=(0, 2, 3)))[:, None]
-        excess = tails / np.where(sizes > 0.0, share * self.fine * sizes, np.inf)
+        excess = tails / np.where(sizes > 0.0, share * self.fine(measure) * sizes, np.inf)
         if isinstance(panels.coefficients, Dual):
             changes = np.abs(np.broadcast_to(panels.coefficients.dual, panels.coefficients.shape))
             most = np.max(changes, axis=(0, 2, 3))[:, None]

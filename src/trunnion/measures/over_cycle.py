@@ -18,6 +18,7 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import ends_of, plan
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
+from trunnion.solve.seating import seating_of
 from trunnion.solve.switches import MARGINS, SEATED, Bend, accuracy_of, breaks_between
 
 __all__ = ["Followed", "alike", "endless_and_lost", "figures_of", "followed", "matters", "settled", "together"]
@@ -75,6 +76,7 @@ def settled(
     motion = MOTION if all(measure.of_motion for measure in measures) else Accuracy()
     accuracy = MARGINS if measures[0].wants_margin else SEATED if run.seats else motion
     breaks = np.array([bend.time for bend in run.bends if run.seats or matters(bend, measures)])
+    breaks = np.concatenate([breaks, seating_of(run, method).breaks]) if run.seats else breaks
     return followed(run, measures, ends, partial(courses_of, run, measures, method=method), breaks, accuracy, gaps)
 
 

@@ -170,7 +170,7 @@ def extreme(
     constant = (grid.most - grid.least)[lane, panel] <= flat[lane]  # a plateau is told by where it begins
     place: Number = np.where(constant, -1.0, middle + width * spot)
     # one that is not level goes on rising beside its panel: only what is as high but for rounding counts there
-    slack = np.where(level | constant, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
+    slack = np.where(level, flat[lane], ROUNDING * np.maximum(np.abs(high), np.abs(low))[lane])
     first[known] = _first(lane, value >= most[lane] - slack)
     pick = first
     if isinstance(pairs, Dual):

@@ -1,9 +1,8 @@
 """The rows of an allocation from first order of a mechanism: every position of every measure with limits.
 
-A figure that is a deviation from the nominal mechanism has a row at each position, and one where its worst case is the
-largest, between two of them; any other figure one row. What moves
+A figure that is a deviation from the nominal mechanism has a row at each position, any other figure one row. What moves
 a row is linear in the half widths, and so is what a play does in its radius, with a few exceptions: which way a point
-is off most, where and between which positions it is worst, a distribution whose shape changes with its
+is off most, which two positions a peak-to-peak deviation lies between, a distribution whose shape changes with its
 limits. These are taken as they are with the tolerances of the study, and again with those that are found, see
 `allocate`.
 """
@@ -59,23 +58,19 @@ class _Block:
     moving: bool
 
 
-def _blocks(of: Of) -> list[_Block]:
+def _block(of: Of) -> _Block:
     measure = of.measure
     # without a derivative, but no further off than the worst position: kept where every position keeps it
     root = against(of) and measure.rule == "rms"
     root |= measure.kind == "path_error" and measure.rule in ("mean", "minimum", "peak-to-peak")
     lower, upper = limits(of)
-    spread = Spread(*(np.asarray(part)[:, None] for part in of.figure.spread))
-    place = of.reference.window.index[of.place] if of.place >= 0 else -1
-    figure = _Block(of.figure.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(of.reference))
     if (by_position(of.reference) and of.place >= 0) or root:
         index = np.asarray(of.reference.window.index, np.intp)
         moving = measure.kind == "path_error"
-        return [
-            _Block(of.course.sensitivity, of.course.spread, lower, upper, index, moving),
-            *([] if root else [figure]),
-        ]
-    return [figure]
+        return _Block(of.course.sensitivity, of.course.spread, lower, upper, index, moving)
+    spread = Spread(*(np.asarray(part)[:, None] for part in of.figure.spread))
+    place = of.reference.window.index[of.place] if of.place >= 0 else -1
+    return _Block(of.figure.sensitivity[:, None], spread, lower, upper, np.array([place]), by_position(of.reference))
 
 
 def rows_of(
@@ -86,20 +81,18 @@ def rows_of(
     Effects of these are per unit of half width, of all others those of the whole tolerance (their half width being 1).
     tight: what the limits of a measure are multiplied by.
     """
-    blocks: list[_Block] = []
-    which: list[int] = []
-    unknown: list[str] = []
+    blocks, which, unknown = [], [], []
     for k, of in enumerate(study.linear.measures):
         if not np.any(np.isfinite(limits(of))):
             continue
-        share, count = (tight or {}).get(of.measure.name, 1.0), len(blocks)
-        for block in _blocks(of):
-            answered = np.all(np.isfinite(block.spread.upper), axis=0)
-            if np.any(answered):
-                blocks.append(replace(_taken(block, answered), lower=share * block.lower, upper=share * block.upper))
-                which.append(k)
-        if len(blocks) == count:
+        block = _block(of)
+        known = np.all(np.isfinite(block.spread.upper), axis=0)
+        if not np.any(known):
             unknown.append(of.measure.name)
+            continue
+        share = (tight or {}).get(of.measure.name, 1.0)
+        blocks.append(replace(_taken(block, known), lower=share * block.lower, upper=share * block.upper))
+        which.append(k)
     none = np.zeros(0, np.intp)
     if not blocks:
         empty = RowEffects(np.zeros((0, len(study.inputs.names))), np.zeros(0), np.zeros(0))

@@ -100,12 +100,14 @@ def test_the_studio_is_served_without_node(installed: Path, tmp_path: Path) -> N
     bare = {"PYTHONPATH": str(installed), "PATH": "", "HOME": str(tmp_path)}
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, env=bare) as process:
         assert process.stdout is not None
-        address = process.stdout.readline().split()[-1]
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-            user = User(browser.new_page(), SimpleNamespace(address=address))
-            user.open()
-            user.page.wait_for_selector(".motion .player")
-            browser.close()
-        process.terminate()
+        try:
+            address = process.stdout.readline().split()[-1]
+            with sync_playwright() as playwright:
+                browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+                user = User(browser.new_page(), SimpleNamespace(address=address))
+                user.open()
+                user.page.wait_for_selector(".motion .player")
+                browser.close()
+        finally:
+            process.terminate()  # else leaving waits for it
     assert user.wrong == []

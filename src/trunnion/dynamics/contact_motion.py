@@ -34,7 +34,6 @@ GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, an
 LOOKS = 12  # times within a step at which gaps are looked at
 FINE = 40  # halvings towards the beginning of a step, where a gap that has just changed its sign is next to nothing
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
-MOST_CONTACTS = 100_000
 
 
 class Impact(NamedTuple):

@@ -191,10 +191,6 @@ class Measure:
                 total = total + (load.x * twist.x + load.y * twist.y + load.m * twist.w)
         return total
 
-    def rate_of_course(self, walk: Forward) -> Number | None:
-        """Rate of a course that is an angle, rad/s; None of others."""
-        return self.coordinate(walk.system).rate(walk) if self.turning(walk.system) else None
-
 
 def coordinate_unit(system: System, values: Values) -> str:
     """Unit of what names positions: rad or m, the coordinate of the first driver if it runs one way, else s."""

@@ -36,7 +36,7 @@ VERBS: dict[str, list[str]] = {
     "check": [],
     "analyse": [*STEPS, "--out", "out.nc", "--out", "out.csv", "--out", "out.json", "--report", "out.html"],
     "locking": STEPS,
-    "design": STEPS,
+    "design": [],
     "assemble": [*STEPS, "--out", "out.nc", "--out", "out.csv"],
     "play": [*STEPS, "--out", "out.nc", "--out", "out.csv"],
     "sweep": [*STEPS, "--margin", "--out", "out.nc", "--out", "out.csv"],

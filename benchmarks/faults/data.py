@@ -83,8 +83,8 @@ _STUDIES = (
     Fault(
         "dead-centre-of-a-resting-link",
         "studies/design.py",
-        "(around[:-2] * values[1:] < 0)",
-        "(around[:-2] * values[1:] <= 0)",
+        "passages[before * after < 0]",
+        "passages[before * after <= 0]",
         ("tests/reference/test_design.py",),
     ),
 )

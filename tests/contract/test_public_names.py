@@ -25,7 +25,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 # where a default is another for a reason
 OTHERWISE = {
-    ("design", "steps"),  # most extremes are taken at the positions alone: 720 of them
     ("simulate", "steps"),  # many turns, where the others have one
     ("simulate", "progress"),  # told a time
 }

@@ -21,7 +21,6 @@ SETTINGS = tuple(part for name, value in STRIBECK.items() for part in ("--set", 
 VERBS = [
     ("check",),
     ("analyse", "--steps", 24),
-    ("design", "--steps", 24),
     ("locking", "--steps", 12),
     ("plot", "--steps", 24, "--kind", "torque", "--out", "a.png"),
     ("report", "--steps", 24, "--out", "a.html"),

@@ -176,7 +176,6 @@ def analyse(
 @verb
 def design(
     file: File,
-    steps: Steps = 720,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -192,7 +191,7 @@ def design(
 
     mechanism = stated(file, set_, table, friction)
     with lines_of(file):
-        figures = report_figures(mechanism, steps, fluctuation)
+        figures = report_figures(mechanism, fluctuation)
     show_figures(mechanism.name or str(file), figures)
 
 

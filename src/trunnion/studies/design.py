@@ -5,27 +5,29 @@ Everything is read off one run over the cycle: the poses of the dyads, the twist
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
+from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.namespace import Number
+from trunnion.algebra.panels import GAUSS_WEIGHTS, ON_GAUSS
+from trunnion.cycle.course import magnitude
 from trunnion.cycle.scales import scales_of
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.transmission import pressure_angles
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
 from trunnion.results.figure import Figure
 from trunnion.results.scales import EVERYWHERE, Scales
-from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run, prepare
+from trunnion.solve.status import pose_status
 from trunnion.solve.switches import Mechanisms, accuracy_of, breaks_between, knots_of
 from trunnion.studies.motor import Motor, motor
 
@@ -33,7 +35,6 @@ __all__ = [
     "Counterweight",
     "Design",
     "Extremes",
-    "all_instant_centres",
     "counterweights",
     "curvature",
     "dead_centres",
@@ -50,6 +51,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 EXACT = Accuracy(1e-12, 1e-14, shortest=1e-14)  # of the motion alone: dead centres and limits
+RESTS = 1e-9  # of the mean rate of a driver: less is none
 BESIDE = 1e-6  # of the cycle: before and after a place at which a link may turn back
 
 
@@ -111,33 +113,32 @@ class Design:
 
 @strict_keywords
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
-def design(mechanism: Mechanism, steps: int = 720) -> Design:
+def design(mechanism: Mechanism) -> Design:
     """What a designer asks of a planar linkage: transmission, dead centres, range, shaking, balance, motor.
 
-    steps: equally spaced positions of the cycle, at which extremes of the motion are taken; dead centres, limits and
-    what concerns the drive depend on none. Returns a Design, SI and
-    rad. Source: R. L. Norton, Design of Machinery.
-    Raises MechanismError for a mechanism in space, or if the structure does not determine the motion.
+    Returns
+    -------
+    Design
+        SI and rad. Source: R. L. Norton, Design of Machinery.
+
+    Raises
+    ------
+    MechanismError
+        For a mechanism in space, or if the structure does not determine the motion.
     """
     run = _planar(mechanism)
-    time = run.cycle.times(steps)
-    back = run.solve(time)
-    walk = back.walk
-    force, moment = shaking(back)
-    steps = len(time)
-    driver = next(iter(mechanism.drivers), "")
-    rate = np.broadcast_to(run.system.drive(run.values, driver, time)[1], time.shape) if driver else np.zeros(steps)
-    asked = motor(run, driver) if driver else Motor()
+    motion, driver = _motion(run), next(iter(mechanism.drivers), "")
+    angles = motion.named("pressure angle")
     return Design(
         grashof(mechanism, run),
-        {name: _least(np.broadcast_to(angle, time.shape)) for name, angle in transmission_angles(walk).items()},
-        {name: _extremes(run, np.broadcast_to(angle, time.shape)) for name, angle in pressure_angles(walk).items()},
+        {name: np.pi / 2 - motion.extreme([row], magnitude, motion.assembled).value for name, row in angles.items()},
+        {name: _extremes(run, motion, row) for name, row in angles.items()},
         dead_centres(run),
         limits(run),
-        _largest(np.hypot(*force)),
-        _largest(moment),
-        *asked,
-        0.0 if np.any(rate * np.sum(rate) <= 0) else float(np.mean(rate)),
+        motion.extreme(motion.rows("shaking force"), magnitude, motion.sound).value,
+        motion.extreme(motion.rows("shaking moment"), magnitude, motion.sound).value,
+        *(motor(run, driver) if driver else Motor()),
+        motion.mean_speed() if driver else 0.0,
     )
 
 
@@ -147,14 +148,6 @@ def _planar(mechanism: Mechanism) -> Run:
         what = "the figures of design (transmission angle, Grashof, instant centres, shaking force) are of the plane"
         raise MechanismError(Finding(what, "space", "use analyse and locking; screw axes are in the report"))
     return prepare(mechanism)
-
-
-def _least(values: Array) -> float:
-    return float(np.nanmin(values)) if np.any(np.isfinite(values)) else float("nan")
-
-
-def _largest(values: Array) -> float:
-    return float(np.nanmax(np.abs(values))) if np.any(np.isfinite(values)) else float("nan")
 
 
 def transmission_angles(walk: Forward) -> dict[str, Array]:
@@ -167,23 +160,23 @@ def transmission_angles(walk: Forward) -> dict[str, Array]:
     return {name: np.pi / 2 - np.abs(angle) for name, angle in pressure_angles(walk).items()}
 
 
-def _extremes(run: Run, values: Array) -> Extremes:
-    """Extremes over the positions of a cycle; NaN where there is no number at all."""
-    if not np.any(np.isfinite(values)):
-        return Extremes(*([float("nan")] * 4))
-    time = run.cycle.times(len(values))
-    low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
-    return Extremes(float(values[low]), _coordinate(run, time[low]), float(values[high]), _coordinate(run, time[high]))
+def _extremes(run: Run, motion: _Motion, row: int) -> Extremes:
+    """Extremes of a pressure angle, with the drive coordinates where they are."""
+    low, high = (motion.extreme([row], _itself, motion.assembled, sign) for sign in (-1.0, 1.0))
+    times = [0.0 if place.everywhere else place.time for place in (low, high)]
+    places = [_coordinate(run, time % run.cycle.duration if run.cycle.periodic else time) for time in times]
+    return Extremes(low.value, places[0], high.value, places[1])
 
 
-def shaking(back: Backward) -> tuple[tuple[Array, Array], Array]:
+def shaking(walk: Forward) -> tuple[tuple[Number, Number], Number]:
     """Force (x, y), N, and moment about the ground's origin, N m, that inertia and weightless links put on the frame.
 
     −Σ m a of all mass centres, and −Σ (r × m a + J α): what the foundation feels of the motion alone.
     """
-    walk, values = back.walk, back.walk.values
-    shape = np.shape(back.walk.motions[walk.system.mechanism.fixed_link].twist.w)
-    x, y, turn = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    values = walk.values
+    x: Number = 0.0
+    y: Number = 0.0
+    turn: Number = 0.0
     for name, link in walk.system.mechanism.links.items():
         if name == walk.system.mechanism.fixed_link:
             continue
@@ -262,41 +255,112 @@ def grashof(mechanism: Mechanism, run: Run | None = None) -> str:
     }[shortest]
 
 
-def _motion(run: Run) -> tuple[list[str], Courses]:
-    """Joints on the ground that no driver turns, and the course of their speeds; its states say whether it closes.
+class _Motion(NamedTuple):
+    """The courses of what the motion alone decides; places: the row of each number, by what it is and whose."""
 
-    The last row is the rate of the first driver.
-    """
-    return run.once("turning", lambda: _moved(run))
+    places: dict[tuple[str, str], int]
+    courses: Courses
+
+    def named(self, kind: str) -> dict[str, int]:
+        """Rows of a kind of number, by whose they are."""
+        return {name: row for (what, name), row in self.places.items() if what == kind}
+
+    def rows(self, kind: str) -> list[int]:
+        """The same alone."""
+        return list(self.named(kind).values())
+
+    @property
+    def assembled(self) -> NDArray[np.bool_]:
+        """Panels that have positions."""
+        return np.asarray(self.courses.states != Status.NOT_ASSEMBLED)
+
+    @property
+    def sound(self) -> NDArray[np.bool_]:
+        """Of these the ones away from singular positions, where accelerations have no bound; all if there are none."""
+        solved = np.asarray(self.courses.states == Status.SOLVED)
+        return solved if np.any(solved) else self.assembled
+
+    def extreme(
+        self, rows: list[int], of: Callable[[Array], Array], panels: NDArray[np.bool_], sign: float = 1.0
+    ) -> Place:
+        """The largest or least value of what is made of some rows, NaN where no panel has one."""
+        place = self.courses.picked(np.array(rows)).extreme(of, sign, panels)
+        return Place(np.nan, 0.0) if place is None else place
+
+    def mean_speed(self) -> float:
+        """Of the first driver, 0 if it rests or turns back."""
+        (row,) = self.rows("rate")
+        mean, everywhere = float(self.courses.mean()[row]), np.ones(len(self.courses.half), bool)
+        least = self.extreme([row], lambda rows: rows[0] * np.sign(mean), everywhere, -1.0)
+        return mean if least.value > RESTS * abs(mean) else 0.0
 
 
-def _moved(run: Run) -> tuple[list[str], Courses]:
-    system, driver = run.system, next(iter(run.system.mechanism.drivers), "")
-    ground, drivers = system.mechanism.fixed_link, system.mechanism.drivers
-    joints = [name for name, (_, links) in system.joints.items() if ground in links and name not in drivers]
+def _itself(rows: Array) -> Array:
+    return np.asarray(rows[0])
+
+
+def _motion(run: Run) -> _Motion:
+    """The courses of the motion, found once for a run."""
+    return run.once("design", lambda: _moved(run))
+
+
+def _moved(run: Run) -> _Motion:
+    system, places = run.system, dict[tuple[str, str], int]()
 
     def look(time: Array) -> tuple[Array, NDArray[np.intp]]:
         time = time if run.cycle.duration > 0 else 0.0 * time
         walk = forward(system, run.values, run.chosen.assembly, time)
-        rates = [*(walk.speed(joint) for joint in joints), system.drive(run.values, driver, time)[1] if driver else 1.0]
-        closed = np.ones(time.shape, bool)
-        for motion in walk.motions.values():
-            closed &= np.isfinite(np.broadcast_to(motion.frame.x + motion.frame.c, closed.shape))
-        return np.array([np.broadcast_to(rate, time.shape) for rate in rates]), closed.astype(np.intp)
+        numbers = _numbers(walk, time)
+        places.update({name: row for row, name in enumerate(numbers)})
+        rows = np.array([np.broadcast_to(np.asarray(number, float), time.shape) for number in numbers.values()])
+        return rows, pose_status(walk, time.shape).astype(np.intp)
 
-    of = Mechanisms(system, run.chosen.assembly, run.values, [run.cycle])
-    knots = np.array([time for _, time in knots_of(of)])
+    def like(sizes: Array) -> Array:
+        """Forces that cancel are rounding beside the others, as angles are beside a radian."""
+        least = {"shaking force": scales.force, "shaking moment": scales.force * scales.length, "pressure angle": 1.0}
+        return np.maximum(sizes, [least.get(kind, 0.0) for kind, _ in places])
+
+    scales = scales_of(run)
+    knots = np.array([time for _, time in knots_of(Mechanisms(system, run.chosen.assembly, run.values, [run.cycle]))])
     breaks = breaks_between(run.cycle, knots) if run.cycle.duration > 0 else np.array([0.0, 1.0])
-    accuracy = accuracy_of(run.cycle, EXACT)
-    return joints, Courses.of(in_blocks(look, len(system.joints)), breaks, None, accuracy)
+    courses = Courses.of(in_blocks(look, len(system.joints)), breaks, like, accuracy_of(run.cycle, EXACT))
+    return _Motion(places, courses)
+
+
+def _numbers(walk: Forward, time: Array) -> dict[tuple[str, str], Number]:
+    """What the figures are read of, by what it is and whose: rates, pressure angles, what inertia does.
+
+    Speeds are of the joints on the ground that no driver turns; balance: the force, N, that 1 kg m on each axis of a
+    link that turns about the ground puts on it.
+    """
+    system, driver = walk.system, next(iter(walk.system.mechanism.drivers), "")
+    ground, drivers = system.mechanism.fixed_link, system.mechanism.drivers
+    numbers: dict[tuple[str, str], Number] = {}
+    for joint, (kind, links) in system.joints.items():
+        if ground not in links:
+            continue
+        if joint not in drivers:
+            numbers["speed", joint] = walk.speed(joint)
+        if PAIRS[kind].turns:
+            link = next(link for link in links if link != ground)
+            motion = walk.motions[link]
+            frame, w, alpha = motion.frame, motion.twist.w, motion.acceleration.w
+            for axis, c, s in (("x", frame.c, frame.s), ("y", -frame.s, frame.c)):  # −(α × r − ω² r) of 1 kg at R p
+                numbers["balance", f"{link}.{axis}.x"] = alpha * s + w * w * c
+                numbers["balance", f"{link}.{axis}.y"] = w * w * s - alpha * c
+    numbers["rate", driver] = system.drive(walk.values, driver, time)[1] if driver else 1.0
+    for name, angle in pressure_angles(walk).items():
+        numbers["pressure angle", name] = angle
+    (numbers["shaking force", "x"], numbers["shaking force", "y"]), numbers["shaking moment", ""] = shaking(walk)
+    return numbers
 
 
 def dead_centres(run: Run) -> dict[str, tuple[float, ...]]:
     """Drive coordinates (rad, m) at which each link on the ground turns back; times (s) without a driver."""
-    joints, courses = _motion(run)
+    motion, courses = _motion(run), _motion(run).courses
     beside, duration = BESIDE * courses.span * np.array([-1.0, 1.0]), run.cycle.duration
     found: dict[str, tuple[float, ...]] = {}
-    for row, joint in enumerate(joints):
+    for joint, row in motion.named("speed").items():
         passages = courses.passages(row)
         if run.cycle.periodic:  # its end is its start
             passages = np.sort(np.append(np.where(passages > duration * (1 - BESIDE), 0.0, passages), 0.0))
@@ -317,9 +381,9 @@ def _coordinate(run: Run, moment: float) -> float:
 
 def limits(run: Run) -> tuple[tuple[float, float], ...]:
     """Intervals of the drive coordinate (rad, m) over which the linkage can be assembled."""
-    _, courses = _motion(run)
-    turns = courses.passages(len(courses.sizes) - 1)  # where the drive turns back
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], courses.states, [0]])))
+    motion, courses = _motion(run), _motion(run).courses
+    turns = courses.passages(motion.rows("rate")[0])  # where the drive turns back
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], motion.assembled.astype(int), [0]])))
     found: list[tuple[float, float]] = []
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         low, high = courses.edges[first], courses.edges[after]
@@ -332,7 +396,7 @@ def limits(run: Run) -> tuple[tuple[float, float], ...]:
     return tuple(found)
 
 
-def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...], float]:
+def counterweights(run: Run) -> tuple[tuple[Counterweight, ...], float]:
     """Counterweights on the links that turn about the ground that best cancel the shaking force, and what is left.
 
     The momentum of the counterweight with mass times place p on link i is ω_i z × R_i p: linear in p. p is found so
@@ -340,49 +404,28 @@ def counterweights(run: Run, steps: int = 90) -> tuple[tuple[Counterweight, ...]
     RMS shaking force that remains: 0 to rounding for a four-bar of revolute pairs (Berkof and Lowen 1969).
     Raises MechanismError if no link turns about the ground.
     """
-    system, time = run.system, run.cycle.times(steps)
-    back = run.solve(time)
-    walk, ground = back.walk, system.mechanism.fixed_link
-    turning = [
-        next(link for link in links if link != ground)
-        for kind, links in system.joints.values()
-        if PAIRS[kind].turns and ground in links
-    ]
-    if not turning:
+    motion = _motion(run)
+    balance = motion.named("balance")
+    if not balance:
         raise MechanismError(Finding("no link turns about the ground", "joints", "counterweights need one that does"))
-    columns = []
-    for link in turning:
-        frame, w = walk.motions[link].frame, walk.motions[link].twist.w
-        alpha = walk.motions[link].acceleration.w
-        for c, s in ((frame.c, frame.s), (-frame.s, frame.c)):  # R p for the unit vectors p = x, p = y
-            # acceleration of the place: α × r − ω² r
-            columns.append(np.concatenate([_full(-alpha * s - w * w * c, time), _full(alpha * c - w * w * s, time)]))
-    force = np.concatenate([_full(part, time) for part in shaking(back)[0]])
-    matrix = np.array(columns).T
-    solved = np.isfinite(force) & np.isfinite(matrix).all(axis=1)
-    matrix, force = matrix[solved], force[solved]
-    solution = np.linalg.lstsq(matrix, force, rcond=None)[0] if len(force) else np.full(matrix.shape[1], np.nan)
+    panels = motion.sound
+    weights = np.sqrt(motion.courses.half[panels, None] * GAUSS_WEIGHTS)  # of a time in the mean square
+    numbers = np.moveaxis(motion.courses.coefficients[panels] @ ON_GAUSS, 1, 0) * weights
+    force = numbers[motion.rows("shaking force")].ravel()
+    # per axis of a link its force along x, then along y
+    matrix = numbers[list(balance.values())].reshape(len(balance) // 2, -1).T
+    links = list(dict.fromkeys(name.rsplit(".", 2)[0] for name in balance))
+    solution = np.linalg.lstsq(matrix, -force, rcond=None)[0] if len(force) else np.full(matrix.shape[1], np.nan)
     size = float(np.linalg.norm(force))
-    left = np.linalg.norm(force - matrix @ solution) / size if size > 0 else float("nan")
-    weights = tuple(
-        Counterweight(link, float(solution[2 * i]), float(solution[2 * i + 1])) for i, link in enumerate(turning)
-    )
-    return weights, float(left)
+    left = np.linalg.norm(force + matrix @ solution) / size if size > 0 else float("nan")
+    pairs = zip(links, solution.reshape(-1, 2).tolist(), strict=True)
+    return tuple(Counterweight(link, x, y) for link, (x, y) in pairs), float(left)
 
 
-def _full(values: Array, time: Array) -> Array:
-    return np.broadcast_to(values, time.shape)
-
-
-def all_instant_centres(walk: Forward) -> dict[tuple[str, str], tuple[Array, Array]]:
-    """Instant centres of every pair of links: n (n − 1)/2 of them."""
-    return {(a, b): instant_centre(walk, a, b) for a, b in combinations(walk.system.mechanism.links, 2)}
-
-
-def report_figures(mechanism: Mechanism, steps: int = 720, fluctuation: float = 0.05) -> list[Figure]:
+def report_figures(mechanism: Mechanism, fluctuation: float = 0.05) -> list[Figure]:
     """The figures that one looks at first."""
     run = _planar(mechanism)
-    found, scales = design(mechanism, steps), scales_of(run)
+    found, scales = design(mechanism), scales_of(run)
     driver = next(iter(mechanism.drivers), "")
     turns = not driver or run.system.turns(driver)
     unit, scale = ("°", 180 / np.pi) if turns else ("mm", 1e3)
@@ -425,7 +468,8 @@ def _pressure(name: str, extremes: Extremes, scale: float, unit: str, scales: Sc
     if not high - low > scales.floor("°"):
         return Figure(key, subject, low, "°", place=EVERYWHERE)
     gap = "" if unit == "°" else " "
-    places = " and ".join(f"{place * scale:.5g}{gap}{unit}" for place in (extremes.at_least, extremes.at_largest))
+    at = scales.zeroed(scale * np.array([extremes.at_least, extremes.at_largest]), unit)
+    places = " and ".join(f"{place:.5g}{gap}{unit}" for place in at.tolist())
     return Figure(key, subject, f"{low:.6g} … {high:.6g}", "°", place=f"at {places}")
 
 

@@ -1,0 +1,13 @@
+"""The list of seeded faults follows the sources: the text of each stands exactly once in its file."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.faults import FAULTS, Fault
+from benchmarks.mutants import applies
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_seeded_fault_applies(fault: Fault) -> None:
+    assert applies(fault)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from benchmarks.faults import FAULTS, Fault
 from benchmarks.mutants import applies
 

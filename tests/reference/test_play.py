@@ -301,9 +301,8 @@ def test_limit() -> None:
 def test_limit_of_one_place(place: dict[str, str]) -> None:
     """The worst case there decides, on either side of it."""
     data = four_bar("C").data() | {"measures": {"swing": {"rotation": "D", **place}}}
-    told = trunnion.play(trunnion.Mechanism(**data), steps=72).trunnion.findings
-    (worst,) = (np.rad2deg(one.figures["worst"]) for one in told if "worst" in one.figures)
-    for factor, code in ((0.999, "limit.exceeded_there"), (1.001, "limit.kept")):
+    worst = np.rad2deg(trunnion.play(trunnion.Mechanism(**data), steps=72)["extreme_worst_case"].values.sum())
+    for factor, code in ((0.999, "limit.exceeded"), (1.001, "limit.kept")):
         data["measures"]["swing"]["limit"] = f"{factor * worst} deg"
         result = trunnion.play(trunnion.Mechanism(**data), steps=72)
         assert [one.code for one in result.trunnion.findings if one.where == "measures.swing.limit"] == [code]
@@ -321,7 +320,9 @@ def test_dead_centres_have_no_answer_and_say_so() -> None:
     result = trunnion.play(trunnion.Mechanism(**data), steps=36000)
     sound = result["status"].values < Status.NEAR_SINGULAR
     told = summary_of(result)[0].value  # close to a dead centre first order says little
-    assert told == np.max(result["worst_case_total"].values[0, sound])
+    total = result["worst_case_total"].values[0]
+    (last,) = np.flatnonzero(sound & (total == np.max(total[sound])))
+    assert total[last] <= told <= np.max(total[last - 1 : last + 2])  # where the position begins to be near it
     assert told < 0.5 * np.nanmax(result["worst_case_total"].values)
 
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.groups.gear import rotation
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.assembly import Chosen, choose
 from trunnion.solve.backward import Backward, Given, Sense, solve
@@ -32,6 +34,7 @@ __all__ = ["Run", "prepare"]
 
 
 TURN_STEPS = 720
+COMES_BACK = 1e-6  # of the mechanism's size
 Found = TypeVar("Found")
 
 
@@ -181,7 +184,16 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
     if any(turns.values()):
         cycle = system.cycle(values, turns, free)
         run = Run(system, values, cycle, choose(system, values, cycle))
-    return run
+    return run if _comes_back(run) else replace(run, cycle=replace(cycle, periodic=False))
+
+
+def _comes_back(run: Run) -> bool:
+    """Whether the links are after a period of the drivers where they were, as they are not where a nut goes on."""
+    if not (run.cycle.periodic and any(PAIRS[kind].threaded for kind, _ in run.system.joints.values())):
+        return True
+    walk, size = run.walk(np.array([0.0, run.cycle.duration])), float(np.max(primal(run.system.size(run.values))))
+    places = [np.broadcast_to(np.asarray(part, float), 2) for one in walk.motions.values() for part in one.frame.place]
+    return not np.any(np.abs(np.diff(places)) > COMES_BACK * size)
 
 
 def _unknown_turns(run: Run) -> dict[str, float]:

@@ -59,38 +59,11 @@ PLAY = {
         "the play of {joints} is the mean of their fits; the largest is {largest:~m}, of {most}",
         "--set fits=maximum takes the largest play",
     ),
-    "play.one_sided": Sentence(
-        WARNING,
-        "to first order play has no effect, but pins on the rims of their holes can change it by at least "
-        "{found:~{unit}} (at {at}): a contact or a spring that acts one way is just open there",
-        "`trunnion tolerance` samples the places of the pins",
-    ),
-    "play.on_other_links": Sentence(
-        NOTE,
-        "the effect is largest with the place of the pin fixed on {links} as the joint turns",
-        lambda links, joint: f"state joints.{joint}.seat_on: the link on which the pin keeps its place, if it is known",
-    ),
     "play.beyond_first_order": Sentence(
-        NOTE,
-        "pins in their holes can change it by {exact:~{unit}} (at {at}), {percent:~} % more than the worst case to "
-        "first order, {first:~{unit}}",
-        "use the larger figure",
-    ),
-    "play.below_first_order": Sentence(
         NOTE,
         "with the pins where first order has ±{first:~{unit}} (at {at}), it changes by {low:~{unit}} and "
         "{high:~{unit}}",
         "use these figures",
-    ),
-    "play.at_a_place": Sentence(
-        NOTE,
-        "at {at} the worst case of {measure} to first order is ±{worst:~{unit}}; the figure and the files show the "
-        "whole cycle besides",
-    ),
-    "play.at_an_extreme": Sentence(
-        NOTE,
-        "the {statistic} is at {at}: the worst case of {measure} to first order, ±{worst:~{unit}}, is of that place; "
-        "the figure and the files show the whole cycle besides",
     ),
     "play.no_effect": Sentence(
         NOTE,
@@ -120,12 +93,6 @@ PLAY = {
     ),
     "play.no_answer": Sentence(ERROR, "{status} {at}", "the effect of play is undefined there"),
     "limit.exceeded": Sentence(
-        ERROR,
-        "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}; it does so "
-        "{over}",
-        "reduce the play of the joints with the largest share",
-    ),
-    "limit.exceeded_there": Sentence(
         ERROR,
         "the worst case to first order, {worst:~{unit}} at {at}, exceeds the limit of {limit:~{unit}}",
         "reduce the play of the joints with the largest share",

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity, Status
-from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
 from trunnion.measures.motion import MOTIONS
@@ -23,22 +22,15 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.shifts import HOLE, carriers_of
-from trunnion.studies.play.result import relied_on
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
     from trunnion.studies.play.effect import Effect
 
-__all__ = ["beyond_first_order", "exact_changes", "figures_with", "on_other_links", "one_sided"]
+__all__ = ["beyond_first_order", "exact_changes", "figures_with"]
 
 Array = NDArray[np.float64]
-TRIED = ((16, 1.0), (64, 1.0), (64, 0.5), (64, 0.25), (64, 0.12), (64, 0.06))  # places of pins, how far about the best
-PLACES, NONE = 720, 1e-6  # positions at which they are; of the largest value: a change that is none
-MUCH = 1.2  # times as much on the other link as on that of the hole
-SLIGHT, GRAVE = (
-    0.01,
-    0.05,
-)  # of the worst case to first order: how much more is a note, and a warning; so much less is a note
+SLIGHT, GRAVE = 0.01, 0.05  # of the worst case to first order: how far off is a note, how much more a warning
 
 
 def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -75,56 +67,6 @@ def exact_changes(effect: Effect, i: int, at: NDArray[np.intp]) -> tuple[Array, 
     return found, first
 
 
-def on_other_links(effect: Effect, i: int) -> Iterator[Finding]:
-    """Joints whose effect, where it is largest, is that of a pin whose place is not fixed on the link with the hole."""
-    joints, links = effect.run.system.mechanism.effective_joints, {}
-    for j, name in enumerate(effect.plays):
-        course = effect.worst_case[i, j]
-        if not np.any(np.isfinite(course)):
-            continue
-        hole, other = effect.by_link(i, j)[:, int(np.nanargmax(course))]
-        if other > MUCH * hole:
-            links[name] = f"{joints[name].links[0]} ({name}: {hole / other:.2g} times on {joints[name].links[1]})"
-    if links:
-        where = f"measures.{effect.measures[i].name}"
-        yield finding_for("play.on_other_links", where, links=list(links.values()), joint=next(iter(links)))
-
-
-def one_sided(effect: Effect, i: int) -> Iterator[Finding]:
-    """A measure of forces that does not change to first order, but does with the pins on the rims of their holes.
-
-    So does that of a spring or contact that is just open. The rims are searched: directions by chance, and about the
-    best of them.
-    """
-    run, measure = effect.run, effect.measures[i]
-    known = np.flatnonzero(np.isfinite(effect.value[i]))
-    if measure.kind in MOTIONS or np.any(effect.total[i] > 0) or not len(known):
-        return
-    at = known[:: -(-len(known) // PLACES)]
-    kernel, rng = NumpyKernel(run, [measure], FrictionMethod()), np.random.default_rng(1)
-    ends = [(name, end, one.radii[k]) for name, one in effect.plays.items() for k, end in enumerate(one.model.ends)]
-    best: list[Array] = [np.zeros((1, len(end))) for _, end, _ in ends]
-    most, time, size = 0.0, 0.0, float(np.max(np.abs(effect.value[i, known])))
-    for tried, width in TRIED:
-        ways = [place + width * rng.standard_normal((tried, place.shape[1])) for place in best]
-        ways = [way / np.sqrt(np.sum(way**2, axis=1, keepdims=True)) for way in ways]
-        offsets = {
-            f"{HOLE}.{name}.{key}": float(np.ravel(primal(radius))[0]) * way[:, k : k + 1]
-            for (name, end, radius), way in zip(ends, ways, strict=True)
-            for k, key in enumerate(end)
-        }
-        course = kernel.courses({**run.values, **offsets}, effect.time[at])[0][measure.name][0]
-        value = np.nan_to_num(np.broadcast_to(np.asarray(primal(course), float), (tried, len(at))))
-        change, size = np.abs(value - effect.value[i, at]), max(size, float(np.max(np.abs(value))))
-        row, column = np.unravel_index(int(np.argmax(change)), change.shape)
-        if change[row, column] > most:
-            most, best = float(change[row, column]), [way[row : row + 1] for way in ways]
-            time, at = float(effect.time[at[column]]), at[max(0, int(column) - 1) : int(column) + 2]
-    if most > NONE * size:
-        where, dial = f"measures.{measure.name}", run.system.dial(run.values, np.array([time]))
-        yield finding_for("play.one_sided", where, found=most, unit=measure.unit(run.system), at=dial.at(0))
-
-
 def figures_with(many: Many, measure: Measure, offsets: Mapping[str, Array]) -> Array:
     """An extreme, (sample,), with pins at offsets by path, m, (sample, 1)."""
     return np.asarray(many.read({**many.run.values, **offsets})[measure.name].figure)
@@ -140,36 +82,21 @@ def _value(run: Run, measure: Measure, time: Array, offsets: dict[str, Array]) -
     return np.broadcast_to(np.asarray(primal(value), float), time.shape)
 
 
-def beyond_first_order(effect: Effect, i: int) -> Iterator[Finding]:
-    """A measure that pins in their holes can change by more than the worst case of first order says, or by less on a
-    side where that is largest.
+def beyond_first_order(effect: Effect) -> Iterator[Finding]:
+    """A measure that pins in their holes change otherwise than first order says, at the one position of an effect.
 
-    One of forces is looked at where its worst case is largest alone, and not where a joint is at rest: elsewhere the
-    pins turn the sense of the friction of joints that hardly move.
+    One of forces is not looked at where a joint is at rest: there the pins turn the sense of its friction.
     """
-    run, measure = effect.run, effect.measures[i]
-    dial, totals = run.system.dial(run.values, effect.time), relied_on(effect.total, effect.status)[i]
-    largest = float(np.nanmax(totals, initial=0.0))
-    if not largest > 0:
-        return
-    top = int(np.nanargmax(totals))
-    places = np.flatnonzero(np.isfinite(totals)) if measure.of_motion else np.array([top])
+    run, (measure,) = effect.run, effect.measures
     with np.errstate(all="ignore"):
-        both, own = exact_changes(effect, i, places)
-        exact = np.fmax(*np.abs(both))
-    if not np.any(np.isfinite(exact)) or not (measure.of_motion or effect.status[top] == Status.SOLVED):
+        changes, (first,) = exact_changes(effect, 0, np.zeros(1, np.intp))
+    low, high = np.sort(changes[:, 0]).tolist()
+    if not (first > 0 and np.isfinite(high - low)) or not (measure.of_motion or effect.status[0] == Status.SOLVED):
         return
-    at, there = int(np.nanargmax(exact)), int(np.searchsorted(places, top))
-    over = float(exact[at]) / largest - 1
-    where, unit = f"measures.{measure.name}", measure.unit(run.system)
-    if over > SLIGHT:
-        severity = Severity.WARNING if over > GRAVE else Severity.NOTE
+    off = max(abs(low + first), abs(high - first)) / first
+    if off > SLIGHT:
         yield finding_for(
-            "play.beyond_first_order", where, severity=severity, exact=float(exact[at]), first=largest, unit=unit,
-            percent=100 * over, at=dial.at(int(places[at])),
+            "play.beyond_first_order", f"measures.{measure.name}", low=low, high=high, first=float(first),
+            severity=Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
+            unit=measure.unit(run.system), at=run.system.dial(run.values, effect.time).at(0),
         )  # fmt: skip
-    elif np.all(np.isfinite(both[:, there])) and np.any(np.abs(both[:, there]) < (1 - GRAVE) * own[there]):
-        low, high = np.sort(both[:, there]).tolist()
-        yield finding_for(
-            "play.below_first_order", where, low=low, high=high, first=largest, unit=unit, at=dial.at(top)
-        )

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import inputs, references
-from trunnion.errors import Finding, Status
+from trunnion.errors import Finding
 from trunnion.measures.measures import Measure
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
-from trunnion.results.scales import Scales, extreme_place
 from trunnion.solve.shifts import Play
 
 if TYPE_CHECKING:
@@ -24,11 +23,12 @@ if TYPE_CHECKING:
 
     from trunnion.solve.run import Run
 
-__all__ = ["VARIABLES", "dataset", "relied_on"]
+__all__ = ["EXTREMES", "VARIABLES", "dataset"]
 
 Array = NDArray[np.float64]
 
 
+EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
 # unit "measure": that of each measure; "sensitivity": that over m
 OVER = ("measure", "position")
 BY_JOINT = ("measure", "joint", "position")
@@ -52,16 +52,10 @@ VARIABLES: dict[str, Variable] = {
     "extreme_worst_case": Variable(
         ("measure", "joint"),
         "measure",
-        "worst case of a maximum or minimum, or a stated place, there; NaN of other measures",
+        "worst case at the place of a measure: a stated one, that of its maximum or minimum, else of the largest total",
     ),
-    "extreme_deviation": Variable(
-        ("measure", "joint"),
-        "measure",
-        "standard deviation of a maximum or minimum, or a stated place, there; NaN of other measures",
-    ),
-    "extreme_time": Variable(
-        ("measure",), "s", "time of a maximum or minimum, or a stated place; NaN of other measures"
-    ),
+    "extreme_deviation": Variable(("measure", "joint"), "measure", "standard deviation at that place"),
+    "extreme_time": Variable(("measure",), "s", "time of that place"),
     "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
 }
 
@@ -90,7 +84,7 @@ class PlayEffects(Protocol):
     @property
     def status(self) -> NDArray[np.int8]: ...
     @property
-    def extremes(self) -> Mapping[str, PlayEffects]: ...
+    def there(self) -> Mapping[str, PlayEffects]: ...
 
 
 def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
@@ -108,7 +102,7 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "sensitivity": sensitivity,
         "radius": _radii(found.plays, ends),
         "status": found.status,
-        **_at_extremes(found),
+        **_at_places(found),
     }
     units = [measure.unit(system) for measure in found.measures]
     own = MemberUnits("measure", units)
@@ -129,36 +123,30 @@ def dataset(found: PlayEffects, findings: Sequence[Finding]) -> xr.Dataset:
         "drive": dial.of,
         "drive_unit": dial.unit.strip(),
         "periodic": int(found.run.cycle.periodic),
-        "extremes": [_extreme_of(found, measure) for measure in found.measures],
-        **scales.summary(_summary(found, units, scales)),
+        "places": [_place_of(found, measure) for measure in found.measures],
+        **scales.summary(_summary(found, units)),
         "findings": finding_rows(findings),
-        "missed": [f"{one.where}: {one.what}" for one in findings if one.code.startswith("limit.exceeded")],
+        "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
     }
     return dataset_of("play", variables, labels, attributes, driven(found.time, *dial))
 
 
-def _extreme_of(found: PlayEffects, measure: Measure) -> list[str]:
-    """The word for a measure's extreme, or "value", and where in the cycle it is, for tables; empty of other ones."""
-    there = found.extremes.get(measure.name)
-    return [] if there is None else [measure.rule, found.run.system.dial(found.run.values, there.time).at(0)]
+def _place_of(found: PlayEffects, measure: Measure) -> list[str]:
+    """What the place of a measure is, and where in the cycle it is, for tables."""
+    there = found.there[measure.name]
+    stated = measure.at is not None or len(found.time) == 1
+    kind = "" if stated else f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
+    return [kind, found.run.system.dial(found.run.values, there.time).at(0)]
 
 
-def _at_extremes(found: PlayEffects) -> dict[str, Array]:
-    """What is at the places of extremes, or stated, NaN of other measures."""
-    names, count = [measure.name for measure in found.measures], len(found.plays)
-    worst, deviation = (np.full((len(names), count), np.nan) for _ in range(2))
-    time = np.full(len(names), np.nan)
-    for i, name in enumerate(names):
-        if name in found.extremes:
-            there = found.extremes[name]
-            worst[i], deviation[i], time[i] = there.worst_case[0, :, 0], there.deviation[0, :, 0], there.time[0]
+def _at_places(found: PlayEffects) -> dict[str, Array]:
+    """What is at the place of each measure."""
+    theres = [found.there[measure.name] for measure in found.measures]
+    worst, deviation = (np.array([part[0, :, 0] for part in parts]) for parts in (
+        [one.worst_case for one in theres], [one.deviation for one in theres],
+    ))  # fmt: skip
+    time = np.array([one.time[0] for one in theres])
     return {"extreme_worst_case": worst, "extreme_deviation": deviation, "extreme_time": time}
-
-
-def relied_on(numbers: Array, status: NDArray[np.int8]) -> Array:
-    """The numbers, (…, position), NaN close to dead centres, where first order says little; all if all are close."""
-    near = status >= Status.NEAR_SINGULAR
-    return numbers if np.all(near) else np.where(near, np.nan, numbers)
 
 
 def _radii(plays: Mapping[str, Play], ends: int) -> Array:
@@ -169,22 +157,19 @@ def _radii(plays: Mapping[str, Play], ends: int) -> Array:
     return found
 
 
-def _summary(found: PlayEffects, units: Sequence[str], scales: Scales) -> Iterator[Figure]:
-    """Of each measure the largest worst case, or that of its extreme: what each joint has in it, RSS and deviation."""
-    for i, (measure, unit) in enumerate(zip(found.measures, units, strict=True)):
-        name, there = measure.name, found.extremes.get(measure.name)
-        own, k = (found, i) if there is None else (there, 0)
-        of = found.run.system.dial(found.run.values, own.time)
-        total = relied_on(own.total[k], own.status)
-        worst = f"{name}.worst_case", f"{name}, worst case to first order"
-        if not np.any(np.isfinite(total)):
-            yield Figure(*worst, None, unit)
+def _summary(found: PlayEffects, units: Sequence[str]) -> Iterator[Figure]:
+    """Of each measure the worst case at its place: what each joint has in it, RSS and deviation."""
+    for measure, unit in zip(found.measures, units, strict=True):
+        name, there = measure.name, found.there[measure.name]
+        kind, at = _place_of(found, measure)
+        total = float(there.total[0, 0])
+        if not np.isfinite(total):
+            yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", None, unit)
             continue
-        top = int(np.nanargmax(total))
-        aspect = "maximum" if there is None else f"of the {measure.rule}" if measure.at is None else ""
-        yield Figure(*worst, total[top], unit, aspect, extreme_place(total, f"at {of.at(top)}", scales.floor(unit)))
-        rss, deviation = (np.sqrt(np.sum(part[k, :, top] ** 2)) for part in (own.worst_case, own.deviation))
+        aspect = "maximum" if kind == "largest" else f"of {kind}" if kind else ""
+        yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", total, unit, aspect, f"at {at}")
+        rss, deviation = (np.sqrt(np.sum(part[0, :, 0] ** 2)) for part in (there.worst_case, there.deviation))
         yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
         yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
         for j, joint in enumerate(found.plays):
-            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", own.worst_case[k, j, top], unit)
+            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", there.worst_case[0, j, 0], unit)

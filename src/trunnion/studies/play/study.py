@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
@@ -45,13 +46,15 @@ from trunnion.solve import shifts
 from trunnion.solve.backward import under
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
+from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
-from trunnion.studies.play.exact import beyond_first_order, figures_with, on_other_links, one_sided
-from trunnion.studies.play.result import dataset, relied_on
+from trunnion.studies.play.exact import beyond_first_order, figures_with
+from trunnion.studies.play.result import EXTREMES, dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +62,7 @@ if TYPE_CHECKING:
 __all__ = ["Effect", "by_duals", "by_virtual_load", "play", "plays", "variance"]
 
 CHUNK = 4096  # positions at a time
-EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
+LOCATED = Accuracy(1e-6, 1e-9, shortest=1e-7, rounds=16)  # of the worst case, which is of first order
 
 Array = NDArray[np.float64]
 Loads = dict[str, list[Vector]]  # load at each end, by joint
@@ -167,12 +170,13 @@ def play(
     _check(known)
     if at is None:
         effect = _over(run, found, known, run.cycle.times(steps if run.cycle.duration > 0 else 1), progress)
-        effect = replace(effect, extremes=_extremes(run, found, known))
+        effect = replace(effect, there=_theres(run, found, known))
     else:
         value, timed = place_of(mechanism, at)
         there = plan(run, [replace(found[0], at=value, over=None, timed=timed)], 1)
         found = [replace(one, at=None) for one in found]
         effect = _over(run, found, known, there.times, progress)
+        effect = replace(effect, there={one.name: _over(run, [one], known, there.times) for one in found})
     return dataset(effect, [*_model_findings(run, effect), *told])
 
 
@@ -203,30 +207,45 @@ def _covered(run: Run, measure: Measure) -> bool:
     return (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
 
 
-def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play]) -> dict[str, Effect]:
-    """What play does to a maximum or minimum: at its place in the mechanism with every pin in the middle of its hole;
-    and to a measure at a stated place.
+def _theres(run: Run, measures: Sequence[Measure], known: Mapping[str, Play]) -> dict[str, Effect]:
+    """What play does to each measure at its place, that of a maximum or minimum with every pin in the middle.
 
     To first order an extreme changes as its course does there: where the course turns back, to move along it does
-    nothing. One at a break of its course changes as the break moves too. None of a course that does not change.
+    nothing. One at a break of its course changes as the break moves too.
     """
     found = {}
     for measure in measures:
         if measure.at is not None:
             found[measure.name] = _over(run, [measure], known, plan(run, [measure], 1).times)
-        if measure.rule not in EXTREMES:
-            continue
-        many = Many(run, [measure], run.values, lambda some: NumpyKernel(run, some, FrictionMethod()))
-        time = many.times[measure.name]
-        if not np.isfinite(time):
-            continue
-        time = time % run.cycle.duration if run.cycle.periodic else time
-        there = _over(run, [measure], known, np.array([time]))
-        if measure.kind not in MOTIONS:
-            loads, others = _both(run, known, partial(of_figure, many, measure))
-            _put(there, 0, loads, slice(None), np.ones(1, bool), others)
-        found[measure.name] = replace(there, figure=partial(figures_with, many, measure))
+        elif measure.rule in EXTREMES:
+            many = Many(run, [measure], run.values, lambda some: NumpyKernel(run, some, FrictionMethod()))
+            time = many.times[measure.name] % (run.cycle.duration if run.cycle.periodic else np.inf)
+            there = _over(run, [measure], known, np.array([time if np.isfinite(time) else 0.0]))
+            if measure.kind not in MOTIONS:
+                loads, others = _both(run, known, partial(of_figure, many, measure))
+                _put(there, 0, loads, slice(None), np.ones(1, bool), others)
+            found[measure.name] = replace(there, figure=partial(figures_with, many, measure))
+        else:
+            found[measure.name] = _over(run, [measure], known, np.array([_largest(run, measure, known)]))
     return found
+
+
+def _largest(run: Run, measure: Measure, known: Mapping[str, Play]) -> float:
+    """Time, s, of the largest worst case of a measure in the cycle, away from dead centres if it is anywhere else."""
+    cycle = run.cycle
+    if cycle.duration <= 0:
+        return 0.0
+
+    def look(time: Array) -> tuple[Array, NDArray[np.intp]]:
+        effect = _over(run, [measure], known, time)
+        return effect.total, effect.status.astype(np.intp)
+
+    breaks = breaks_between(cycle, np.array([bend.time for bend in run.bends]))
+    courses = Courses.of(in_blocks(look, len(run.system.joints)), breaks, None, accuracy_of(cycle, LOCATED))
+    sound = courses.states < Status.NEAR_SINGULAR
+    floor = scales_of(run).floor(measure.unit(run.system))
+    place = courses.extreme(lambda rows: rows[0], 1.0, sound if np.any(sound) else None, floor)
+    return 0.0 if place is None or place.everywhere else place.time
 
 
 def _check(known: Mapping[str, Play]) -> None:
@@ -346,12 +365,9 @@ def _model_findings(run: Run, effect: Effect) -> Iterator[Finding]:
         yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
     yield from _fits(run, effect.plays)
     yield from _limits(run, effect)
-    yield from _places(run, effect)
-    for i in range(len(effect.measures)):
-        yield from list(one_sided(*effect.of(i))) or _idle(run, effect, i)
-    for i in range(len(effect.measures)):
-        yield from on_other_links(*effect.of(i))
-        yield from beyond_first_order(*effect.of(i))
+    for i, measure in enumerate(effect.measures):
+        yield from _idle(run, effect, i)
+        yield from beyond_first_order(effect.there[measure.name])
     dial = run.system.dial(run.values, effect.time)
     for code in Status:
         where = np.flatnonzero(effect.status == code)
@@ -404,47 +420,16 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
 
 def _limits(run: Run, effect: Effect) -> Iterator[Finding]:
     """Measures whose worst case is above their limit, and those that keep theirs."""
-    dial = run.system.dial(run.values, effect.time)
-    for measure, total in zip(effect.measures, relied_on(effect.total, effect.status), strict=True):
-        if measure.limit is not None and np.any(np.isfinite(total)):
-            top = int(np.nanargmax(total))
-            over = np.flatnonzero(total > measure.limit)
-            where = dial.intervals(over) if len(over) else ""
-            yield _against(run, measure, measure.limit, total[top], dial.at(top), where)
-
-
-def _limit_at(run: Run, measure: Measure, worst: float, at: str) -> Iterator[Finding]:
-    """The same of a measure of one place."""
-    sides = [side for side in (measure.upper, measure.lower) if side is not None]
-    if sides and np.isfinite(worst):
-        yield _against(run, measure, min(map(abs, sides)), worst, at)
-
-
-def _against(run: Run, measure: Measure, limit: float, worst: float, at: str, over: str = "") -> Finding:
-    unit, where = measure.unit(run.system), f"measures.{measure.name}.limit"
-    factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-    figures: dict[str, Any] = {"worst": factor * worst, "limit": factor * limit, "unit": shown, "at": at}
-    if worst <= limit:
-        return finding_for("limit.kept", where, **figures)
-    if over:
-        return finding_for("limit.exceeded", where, **figures, over=over)
-    return finding_for("limit.exceeded_there", where, **figures)
-
-
-def _places(run: Run, effect: Effect) -> Iterator[Finding]:
-    """What play does at the place that a measure states, or where its extreme is: the result has the whole cycle."""
     for measure in effect.measures:
-        if measure.name not in effect.extremes:
+        there, unit, where = effect.there[measure.name], measure.unit(run.system), f"measures.{measure.name}.limit"
+        sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
+        placed = measure.at is not None or measure.rule in EXTREMES
+        limit, worst = min(sides) if placed and sides else measure.limit, float(there.total[0, 0])
+        if limit is None or not np.isfinite(worst):
             continue
-        there, unit, where = effect.extremes[measure.name], measure.unit(run.system), f"measures.{measure.name}"
-        worst = float(relied_on(there.total[0], there.status)[0])
-        at = run.system.dial(run.values, there.time).at(0)
-        told: dict[str, Any] = {"measure": measure.name, "at": at, "worst": worst, "unit": unit}
-        if measure.at is not None:
-            yield finding_for("play.at_a_place", f"{where}.at", **told)
-        else:
-            yield finding_for("play.at_an_extreme", where, statistic=measure.rule, **told)
-        yield from _limit_at(run, measure, worst, at)
+        factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
+        code, at = "limit.kept" if worst <= limit else "limit.exceeded", run.system.dial(run.values, there.time).at(0)
+        yield finding_for(code, where, worst=factor * worst, limit=factor * limit, unit=shown, at=at)
 
 
 def _idle(run: Run, effect: Effect, i: int) -> Iterator[Finding]:

@@ -39,16 +39,19 @@ def figure(result: xr.Dataset, measures: Sequence[int] | None = None) -> Figure:
     chosen = range(len(names))[:MOST_PANELS] if measures is None else measures
     sheet = new("Effect of the play of the joints", result, height=1.0 + PANEL * len(chosen))
     units, limits = units_along(result["value"], "measure"), attribute(result, "limits")
+    places = attribute(result, "places")
     panels = sheet.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
     for i, axes in zip(chosen, panels, strict=True):
-        _panel(axes, result.isel(measure=i), over, str(names[i]), units[i], limits[i])
+        _panel(axes, result.isel(measure=i), over, str(names[i]), units[i], limits[i], " at ".join(places[i]).strip())
         shade(axes, result, over)
         if axes is not panels[-1]:
             axes.set_xlabel("")
     return sheet
 
 
-def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str, limit: float | None) -> None:
+def _panel(
+    axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str, limit: float | None, place: str
+) -> None:
     rows, total, rss = (result[key].values for key in ("worst_case", "worst_case_total", "rss"))
     most, shown = float(np.nanmax(total, initial=0.0)), usual_peak(ease(result), total)
     factor, label = prefixed(shown, unit)
@@ -70,10 +73,9 @@ def _panel(axes: Axes, result: xr.Dataset, over: Abscissa, name: str, unit: str,
     axes.plot(x, lanes[-1], color=INK, linewidth=1.2, linestyle=(0, (5, 2)), label="RSS")
     if limit is not None:
         axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
-    if "extreme_worst_case" in result and np.isfinite(there := float(np.sum(result["extreme_worst_case"].values))):
-        # the curve is of the whole course with the pins held where it is, the figure of this place, which they may move
-        label = "of the extreme, at its place"
-        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label=label, clip_on=False)
+    if np.isfinite(there := float(np.sum(result["extreme_worst_case"].values))):
+        # of an extreme the curve has the pins where they are, the figure also this place, which they may move
+        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label=plain(place), clip_on=False)
     axes.set_ylim(bottom=0.0)
     frame_peak(axes, most, shown, factor, unit)
     legend(axes)

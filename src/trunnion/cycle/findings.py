@@ -196,8 +196,7 @@ def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
     """Drivers whose periods have no common multiple."""
     run, drivers = cycle.run, cycle.mechanism.drivers
     spans = [run.system.span(run.values, name) for name in drivers]
-    threads = any(PAIRS[kind].threaded for kind, _ in run.system.joints.values())
-    several = len(spans) > 1 or cycle.mechanism.gears or threads
+    several = len(spans) > 1 or cycle.mechanism.gears or run.cycle.advances
     if several and not run.cycle.periodic and spans and all(span.periodic for span in spans):
         whom = "drivers" if len(spans) > 1 else f"driver and the {'gears' if cycle.mechanism.gears else 'threads'}"
         yield finding_for("cycle.not_common", "drivers", duration=run.cycle.duration, phrases={"whom": whom})

@@ -21,6 +21,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
 from trunnion.dynamics.touching import Contacts, Onset
+from trunnion.errors import Finding, MechanismError
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
@@ -98,7 +99,15 @@ class FreeMotion:
 
     @classmethod
     def of(cls, run: Run, contacts: Contacts | None = None, passing: bool = False) -> Self:
-        """The free motion of a prepared mechanism."""
+        """The free motion of a prepared mechanism.
+
+        Raises MechanismError where the links do not come back with the drivers, as of a nut, and no range says how far
+        they go: what is known of the way is that of one period.
+        """
+        if run.cycle.advances:
+            what = "the links do not come back with the driver, as a nut goes on along its thread"
+            where, remedy = next(iter(run.system.mechanism.drivers)), "state how far it goes: range: [0 turn, 20 turn]"
+            raise MechanismError(Finding(what, f"drivers.{where}.range", remedy))
         free = drives(run.system, run.values)
         assembly = follows(run, len(free) > 1, passing)
         return cls(run, free, assembly, contacts=contacts or Contacts(), passing=passing)

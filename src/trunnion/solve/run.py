@@ -184,14 +184,19 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
     if any(turns.values()):
         cycle = system.cycle(values, turns, free)
         run = Run(system, values, cycle, choose(system, values, cycle))
-    return run if _comes_back(run) else replace(run, cycle=replace(cycle, periodic=False))
+    if not _comes_back(run):
+        cycle = replace(cycle, periodic=False, advances=True)
+        run = Run(system, values, cycle, choose(system, values, cycle))
+    return run
 
 
 def _comes_back(run: Run) -> bool:
     """Whether the links are after a period of the drivers where they were, as they are not where a nut goes on."""
     if not (run.cycle.periodic and any(PAIRS[kind].threaded for kind, _ in run.system.joints.values())):
         return True
-    walk, size = run.walk(np.array([0.0, run.cycle.duration])), float(np.max(primal(run.system.size(run.values))))
+    # up to just before the end: there a track begins again
+    walk = run.walk(run.cycle.duration * np.array([0.0, 1 - 1e-9]))
+    size = float(np.max(primal(run.system.size(run.values))))
     places = [np.broadcast_to(np.asarray(part, float), 2) for one in walk.motions.values() for part in one.frame.place]
     return not np.any(np.abs(np.diff(places)) > COMES_BACK * size)
 

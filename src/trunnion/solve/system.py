@@ -92,11 +92,13 @@ class Place:
 @dataclass(frozen=True)
 class Cycle:
     """One period or range of the drivers: how long it takes, s, whether its end is its start again, and the most
-    turns that a driver makes in it, at its largest rate."""
+    turns that a driver makes in it, at its largest rate. advances: whether drivers come back and the links do not, as
+    of a nut on its thread."""
 
     duration: float
     periodic: bool
     turns: float = 1.0
+    advances: bool = False
 
     def times(self, steps: int) -> np.ndarray:
         """`steps` equally spaced times, s; the end is left out where it repeats the start."""

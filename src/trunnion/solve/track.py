@@ -359,16 +359,9 @@ class Track:
     ) -> Any:
         """Pose by Newton from the track; NaN in the lanes that left its branch."""
         moment = primal(self.clock.nominal(walk, time))
-        passed, laps = moment, 0.0
-        if self.periodic:
-            moment = np.mod(moment, self.times[-1])
-            laps = (passed - moment) / self.times[-1]
+        moment = np.mod(moment, self.times[-1]) if self.periodic else moment
         near = np.clip(np.searchsorted(self.times, moment), 1, len(self.times) - 1) if len(self.times) > 1 else 0
         guess = [_interpolated(self.times, row, moment, near) for row in self.coordinates]
-        if self.periodic:  # a thread goes on with every turn of its nut
-            gains = np.nan_to_num(self.coordinates[:, -1] - self.coordinates[:, 0])
-            turned = zip(guess, gains.tolist(), group.kept_kinds, strict=True)
-            guess = [q + laps * gain if kind == "turn" and gain else q for q, gain, kind in turned]
         drive = list(drive)
         for slot, row in self.turns.items():
             drive[slot] = _interpolated(self.times, row, moment, near)

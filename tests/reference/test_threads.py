@@ -75,9 +75,8 @@ def test_a_motion_of_a_nut_asks_for_the_end_of_its_way(direct: bool) -> None:
 def test_a_load_of_a_nut_acts_where_the_nut_is_after_some_turns() -> None:
     """½ J ω² of the screw lifts the table to where the load acts, and against it: h = h₀ + (E − m g h₀)/(m g + F)."""
     inertia, speed = 0.02, 50.0
-    driver = {
-        "speed": -speed, "free": True, "initial": {"speed": -speed}, "range": ["0 turn", "-50 turn"], "motor": {"kind": "constant", "effort": 0.0},
-    }  # fmt: skip
+    driver: dict[str, Any] = {"speed": -speed, "free": True, "initial": {"speed": -speed}}
+    driver |= {"range": ["0 turn", "-50 turn"], "motor": {"kind": "constant", "effort": 0.0}}
     model = lift(driver).data()
     model["links"]["screw"]["inertia"] = dict.fromkeys(("xx", "yy", "zz"), inertia)
     model["links"]["screw"]["mass"] = 1e-9

@@ -16,8 +16,7 @@ from mechanisms_parts import Data, plunger, revolute
 from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
-from trunnion.cycle.locking_course import LockingCourse, locking_course
-from trunnion.cycle.locking_states import NO_MARGIN
+from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL

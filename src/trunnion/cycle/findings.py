@@ -1,7 +1,7 @@
 """What is to be known of a mechanism over its cycle: a list of questions, each of them a small function.
 
 What concerns the cycle is read of courses, so that it does not depend on which positions were asked for; causes of
-positions without an answer are those of the positions (`diagnosis`).
+positions without an answer are those of the positions (`causes`).
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis
+from trunnion.cycle import contact_loss
 from trunnion.cycle.course import CycleCourse, magnitude
-from trunnion.cycle.locking_course import LockingCourse, locking_course
+from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.means import Means
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
@@ -32,9 +32,7 @@ from trunnion.results.quantities import quantity, readable
 from trunnion.results.sentences import finding_for
 from trunnion.solve import loads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
-from trunnion.solve.memory import in_blocks
 from trunnion.solve.seating import seating_of
-from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -46,6 +44,8 @@ Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
+CLASS_TWO = 2
+NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
@@ -82,14 +82,10 @@ class Cycle:
         run = self.run
 
         def rows(time: Array) -> tuple[Array, NDArray[np.intp]]:
-            numbers = look(time if run.cycle.duration > 0 else 0.0 * time)
+            numbers = look(time)
             return np.array([np.broadcast_to(primal(row), time.shape) for row in numbers]), np.zeros(time.shape, int)
 
-        bends = np.array([bend.time for bend in run.bends])
-        breaks = breaks_between(run.cycle, bends) if run.cycle.duration > 0 else np.array([0.0, 1.0])
-        with np.errstate(all="ignore"):
-            in_parts = in_blocks(rows, len(run.system.joints))
-            return Courses.of(in_parts, breaks, None, accuracy_of(run.cycle, Accuracy()))
+        return run.courses(rows)
 
     def place(self, *times: float) -> str:
         """One time, s, or the range between two, on the dial of the drive."""
@@ -172,16 +168,109 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
 
 
-def _without_answer(cycle: Cycle) -> list[Finding]:
-    """Why positions have no answer."""
-    run, at, scales, units = cycle.run, cycle.at, scales_of(cycle.run), effort_units(cycle.run.system)
-    efforts = {}
-    for i, (name, unit) in enumerate(zip(cycle.mechanism.drivers, units, strict=True)):
-        lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
-        efforts[name] = lower, upper, unit
-    status, condition, margin = (at.arrays[name] for name in ("status", "condition", "locking_margin"))
-    joints = felt(run.system, run.values)
-    return diagnosis.findings(at.causes, at.dial, status, condition, efforts, margin, scales, cycle.locking, joints)
+def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
+    """Modules that do not close, and by how much."""
+    dial, mechanism = cycle.at.dial, cycle.mechanism
+    for (number, *reasons), (places, sizes) in sorted(cycle.at.causes.of("open").items(), key=lambda item: item[0][0]):
+        module, at = cycle.run.system.plan.modules[number], dial.intervals(places)
+        everywhere, where = len(places) == len(dial.values) > 1, f"links {', '.join(module.links)}"
+        if reasons:
+            gaps = {reason: np.nanmax(row) for reason, row in zip(reasons, sizes, strict=True) if np.any(row > 0)}
+            yield finding_for("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
+        else:
+            yield finding_for(
+                "assembly.open", where, at=at, everywhere=everywhere, redundant=bool(module.redundant),
+                errors=mechanism.has_errors, start=bool(np.any(places == 0)),
+            )  # fmt: skip
+
+
+def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
+    """Where only the travel of seats decides the sense of a friction."""
+    for places, _ in cycle.at.causes.of("stuck").values():
+        places = places[cycle.at.arrays["status"][places] == Status.ZERO_SLIP]
+        if len(places):
+            yield finding_for("friction.sense", "joints", at=cycle.at.dial.intervals(places))
+
+
+def _singular(cycle: Cycle) -> Iterator[Finding]:
+    """Modules that are singular."""
+    condition = cycle.at.arrays["condition"]
+    for number, (places, _) in cycle.at.causes.of("singular").items():
+        module = cycle.run.system.plan.modules[number]
+        kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
+        yield finding_for(
+            "position.singular", f"links {', '.join(module.links)}", at=cycle.at.dial.intervals(places),
+            condition=_most(condition[places]), phrases={"kind": kind},
+        )  # fmt: skip
+
+
+def _undefined(cycle: Cycle) -> Iterator[Finding]:
+    """Loads and springs that have no value."""
+    for path, (places, _) in cycle.at.causes.of("undefined").items():
+        code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
+        yield finding_for(code, path, at=cycle.at.dial.intervals(places))
+
+
+def _locked(cycle: Cycle) -> Iterator[Finding]:
+    """Modules that lock: how far they are from running, the joint that decides, and whether they lock backward too."""
+    rubs = felt(cycle.run.system, cycle.run.values)
+    for number, (places, share) in cycle.at.causes.of("locked").items():
+        module = cycle.run.system.plan.modules[number]
+        reverse, decides, multiple = "", "", None
+        if cycle.locking is not None:
+            states, responsible = cycle.locking.all_states(), cycle.locking.responsible
+            if LockingState.JAMMED in states:
+                reverse = "some" if LockingState.LOCKED in states else "all"
+            if responsible and responsible[0] in module.joints:
+                decides, multiple = responsible
+        yield finding_for(
+            "friction.locked", f"links {', '.join(module.links)}", at=cycle.at.dial.intervals(places),
+            share=np.min(share), joints=[name for name in module.joints if name in rubs], reverse=reverse,
+            decides=decides, multiple=multiple,
+            whole=float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf)),
+        )  # fmt: skip
+
+
+def _badly_solved(cycle: Cycle) -> Iterator[Finding]:
+    """Positions whose friction does not converge, and such as are close to singular."""
+    status, condition, dial = cycle.at.arrays["status"], cycle.at.arrays["condition"], cycle.at.dial
+    if len(late := np.flatnonzero(status == Status.NOT_CONVERGED)):
+        yield finding_for("friction.not_converged", "joints", at=dial.intervals(late))
+    if len(close := np.flatnonzero(status == Status.NEAR_SINGULAR)):
+        yield finding_for(
+            "position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close])
+        )
+
+
+def _most(values: Array) -> float:
+    """The largest; ∞ if any has no value."""
+    return float(np.max(values)) if len(values) and np.all(np.isfinite(values)) else np.inf
+
+
+def _resting(cycle: Cycle) -> Iterator[Finding]:
+    """Joints at rest, those that are at the same positions as one, and the interval of the efforts there."""
+    system, at, scales = cycle.run.system, cycle.at, scales_of(cycle.run)
+    holding = {*felt(system, cycle.run.values), *system.resisted}  # without friction either way is the same
+    together: dict[bytes, tuple[list[str], NDArray[np.intp]]] = {}
+    for joint, (places, _) in at.causes.of("rest").items():
+        if joint in holding:
+            together.setdefault(places.tobytes(), ([], places))[0].append(joint)
+    for joints, places in together.values():
+        widest: dict[str, dict[str, float | str]] = {}
+        matters = not cycle.mechanism.drivers
+        for i, (driver, unit) in enumerate(zip(cycle.mechanism.drivers, effort_units(system), strict=True)):
+            lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
+            widths, largest = (upper - lower)[places], np.nanmax(np.abs([lower, upper]), initial=0.0)
+            least = max(NEGLIGIBLE * largest, scales.floor(unit))
+            matters |= bool(np.any(np.isnan(widths) | (widths > least)))
+            if np.any(np.isfinite(widths)):
+                k = places[int(np.nanargmax(widths))]
+                widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {at.dial.at(k)}"}
+        if matters:
+            yield finding_for(
+                "friction.interval", f"joints.{', '.join(joints)}", joints=joints, at=at.dial.intervals(places),
+                efforts=widest, locks=bool(cycle.mechanism.drivers),
+            )  # fmt: skip
 
 
 def _ranges(cycle: Cycle) -> Iterator[Finding]:
@@ -383,6 +472,7 @@ def _between(one: int, other: int, count: int) -> NDArray[np.intp]:
 
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
-    _of_the_model, _without_answer, _ranges, _no_common_period, _driving_resistances, _springs, _idle_loads,
-    _beside_gaps, _moved_jumps, _uncounted_work, _lost_contacts,
+    _of_the_model, _not_assembled, _undecided_senses, _singular, _undefined, _locked, _badly_solved, _resting,
+    _ranges, _no_common_period, _driving_resistances, _springs, _idle_loads, _beside_gaps, _moved_jumps,
+    _uncounted_work, _lost_contacts,
 )  # fmt: skip

@@ -171,7 +171,7 @@ def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         return
     if cycle.locking and (margin := cycle.locking.margin_figure()):
         yield margin
-        decides = cycle.locking.responsible()
+        decides = cycle.locking.responsible
         yield from [] if decides is None else [critical_figure(cycle.run, *decides, margin.place)]
     means = course.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")

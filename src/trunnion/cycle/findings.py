@@ -31,8 +31,10 @@ from trunnion.model.units import KINDS
 from trunnion.results.quantities import quantity, readable
 from trunnion.results.sentences import finding_for
 from trunnion.solve import loads
+from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
-from trunnion.solve.seating import seating_of
+from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
+from trunnion.solve.seating import UNSETTLED, seating_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
@@ -49,7 +51,9 @@ NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effor
 MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
-MOST_PLACES = 3  # named in one sentence
+MOST_PLACES = 6  # named in one sentence
+APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
+ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")  # by the place of an end
 JUMP = 0.2  # of the largest effort: what changes by more at a break jumps there
 ALIKE = 0.5  # of a jump: another that differs by less may be the same elsewhere
 NEAR = 1 / 8  # of the cycle: how far a jump is moved at most
@@ -91,6 +95,17 @@ class Cycle:
         """One time, s, or the range between two, on the dial of the drive."""
         dial = self.run.system.dial(self.run.values, np.array([*times, self.run.cycle.duration]))
         return dial.at(0) if len(times) == 1 else f"between {dial.at(0)} and {dial.at(1)}"
+
+    def between(self, low: float, high: float) -> str:
+        """A range, s, as one place if its ends read alike."""
+        return f"at {self.place(low)}" if self.place(low) == self.place(high) else self.place(low, high)
+
+
+def listed(places: Sequence[str]) -> str:
+    """Places in words, in their order; of many how often, and the first and the last."""
+    if len(places) <= MOST_PLACES:
+        return ", ".join(places)
+    return f"{len(places)} times, first {places[0]}, last {places[-1]}"
 
 
 def findings(cycle: Cycle) -> list[Finding]:
@@ -312,8 +327,7 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
         ends = np.flatnonzero(np.diff(np.concatenate([[0], below, [0]]).astype(int)))
         places = [cycle.place(*cut.edges[pair]) for pair in ends.reshape(-1, 2)]
         if places:
-            more = f" and in {len(places) - MOST_PLACES} more places" * (len(places) > MOST_PLACES)
-            yield finding_for("load.drives", path, at=", ".join(places[:MOST_PLACES]) + more)
+            yield finding_for("load.drives", path, at=listed(places))
 
 
 def _springs(cycle: Cycle) -> Iterator[Finding]:
@@ -414,12 +428,73 @@ def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
             yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))
 
 
-def _lost_contacts(cycle: Cycle) -> Iterable[Finding]:
-    """Pins that lose contact."""
-    at = cycle.at
-    if not cycle.run.seats:
-        return ()
-    return contact_loss.findings(at.arrays, seating_of(cycle.run, at.method), at.time, at.dial)
+def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
+    """Pins that lose contact, those that do at the same places as one, and pins that nothing presses."""
+    run, at = cycle.run, cycle.at
+    if not run.seats:
+        return
+    seating = seating_of(run, at.method)
+    loads, joints = seating.loads, list(run.system.joints)
+    yield from _unloaded(cycle, loads)
+    lost: dict[tuple[str, str], list[str]] = {}
+    lifted: dict[tuple[str, str], list[str]] = {}
+    for seat in run.seats:
+        joint, part = seat.joint, "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
+        crossings = [cross for cross in loads.passages if cross.end.seat.joint == joint]
+        halts = [
+            (halt.low, halt.high) for halt in seating.halts
+            if halt.joint == joint and not any(halt.low <= cross.high and cross.low <= halt.high for cross in crossings)
+        ]  # fmt: skip
+        if crossings:
+            places = [f"at {cycle.place(cross.time)}{ENDS[cross.end.place]}" for cross in crossings]
+            lost.setdefault((part, listed(places)), []).append(joint)
+        elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
+            yield finding_for("seat.unloaded", f"joints.{joint}", part=part)
+        if halts:
+            spans = _joined(halts, APART * run.cycle.duration)
+            lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
+    for (part, places), names in lost.items():
+        nearest = min(
+            (cross for cross in loads.passages if cross.end.seat.joint in names),
+            key=lambda cross: cross.least / cross.peak,
+        )
+        least = nearest.least if nearest.least > NO_LOAD * nearest.peak else 0.0  # less than that is rounding
+        numbers, number, turning = at.arrays["contact_loss_number"][[joints.index(name) for name in names]], None, ""
+        if part == "pin" and np.any(np.isfinite(numbers)):  # the load of a slider has no direction that can turn
+            number = np.nanmax(numbers)
+            turning = f"at {at.dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
+        yield finding_for(
+            "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=places,
+            likely=contact_loss.EARLES_WU, number=number, turning=turning, count=len(names),
+        )  # fmt: skip
+    for (part, places), names in lifted.items():
+        yield finding_for("contact.lifted", f"joints.{', '.join(names)}", part=part, at=places, count=len(names))
+    unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
+    for i in np.flatnonzero(np.any(unsettled, axis=1)):
+        intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
+        change = np.max(at.arrays["seat_change"][unsettled[i]])
+        yield finding_for("seat.unsettled", f"joints.{joints[i]}", rounds=SEAT_ROUNDS, at=intervals, change=change)
+
+
+def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
+    """The joints that bear no load over a range, with the end that does not where the other does."""
+    ranges: dict[str, dict[str, str]] = {}
+    for end, low, high in loads.idle:
+        ends = ranges.setdefault(cycle.between(low, high), {})
+        ends[end.seat.joint] = "" if end.seat.joint in ends else ENDS[end.place]
+    for text, ends in ranges.items():
+        yield finding_for("contact.unloaded", "joints", joints=[name + end for name, end in ends.items()], at=text)
+
+
+def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[float, float]]:
+    """Times from and to, s, in their order; those that are hardly apart as one."""
+    joined: list[tuple[float, float]] = []
+    for low, high in sorted(spans):
+        if joined and low - joined[-1][1] <= apart:
+            joined[-1] = joined[-1][0], max(joined[-1][1], high)
+        else:
+            joined.append((low, high))
+    return joined
 
 
 def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:

@@ -282,7 +282,8 @@ class LockingCourse:
         def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
             back = run.solve(time, method=plain)
             ahead, other = Passage.of(back), reverse(run, back.walk, plain)
-            status, locked = status_of(back, time.shape), ahead.locked
+            status: NDArray[np.integer] = status_of(back, time.shape)
+            locked = ahead.locked
             if seated is not None:  # where it locks pins are in their seats
                 status = seated.status[seated.courses.panels_of(time)]
                 locked = status == Status.LOCKED

@@ -125,7 +125,7 @@ class Seating:
     def sticks(self, time: Array) -> NDArray[np.bool_]:
         """Where the travel of the seats turns round the sense of a joint."""
         time = self._within(time)
-        return np.any((self.turned[0] <= time[:, None]) & (time[:, None] < self.turned[1]), axis=1)
+        return np.asarray(np.any((self.turned[0] <= time[:, None]) & (time[:, None] < self.turned[1]), axis=1))
 
     def offsets(self, time: Array) -> dict[str, Array]:
         """Where the pins lie at times, s, m, by the names of `shifts`."""

@@ -27,6 +27,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
+from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
 from trunnion.results.quantities import quantity, readable
 from trunnion.results.sentences import finding_for
@@ -40,7 +41,7 @@ from trunnion.solve.system import System, felt, rubbing
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "model_notes"]
+__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed", "model_notes", "shared_dimensions"]
 
 Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
@@ -178,6 +179,28 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
         seatable = [name for name in playing if name not in held]
         notes.append(finding_for("model.play_centred", "joints", joints=playing, seatable=seatable))
     return notes
+
+
+def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
+    """Of each toleranced dimension that alone sets points of more than one link: as one they vary together, as parts do
+    not.
+
+    Where it stands beside other dimensions, as the radius of a roller between two links does, it is one part's own.
+    """
+    placed = [
+        (path, entry.depends)
+        for path, entry in mechanism.parameter_set.entries.items()
+        if path.startswith("links.") and ".points." in path
+    ]
+    for tolerance in tolerated(mechanism):
+        used = [path for path, depends in placed if depends == (tolerance.path,)]
+        links = list(dict.fromkeys(path.split(".")[1] for path in used))
+        if tolerance.path.startswith("dimensions.") and len(links) > 1:
+            name = tolerance.path.removeprefix("dimensions.")
+            shown = [path.removeprefix("links.").replace(".points.", ".") for path in used]
+            more = f" and {len(shown) - MOST_PLACES} more" if len(shown) > MOST_PLACES else ""
+            phrases = {"shown": ", ".join(shown[:MOST_PLACES]) + more}
+            yield finding_for("tolerance.shared_dimension", tolerance.path, phrases=phrases, name=name, links=links)
 
 
 # ---- assembly, locking and singular positions -----------------------------------------------------------------

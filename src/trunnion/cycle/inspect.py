@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import shared_dimensions
-from trunnion.cycle.findings import Cycle, findings
+from trunnion.cycle.findings import Cycle, findings, shared_dimensions
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity
@@ -77,7 +76,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
         found.append(finding_for("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
-    found += [*shared_dimensions.findings(mechanism), *_unplaced(run)]
+    found += [*shared_dimensions(mechanism), *_unplaced(run)]
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,18 +13,32 @@ from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, course_of
 from trunnion.cycle.cycle_kernel import CycleKernel, compiles
 from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors, labels, unwrap
-from trunnion.cycle.kept import needed
 from trunnion.cycle.means import Means, unknown
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.names import nearest
+from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import SETTLED, seating_of
-from trunnion.solve.system import Dial, Values
+from trunnion.solve.system import Dial, System, Values
 
-__all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
+__all__ = ["ALL", "Arrays", "Kept", "Positions", "check_steps", "positions", "stretch"]
 
 
+NUMBERS = ("float64", "float32")
+# what summary and findings are made of
+BOOKS = {
+    "condition", "drive_effort", "drive_power", "friction_iterations", "friction_power", "joint_slide",
+    "locking_margin", "power_residual", "reaction_force", "reaction_moment", "spring_elongation", "spring_power",
+    "status", "useful_power",
+}  # fmt: skip
+# what makes an angle run on over whole turns
+TURNED = {
+    "joint_rotation": ("joint_rotation_velocity", "link_angle", "link_angle_velocity"),
+    "link_angle": ("link_angle_velocity",),
+}
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
 
 
@@ -32,6 +46,48 @@ def check_steps(steps: int) -> None:
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
         remedy = f"give a whole number from 1 to {MOST_STEPS:,}, for all positions are held in memory"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
+
+
+@dataclass(frozen=True)
+class Kept:
+    """variables: names of `results.VARIABLES`, all if not given; the status is always kept. dtype: of the floats."""
+
+    variables: tuple[str, ...] | None = None
+    dtype: str = "float64"
+
+    @classmethod
+    def read(cls, variables: Sequence[str] | None, dtype: str) -> Kept:
+        """What somebody asks for; MechanismError for a name or a kind of number that there is not."""
+        if dtype not in NUMBERS:
+            what = f"results are not kept as '{dtype}'"
+            raise MechanismError(Finding(what, "dtype", f"use {' or '.join(NUMBERS)}"))
+        if isinstance(variables, str):
+            variables = [variables]
+        for name in variables or ():
+            if name not in results.VARIABLES:
+                remedy = nearest(str(name), list(results.VARIABLES))
+                raise MechanismError(Finding(f"a result has no variable '{name}'", "variables", remedy))
+        return cls(None if variables is None else (*dict.fromkeys([*variables, "status"]),), dtype)
+
+    @property
+    def margin(self) -> bool:
+        """Whether the locking margin is to be found, which may take longer than all else."""
+        return self.variables is None or "locking_margin" in self.variables
+
+
+ALL = Kept()
+
+
+def needed(wanted: Collection[str], system: System, erring: bool) -> set[str]:
+    """The variables that have to be found for those that are wanted and for the books of the cycle."""
+    found = {*wanted, *BOOKS}
+    if erring:
+        parts = {name for name, one in results.VARIABLES.items() if one.part}
+        found |= {*parts, *COMPARED}
+    found |= {results.SAME_AS[name] for name in found & results.SAME_AS.keys()}
+    if any(PAIRS[kind].threaded for kind, _ in system.joints.values()):  # a screw's slide follows its rotation
+        found.add("joint_rotation")
+    return found | {other for name in found & TURNED.keys() for other in TURNED[name]}
 
 
 @dataclass(frozen=True)
@@ -102,7 +158,7 @@ def stretch(
             progress(window.stop)
     quick, seating = replace(method, margin_up_to=0.0), seating_of(run, method) if run.seats else None
     resting = {joint: places for joint, (places, _) in causes.of("rest").items()}
-    resting_joints.bracket(arrays, run, time, quick, resting, seating.offsets(time) if seating else {})
+    resting_joints.bracket(arrays, run, time, quick, resting, seating)
     if seating:
         contact_loss.find(arrays, seating, time)
     unwrap(arrays, run.system, run.values, time)

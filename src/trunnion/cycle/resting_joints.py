@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.panels import POINTS
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
+from trunnion.solve.seating import Seating
 
 __all__ = ["bracket"]
 
@@ -36,12 +37,12 @@ def bracket(
     time: Array,
     method: FrictionMethod,
     resting: Mapping[str, NDArray[np.intp]],
-    seats: Mapping[str, Array],
+    seating: Seating | None,
 ) -> None:
     """Fill drive_effort_lower and drive_effort_upper.
 
     One resting joint at a position: the extremes over its resistance; several: their separate effects are added
-    (first order). resting: positions at which a joint does; seats: of the pins, by path, over all positions.
+    (first order). resting: positions at which a joint does; seating: where pins lie, if not in the middle.
     """
     if not resting or not run.system.mechanism.drivers:
         return  # both are the effort itself, or there is none
@@ -50,12 +51,12 @@ def bracket(
         for joint, positions in resting.items():
             for low in range(0, len(positions), LANES):
                 part = positions[low : low + LANES]
-                rests = _Resting(run, joint, time[part], {path: row[part] for path, row in seats.items()}, method)
+                rests = _Resting(run, joint, time[part], seating.offsets(time[part]) if seating else {}, method)
                 change, key = (
                     functools.partial(rests.change, sign),
                     ("resting", joint, sign, rests.time.tobytes(), method),
                 )
-                again = len(positions) <= FEW and not seats  # a few are asked for again and again
+                again = len(positions) <= FEW and not seating  # a few are asked for again and again
                 efforts[:, part] += run.once(key, change) if again else change()
 
 

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.cycle.findings import Cycle, effort_units, findings
-from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_course import critical_figure
 from trunnion.cycle.means import MOST_SUPPOSED, Means
 from trunnion.cycle.model_measures import Watched, watched
-from trunnion.cycle.positions import Positions
+from trunnion.cycle.positions import ALL, Kept, Positions
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.scene import COURSE, DRAWN, courses, planar, spatial
 from trunnion.errors import Status

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.cycle.positions import ALL, Kept, check_steps, positions
-from trunnion.cycle.summary import member_units, result_of, scene_of
+from trunnion.cycle.scene import scene_of
+from trunnion.cycle.summary import member_units, result_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords

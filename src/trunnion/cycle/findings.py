@@ -52,7 +52,7 @@ NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effor
 MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
-MOST_PLACES = 6  # named in one sentence
+MOST_PLACES = 8  # named in one sentence
 APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
 ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")  # by the place of an end
 JUMP = 0.2  # of the largest effort: what changes by more at a break jumps there
@@ -476,7 +476,7 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
         if halts:
             spans = _joined(halts, APART * run.cycle.duration)
             lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
-    for (part, places), names in lost.items():
+    for (part, text), names in lost.items():
         nearest = min(
             (cross for cross in loads.passages if cross.end.seat.joint in names),
             key=lambda cross: cross.least / cross.peak,
@@ -487,11 +487,11 @@ def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
             number = np.nanmax(numbers)
             turning = f"at {at.dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
         yield finding_for(
-            "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=places,
+            "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=text,
             likely=contact_loss.EARLES_WU, number=number, turning=turning, count=len(names),
         )  # fmt: skip
-    for (part, places), names in lifted.items():
-        yield finding_for("contact.lifted", f"joints.{', '.join(names)}", part=part, at=places, count=len(names))
+    for (part, text), names in lifted.items():
+        yield finding_for("contact.lifted", f"joints.{', '.join(names)}", part=part, at=text, count=len(names))
     unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
     for i in np.flatnonzero(np.any(unsettled, axis=1)):
         intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))

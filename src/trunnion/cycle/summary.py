@@ -12,10 +12,10 @@ from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.cycle.findings import Cycle, effort_units, findings
 from trunnion.cycle.locking_course import critical_figure
 from trunnion.cycle.means import MOST_SUPPOSED, Means
-from trunnion.cycle.model_measures import Watched, watched
+from trunnion.cycle.model_measures import watched
 from trunnion.cycle.positions import ALL, Kept, Positions
 from trunnion.cycle.scales import peak, scales_of
-from trunnion.cycle.scene import COURSE, DRAWN, courses, planar, spatial
+from trunnion.cycle.scene import load_courses, scene_of
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -26,7 +26,7 @@ from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, orig
 from trunnion.results.dataset import MemberUnits, driven
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
-from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, stated_walk, useful_loads
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.system import System, rubbing
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from trunnion.solve.run import Run
 
-__all__ = ["inputs", "member_units", "references", "result_of", "scene_of"]
+__all__ = ["inputs", "member_units", "references", "result_of"]
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -51,45 +51,36 @@ PEZZUTI = (
 )
 
 
-def result_of(run: Run, found: Positions, kept: Kept = ALL) -> Result:
-    """The result of a cycle. kept: the variables that its Dataset has."""
-    attributes, measured = books(run, found, kept)
-    return Result(attributes, lambda: dataset_of(run, found, measured, attributes, kept))
+def result_of(run: Run, at: Positions, kept: Kept = ALL) -> Result:
+    """The result of a cycle: formula, findings, summary, input data, drawing data, provenance; and its Dataset.
 
-
-def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[str, Any], Watched]:
-    """What the result says: formula, findings, summary, input data, drawing data, provenance; and the measures."""
-    mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
-    method = found_positions.method
-    cycle = Cycle(run, found_positions)
+    kept: the variables that the Dataset has.
+    """
+    mechanism, cycle = run.system.mechanism, Cycle(run, at)
     near = cycle.locking if cycle.course else None
-    measured = watched(run, time, method, arrays["status"])
+    measured = watched(run, at.time, at.method, at.arrays["status"])
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
-    drawn = drawn | _courses(run, time)
     attributes = encoded(
         {
             **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
-            "method": method.name,
+            "method": at.method.name,
             **cited(references(mechanism)),
             "findings": finding_rows([*findings(cycle), *measured.findings]),
             **scales_of(run).summary([*figures(cycle), *measured.summary()]),
-            **({"locking_ranges": near.attribute(time)} if near and near.pushed() else {}),
+            **({"locking_ranges": near.attribute(at.time)} if near and near.pushed() else {}),
             **drawn,
+            **load_courses(run, at.time),
             "periodic": int(run.cycle.periodic),
             **({} if kept.variables is None else {KEPT: kept.variables}),
         }
     )
 
-    return attributes, measured
+    def dataset() -> xr.Dataset:
+        along, units = driven(at.time, *at.dial), member_units(run.system)
+        parts = at.arrays, at.labels, along, at.means, attributes, units, at.ideal
+        return measured.joined(results.dataset(*parts, kept.variables, kept.dtype))
 
-
-def dataset_of(
-    run: Run, found: Positions, measured: Watched, attributes: Mapping[str, Any], kept: Kept = ALL
-) -> xr.Dataset:
-    """The Dataset of some positions."""
-    along = driven(found.time, *found.dial)
-    own = found.arrays, found.labels, along, found.means, attributes, member_units(run.system), found.ideal
-    return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
+    return Result(attributes, dataset)
 
 
 def member_units(system: System) -> dict[str, MemberUnits]:
@@ -306,19 +297,3 @@ def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
             value = float(values[path]) if path in values else None  # an expression of the motion has many
             rows.append({"path": path, "value": value, "unit": unit, "text": text})
     return rows
-
-
-def _courses(run: Run, time: NDArray[np.float64]) -> dict[str, Any]:
-    """Loads that vary at every position, for the drawing; beyond COURSE positions it shows their largest value."""
-    if len(time) > COURSE:
-        return {}
-    found = courses(run.system, run.values, stated_walk(run.system, run.values, run.chosen.assembly, time))
-    return {"load_courses": found} if found else {}
-
-
-def scene_of(run: Run) -> dict[str, Any]:
-    """What a drawing needs to know beside the positions of the points."""
-    system = run.system
-    walk = stated_walk(system, run.values, run.chosen.assembly, run.cycle.times(DRAWN))
-    scene = spatial if system.mechanism.space == "spatial" else planar
-    return scene(system, run.values, walk, useful_loads(system.mechanism))

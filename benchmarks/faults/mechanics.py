@@ -211,8 +211,8 @@ _CYCLE = (
     Fault(
         "efficiency-inverted",
         "cycle/means.py",
-        'return self.useful_power.net / work if work > 0 else float("nan")',
-        'return work / self.useful_power.net if work > 0 else float("nan")',
+        "return self.useful_power.net / work if work > 0 and",
+        "return work / self.useful_power.net if work > 0 and",
         ("tests/reference/test_means.py", "-k", "efficiency"),
     ),
     Fault(

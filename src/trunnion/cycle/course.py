@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ from trunnion.solve.switches import MARGINS, SEATED
 from trunnion.solve.system import System
 
 __all__ = [
-    "CycleCourse", "Top", "course_of", "followed", "like", "magnitude", "margin_of", "stacked",
+    "CycleCourse", "course_of", "followed", "like", "magnitude", "margin_of", "stacked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -44,13 +43,6 @@ COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "dr
 SIDE = 1e-7  # of the cycle: beside a break
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther, and said to be there
 CLOSE = 1e-10  # of the cycle: breaks that are one
-
-
-class Top(NamedTuple):
-    """An extreme with its place in words."""
-
-    value: float
-    place: str
 
 
 @dataclass(frozen=True)
@@ -163,18 +155,6 @@ class CycleCourse:
         """
         chosen = self.sound if panels is None else panels
         return self.picked(name, *which).extreme(of, sign, chosen, scales_of(self.run).floor(unit))
-
-    def top(
-        self,
-        name: str,
-        *which: int,
-        of: Callable[[Array], Array] = lambda rows: rows[0],
-        sign: float = 1.0,
-        unit: str = "",
-    ) -> Top | None:
-        """The same with its place in words."""
-        found = self.extreme(name, *which, of=of, sign=sign, unit=unit)
-        return None if found is None else Top(found.value, self.told(found))
 
     def told(self, place: Place) -> str:
         """Where an extreme is, in words."""

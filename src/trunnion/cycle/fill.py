@@ -65,7 +65,7 @@ DIFFERENCES = {
     "friction_power_change": "friction_power",
 }
 # what of the ideal mechanism is read
-COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotation"}
+COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotation", "status"}
 
 
 def labels(system: System) -> dict[str, list[str]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Place
 from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.cycle.findings import Cycle, effort_units, findings
 from trunnion.cycle.locking_course import critical_figure
@@ -127,9 +128,9 @@ def _efforts(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
         for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)):
-            top = course.top("drive_effort", i, sign=sign, unit=unit)
+            top = course.extreme("drive_effort", i, sign=sign, unit=unit)
             if top is not None:
-                yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, top.place)
+                yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, course.told(top))
         yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
 
 
@@ -142,12 +143,12 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     planar = system.mechanism.space == "planar"
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         for what, variable, unit in loads:
-            top = course.top(variable, i, of=magnitude, unit=unit)
+            top = course.extreme(variable, i, of=magnitude, unit=unit)
             if top is None:
                 continue
             if planar or top.value > scales.floor(unit):
                 key = f"{name}.{what.replace(' ', '_')}_max"
-                yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", top.place)
+                yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", course.told(top))
         if PAIRS[kind].guided:
             ends = [course.extreme("joint_slide", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
@@ -168,9 +169,9 @@ def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     if means.supposed > 0:
         off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
-    lost = course.top("friction_power", of=lambda rows: np.sum(rows, axis=0), unit="W")
+    lost = course.extreme("friction_power", of=lambda rows: np.sum(rows, axis=0), unit="W")
     if lost is not None:
-        yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
+        yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", course.told(lost))
 
 
 def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
@@ -207,34 +208,29 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     if cycle.at.ideal is None:
         return
     run = cycle.run
-    points = [
-        (found.value, k, found)
-        for k in range(len(run.system.points))
-        if (found := course.extreme("point_error", k, of=magnitude, panels=course.valid)) is not None
-    ]
+
+    def largest(variable: str, i: int) -> Place | None:
+        return course.extreme(variable, i, of=magnitude, panels=course.valid)
+
+    points = [(top, k) for k in range(len(run.system.points)) if (top := largest("point_error", k)) is not None]
     if points:
-        highest = max(points)[0] * (1 - ALIKE)
-        farthest, k, found = next(one for one in points if one[0] >= highest)  # of equal ones the first
+        highest = max(top.value for top, _ in points) * (1 - ALIKE)
+        top, k = next(pair for pair in points if pair[0].value >= highest)  # of equal ones the first
         most = f"largest: {'.'.join(run.system.points[k])}"
-        yield Figure("point_error_max", "position error", farthest, "m", most, course.told(found))
+        yield Figure("point_error_max", "position error", top.value, "m", most, course.told(top))
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
-        error = course.extreme(f"joint_{what}_error", i, of=magnitude, panels=course.valid)
-        if error is not None:
+        if (error := largest(f"joint_{what}_error", i)) is not None:
             name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
             yield Figure(name, subject, error.value, unit, "largest magnitude", course.told(error))
     for i, joint in enumerate(run.system.mechanism.drivers):
         kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
         subject, name = f"change of the drive {kind} of {joint} by the errors", f"{joint}.effort_change_max"
-        ends = [
-            found
-            for sign in (1.0, -1.0)
-            if (found := course.extreme("drive_effort_change", i, sign=sign, panels=course.valid))
-        ]
-        if ends:
-            change = max(ends, key=lambda one: abs(one.value))
+        ends = [course.extreme("drive_effort_change", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
+        change = max(filter(None, ends), key=lambda end: abs(end.value), default=None)
+        if change is not None:
             yield Figure(name, subject, change.value, unit, "largest magnitude", course.told(change))
 
 

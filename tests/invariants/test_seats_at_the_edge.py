@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from trunnion import Mechanism, MechanismError, analyse, read
+from trunnion.cycle.findings import listed
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -182,3 +183,9 @@ def test_no_efficiency_where_the_pins_do_not_settle_over_much_of_the_work(pinch:
         assert (figures[name].value is not None) == known
     assert ("pins do not settle" in figures["efficiency"].note) != known
     assert figures["efficiency_ideal"].value is not None
+
+
+def test_many_places_are_told_by_how_often_and_the_ends() -> None:
+    places = [f"at {k}°" for k in range(12)]
+    assert listed(places[:3]) == "at 0°, at 1°, at 2°"
+    assert listed(places) == "12 times, first at 0°, last at 11°"

@@ -11,7 +11,7 @@ import pytest
 from mechanisms import build, four_bar, slider_crank
 from mechanisms_space import cardan, rssr
 from trunnion import Mechanism
-from trunnion.cycle.passage import locks
+from trunnion.cycle.locking_course import locks
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.run import Run, prepare

@@ -16,8 +16,7 @@ from mechanisms_parts import Data, plunger, revolute
 from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
-from trunnion.cycle.locking_course import LockingCourse, locking_course
-from trunnion.cycle.locking_states import NO_MARGIN
+from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, reverse
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
@@ -483,3 +482,20 @@ def test_a_return_spring_that_supplies_work_leaves_no_efficiency() -> None:
     assert (row.value, row.note) == (None, "springs supply work too")
     (told,) = [one for one in trunnion.analyse(sprung, 30).trunnion.findings if one.code == "spring.stores"]
     assert told.figures["stored"] == pytest.approx(0.05 * (1.2**2 - 0.2**2), rel=1e-9)
+
+
+def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:
+    """Backward, by what acts on it: the end of a range need not lie next to a position that anything asked for."""
+    found = course(Mechanism.read(EXAMPLES / "double-butterfly.yaml"))
+    (part,) = [
+        part for part in found.ranges() if part.state == LockingState.SELF_LOCKING and part.places[0] == "74.55°"
+    ]
+    inside = np.linspace(part.low, part.high, 9)
+    powers = reverse(found.run, found.run.walk(inside), FrictionMethod()).acting
+    assert np.all(powers[1:-1] > 0)
+    np.testing.assert_allclose(powers[[0, -1]], 0.0, atol=1e-5 * np.max(powers))
+
+
+def test_states_are_read_of_few_positions() -> None:
+    """Passages of powers are read of their courses: nothing is solved to locate them."""
+    assert course(Mechanism.read(EXAMPLES / "fourbar-with-play.yaml")).course.courses.asked <= 300

@@ -159,7 +159,7 @@ def analyse(
     dtype: Dtype = "float64",
 ) -> None:
     """Analyse a cycle: motion, reactions, friction, effort, power."""
-    from trunnion.cycle.kept import Kept
+    from trunnion.cycle.positions import Kept
 
     check_files(out or [], report, drawn=False, instead=f"trunnion plot {file}")
     kept = Kept.read(variables, dtype)

@@ -82,7 +82,7 @@ def locking(
 
 def _show_ranges(title: str, rows: list[list[str]]) -> None:
     """The ranges as a table, in the order of the cycle; those near locking last."""
-    from trunnion.cycle.locking_states import HEAD
+    from trunnion.cycle.locking_course import HEAD
 
     show_rows(title, list(HEAD), rows[:MOST_RANGES])
     if len(rows) > MOST_RANGES:

@@ -8,20 +8,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle import summary
-from trunnion.cycle.kept import ALL, Kept
+from trunnion.cycle.positions import ALL, Kept, check_steps, positions
+from trunnion.cycle.scene import scene_of
+from trunnion.cycle.summary import member_units, result_of
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
+from trunnion.results import variables as results
+from trunnion.results.attributes import origin
+from trunnion.results.dataset import driven
+from trunnion.results.result import Result
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
 
 if TYPE_CHECKING:
     import xarray as xr
-from trunnion.cycle.positions import check_steps, positions
-from trunnion.results.result import Result
-from trunnion.solve.run import Run, prepare
 
-__all__ = ["analyse", "analyse_run", "analysed"]
+__all__ = ["analyse", "analyse_run", "analysed", "drawable"]
+
+DRAWN = 72  # positions of the curves of points that are drawn
 
 
 @strict_keywords
@@ -86,7 +91,7 @@ def analysed(
         for path in out:
             check_format(path)
     found = positions(run, steps, method, progress, kept.margin, engine=engine, wanted=kept.variables)
-    result = summary.result_of(run, found, kept)
+    result = result_of(run, found, kept)
     for path in out:
         from trunnion.results.export import save
 
@@ -102,4 +107,24 @@ def analyse_run(
     progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """What `analyse` does, for a mechanism that is prepared."""
-    return summary.result_of(run, positions(run, steps, method, progress)).dataset
+    return result_of(run, positions(run, steps, method, progress)).dataset
+
+
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN
+def drawable(mechanism: Mechanism) -> xr.Dataset:
+    """The motion alone over a cycle of DRAWN positions, to draw it: no friction, no seats by loads, no course.
+
+    Raises MechanismError if the structure does not determine the motion.
+    """
+    bare = mechanism.with_friction("off")
+    run = prepare(bare.with_seats("free") if bare.seated else bare)
+    found = positions(run, DRAWN, margin=False, averaged=False)
+    arrays = {name: array for name, array in found.arrays.items() if not name.startswith("reaction_")}
+    attributes = {
+        **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
+        "scene": scene_of(run),
+        "periodic": int(run.cycle.periodic),
+    }
+    along = driven(found.time, *found.dial)
+    units = member_units(run.system)
+    return results.dataset(arrays, found.labels, along, found.means, attributes, units, found.ideal)

@@ -10,34 +10,29 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.panels import CANCELLED
-from trunnion.cycle.deviations import COMPARED, fill_errors
-from trunnion.cycle.fill import allocate
+from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors
 from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
 from trunnion.cycle.scales import scales_of
-from trunnion.cycle.unanswered import blank
-from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
 from trunnion.solve.margin import locking_margin
-from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.status import status_of
-from trunnion.solve.switches import MARGINS, SEATED, Mechanisms, accuracy_of, breaks_between, stated_bends
+from trunnion.solve.switches import MARGINS, SEATED
 from trunnion.solve.system import System
 
 __all__ = [
-    "CycleCourse", "Top", "course_of", "followed", "like", "magnitude", "margin_of", "stacked",
+    "CycleCourse", "course_of", "followed", "like", "magnitude", "margin_of", "stacked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -48,13 +43,6 @@ COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "dr
 SIDE = 1e-7  # of the cycle: beside a break
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther, and said to be there
 CLOSE = 1e-10  # of the cycle: breaks that are one
-
-
-class Top(NamedTuple):
-    """An extreme with its place in words."""
-
-    value: float
-    place: str
 
 
 @dataclass(frozen=True)
@@ -168,18 +156,6 @@ class CycleCourse:
         chosen = self.sound if panels is None else panels
         return self.picked(name, *which).extreme(of, sign, chosen, scales_of(self.run).floor(unit))
 
-    def top(
-        self,
-        name: str,
-        *which: int,
-        of: Callable[[Array], Array] = lambda rows: rows[0],
-        sign: float = 1.0,
-        unit: str = "",
-    ) -> Top | None:
-        """The same with its place in words."""
-        found = self.extreme(name, *which, of=of, sign=sign, unit=unit)
-        return None if found is None else Top(found.value, self.told(found))
-
     def told(self, place: Place) -> str:
         """Where an extreme is, in words."""
         cycle, time = self.run.cycle, place.time
@@ -222,8 +198,9 @@ class CycleCourse:
         lost = parts[2].mean()
         supposed = float(self.picked(SUPPOSED).mean()[0] / sizes[0]) if SUPPOSED in self.shapes else 0.0
         useful_work = has_useful_work(self.run.system.mechanism)
-        means = Means(driven, useful, rubbed, lost, np.sqrt(squares), supposed, useful_work)
-        return unknown(means) if supposed > MOST_SUPPOSED else means
+        if supposed > MOST_SUPPOSED:
+            return unknown(len(squares), len(lost), supposed, useful_work)
+        return Means(driven, useful, rubbed, lost, np.sqrt(squares), supposed, useful_work)
 
 
 def magnitude(rows: Array) -> Array:
@@ -251,10 +228,8 @@ def course_of(
 
 def _course(run: Run, method: FrictionMethod, ideal: bool, names: tuple[str, ...]) -> CycleCourse:
     looking = _Looking(run, method, ideal, names)
-    accuracy = accuracy_of(run.cycle, SEATED if looking.seats else Accuracy())
-    with np.errstate(all="ignore"):
-        look = in_blocks(looking, len(run.system.joints))
-        courses = Courses.of(look, looking.breaks(), lambda sizes: like(run, looking.shapes, sizes), accuracy)
+    accuracy = SEATED if looking.seats else None
+    courses = run.courses(looking, looking.bends(), accuracy, lambda sizes: like(run, looking.shapes, sizes))
     return CycleCourse(run, looking.shapes, courses)
 
 
@@ -263,18 +238,17 @@ def margin_of(run: Run, method: FrictionMethod) -> CycleCourse:
     return run.once(("margin", method), lambda: _margin(run, method))
 
 
-@np.errstate(all="ignore")
 def _margin(run: Run, method: FrictionMethod) -> CycleCourse:
     looking = _Looking(run, method, ideal=False, names=())
 
     def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
-        back, status = looking.walked(time)
+        back, valid = looking.solved(time)
+        status: NDArray[np.integer] = status_of(back, time.shape)
         margin = np.broadcast_to(np.asarray(locking_margin(back), float), time.shape)
+        status = np.where(valid, status, np.maximum(status, Status.CONTACT_LOST))
         return np.where(np.isfinite(margin) & (status < Status.LOAD_UNDEFINED), margin, np.nan)[None], status
 
-    in_parts = in_blocks(look, len(run.system.joints))
-    courses = Courses.of(in_parts, looking.breaks(), None, accuracy_of(run.cycle, MARGINS))
-    return CycleCourse(run, {"locking_margin": ()}, courses)
+    return CycleCourse(run, {"locking_margin": ()}, run.courses(look, looking.bends(), MARGINS))
 
 
 class _Looking:
@@ -290,40 +264,31 @@ class _Looking:
         self.shapes: dict[str, tuple[int, ...]] = {}
         self._names = names
 
-    def breaks(self) -> Array:
-        """Both ends of the cycle and the breaks between them, s, those that are one taken once."""
-        run = self.run
-        if run.cycle.duration <= 0:  # it stands, as if for a second
-            return np.array([0.0, 1.0])
-        bends = [] if self.ideal else [bend.time for bend in run.bends]
-        if run.erring:
-            without = Mechanisms(run.system, run.chosen.assembly, run.ideal_values, [run.cycle])
-            bends += [bend.time for bend in stated_bends(without)]
-        return breaks_between(run.cycle, np.concatenate([bends, self.seats.breaks if self.seats else []]))
+    def bends(self) -> list[float]:
+        """Times, s, at which rows may jump or bend."""
+        bends = [*([] if self.ideal else self.run.bends), *(self.run.ideal_bends if self.run.erring else [])]
+        return [*(bend.time for bend in bends), *(self.seats.breaks if self.seats else ())]
+
+    def solved(self, time: Array) -> tuple[Backward, NDArray[np.bool_]]:
+        """The mechanism at times, s, and where no pin loses contact."""
+        if self.seats:
+            seated = self.seats.at(time, self.method)
+            return seated.back, seated.valid
+        return (self.run.ideal if self.ideal else self.run.solve)(time, method=self.method), np.ones(time.shape, bool)
 
     def __call__(self, time: Array) -> tuple[Array, NDArray[np.integer]]:
         """Rows and statuses at times, s."""
-        run, time = self.run, time if self.run.cycle.duration > 0 else 0.0 * time
+        back, valid = self.solved(time)
+        arrays = self._filled(back, time)
+        if self.errs:
+            meant = self._filled(self.run.ideal(time, self.method), time)
+            fill_errors(arrays, meant, self.run.system, slice(None))
         if self.seats:
-            seated = self.seats.at(time, self.method)
-            arrays = self._filled(seated.back, time)
-            self._stand_in(arrays, seated.valid, time)
-            arrays["status"] = np.where(seated.sticks, np.maximum(arrays["status"], Status.ZERO_SLIP), arrays["status"])
-        else:
-            arrays = self._filled((run.ideal if self.ideal else run.solve)(time, method=self.method), time)
-            self._compare(arrays, time)
+            self._stand_in(arrays, meant, valid)
+            sticks = self.seats.sticks(time)
+            arrays["status"] = np.where(sticks, np.maximum(arrays["status"], Status.ZERO_SLIP), arrays["status"])
         self.shapes, rows = stacked(arrays, (*self._names, SUPPOSED), 1)
         return rows, arrays["status"].astype(np.intp)
-
-    def walked(self, time: Array) -> tuple[Backward, NDArray[np.integer]]:
-        """The mechanism at times, s, and its statuses."""
-        time = time if self.run.cycle.duration > 0 else 0.0 * time
-        if not self.seats:
-            back = self.run.solve(time, method=self.method)
-            return back, status_of(back, time.shape)
-        seated = self.seats.at(time, self.method)
-        status = status_of(seated.back, time.shape)
-        return seated.back, np.where(seated.valid, status, np.maximum(status, Status.CONTACT_LOST))
 
     def _filled(self, back: Backward, time: Array) -> Arrays:
         """The variables of a walk at times, s."""
@@ -332,19 +297,9 @@ class _Looking:
         fill_chunk(arrays, back, time, slice(None))
         return arrays
 
-    def _compare(self, arrays: Arrays, time: Array) -> Arrays:
-        """Write what errors change into the variables; those of the mechanism without errors."""
-        if not self.errs:
-            return arrays
-        meant = self._filled(self.run.ideal(time, self.method), time)
-        fill_errors(arrays, meant, link_numbers(self.run.system), slice(None))
-        blank(arrays, arrays["status"].astype(np.int8), slice(None))
-        return meant
-
-    def _stand_in(self, arrays: Arrays, valid: NDArray[np.bool_], time: Array) -> None:
+    def _stand_in(self, arrays: Arrays, meant: Arrays, valid: NDArray[np.bool_]) -> None:
         """Where a pin loses contact the mechanism without errors stands in for it, with what that may change."""
-        meant = self._compare(arrays, time)
-        powers = [np.sum(one["drive_power"], axis=0) for one in (arrays, meant)]
+        powers = [np.sum(part["drive_power"], axis=0) for part in (arrays, meant)]
         apart = np.abs(powers[1] - np.where(np.isfinite(powers[0]), powers[0], 0.0))
         lost = ~valid & (arrays["status"] < Status.NOT_CONVERGED)
         for name in self._names:

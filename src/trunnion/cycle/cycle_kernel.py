@@ -14,13 +14,18 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.namespace import Number
+from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, followed, like, stacked
-from trunnion.cycle.deviations import COMPARED, fill_errors
-from trunnion.cycle.diagnosis import Causes
-from trunnion.cycle.fill import allocate
-from trunnion.cycle.means import IDEAL
-from trunnion.cycle.unanswered import blank
-from trunnion.cycle.written import CONDITIONS, Arrays, fill_chunk, fill_lanes, link_numbers, write
+from trunnion.cycle.fill import (
+    COMPARED,
+    CONDITIONS,
+    Arrays,
+    allocate,
+    fill_chunk,
+    fill_errors,
+    fill_lanes,
+    write,
+)
 from trunnion.engines.kernel import Lanes, lanes_of, literals, time_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.variables import VARIABLES
@@ -207,11 +212,10 @@ class Many:
         """
         if ideal is None:
             return self.arrays(values, time, shape, wanted, method), {}
-        wanted, parts, system = {*wanted, *IDEAL, *COMPARED}, ["errors"], self.run.system
+        wanted, parts = {*wanted, *COMPARED}, ["errors"]
         own = self.arrays(values, time, shape, wanted, method, parts)
         meant = self.arrays(ideal, time, shape, wanted, quick, parts)
-        fill_errors(own, meant, link_numbers(system), slice(None))
-        blank(own, own["status"].astype(np.int8), slice(None))
+        fill_errors(own, meant, self.run.system, slice(None))
         return own, meant
 
     def arrays(

@@ -1,7 +1,9 @@
-"""What a walk found, written into the arrays of a result: every variable, in the plane and in space."""
+"""What a walk came to, written into the arrays of a result: every variable, in the plane and in space, what errors
+change, and nothing where a status rules it out."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -12,22 +14,58 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.space import moment_at, quaternion
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.algebra.vector import cross, dot, plus, scaled
+from trunnion.cycle.causes import Causes
+from trunnion.errors import Status
+from trunnion.joints.clearance import describing
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.contact import clearance
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
+from trunnion.solve.end_loads import loads_of
 from trunnion.solve.forward import Forward
 from trunnion.solve.loads import has_useful_work, useful_powers
+from trunnion.solve.margin import locking_margin
+from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.contacts import bearing_middle
 from trunnion.solve.space.motion import SpatialWalk
+from trunnion.solve.status import status_of
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "Into", "allocate", "fill_forces", "fill_joint", "fill_motion", "fill_power", "labels", "put", "unwrap",
+    "COMPARED", "CONDITIONS", "Arrays", "Into", "allocate", "blank", "fill_chunk", "fill_errors", "fill_joint",
+    "fill_lanes", "labels", "put", "unwrap", "write",
 ]  # fmt: skip
 
 Arrays = dict[str, NDArray[np.float64]]
 Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
+Vector = Sequence[Number]
+CONDITIONS = "module_condition"  # (module, …, position), beside the variables of a result where somebody asks for it
 SLIDES = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force", "reaction_moment"]
+FORCES = [
+    *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
+    *("drive_effort", "drive_power", "power_residual", "friction_change"),
+    *("friction_residual", "friction_contraction"),
+    *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
+    *("reaction_force_change", "drive_effort_change", "friction_power_change"),
+    # where the load is not known, neither is the seat
+    *("seat_offset", "seat_beta", "seat_xi", "seat_xi_pin", "end_force", "contact_position"),
+    *("point_error", "link_error", "joint_rotation_error", "joint_slide_error"),
+]
+POSES = [
+    *("point_position", "link_angle", "link_position", "link_rotation", "joint_rotation", "joint_slide"),
+    *("spring_elongation", "closure_residual", "condition"),
+]
+RATES = [name for name in results.VARIABLES if name.endswith(("velocity", "acceleration"))]
+AXES = "xyz"
+DIFFERENCES = {
+    "point_error": "point_position",
+    "joint_slide_error": "joint_slide",
+    "reaction_force_change": "reaction_force",
+    "drive_effort_change": "drive_effort",
+    "friction_power_change": "friction_power",
+}
+# what of the ideal mechanism is read
+COMPARED = {*DIFFERENCES.values(), "link_angle", "link_rotation", "joint_rotation", "status"}
 
 
 def labels(system: System) -> dict[str, list[str]]:
@@ -219,6 +257,199 @@ def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
     for group, pose in zip(system.groups, poses, strict=True):
         worst = np.maximum(worst, getattr(group, figure)(pose))
     return worst
+
+
+# ---- seats and errors -----------------------------------------------------------------------------------------------
+
+
+def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
+    """Seats, end forces and places of contact of one chunk."""
+    walk = back.walk
+    joints, axes = list(walk.system.joints), walk.system.mechanism.coordinates
+    for seat in seats(walk.system, walk.values):
+        i = joints.index(seat.joint)
+        offsets = seat.play.model.offsets(walk.values, f"seats.{seat.joint}") or []
+        ends = _ends(seat, offsets)
+        for name, vectors in (("seat_offset", ends), ("end_force", _ends(seat, loads_of(back, seat), shared=True))):
+            for end, vector in vectors.items():
+                for axis, number in enumerate(vector[:axes]):
+                    arrays[name][i, end, axis, window] = number
+        _describe(arrays, i, window, walk, seat, ends)
+        _fill_contacts(arrays, i, window, walk, seat, ends)
+
+
+def _ends(seat: GivenSeat, vectors: Sequence[Vector], shared: bool = False) -> dict[int, list[Number]]:
+    """Vectors of the ends at end 1 and 2; what is along the axis belongs to both, a force by halves."""
+    keys = [key.split(".") for end in seat.play.model.ends for key in end]
+    found: dict[int, list[Number]] = {int(place) - 1: [0.0, 0.0, 0.0] for place, _ in keys if place != "3"}
+    for (place, axis), number in zip(keys, (number for vector in vectors for number in vector), strict=True):
+        for end in found if place == "3" else (int(place) - 1,):
+            found[end][AXES.index(axis)] = 0.5 * number if shared and place == "3" else number
+    return found
+
+
+def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> None:
+    """β and ξ of a pin or guide; of a ball there are none."""
+    model = seat.play.model
+    if len(model.ends[0]) == 3:
+        return
+    beta: Number = 0.0
+    if len(model.ends) == 1:
+        xi = np.arctan2(ends[0][1], ends[0][0])
+    else:  # a guide of the plane is told from its normal
+        guide = len(model.ends[0]) == 1 and len(model.ends) == 2
+        beta, xi = describing(*((ends[end][1], 0.0) if guide else (ends[end][0], ends[end][1]) for end in (0, 1)))
+    arrays["seat_beta"][i, window], arrays["seat_xi"][i, window] = beta, xi
+    if walk.system.turns(seat.joint):
+        one, two = (walk.element(link, seat.joint) for link in walk.system.joints[seat.joint][1])
+        turn = walk.coordinate(seat.joint, one, two)
+        arrays["seat_xi_pin"][i, window] = wrapped(xi + turn)
+
+
+def _fill_contacts(
+    arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]
+) -> None:
+    """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
+    frame = walk.hole(seat.joint)
+    own = clearance(seat.joint, walk.values)
+    radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (own if own is not None else 0.0)
+    spatial, model = walk.system.mechanism.space == "spatial", seat.play.model
+    guide = model.size is not None and model.size[0] == "guide"
+    half = 0.5 * seat.play.length if model.size is not None else 0.0
+    for end, offset in ends.items():
+        x, y, z = offset if len(model.ends[0]) == 3 else (offset[0], offset[1], 0.0)
+        size = np.sqrt(x * x + y * y + z * z)
+        share = np.where(size > 0, radius / np.where(size > 0, size, 1.0), np.nan)
+        along = half if end else -half
+        if guide:
+            local = (0.0, 0.0, along) if spatial else (along, 0.0, 0.0)
+        elif len(model.ends[0]) == 3:
+            local = (share * x, share * y, share * z)
+        else:
+            local = (share * x, share * y, along)
+        place = walk.algebra.point_of(frame, local[: len(walk.system.axes)])
+        for axis, number in enumerate(place):
+            arrays["contact_position"][i, end, axis, window] = number
+
+
+def wrapped(angle: Number) -> Number:
+    """An angle in (−π, π]."""
+    return angle + 2 * np.pi * np.floor((np.pi - angle) / (2 * np.pi))
+
+
+def fill_errors(arrays: Arrays, ideal: Arrays, system: System, window: slice) -> None:
+    """Differences of one chunk to the ideal mechanism's results, which hold that chunk alone; NaN without an answer."""
+    for name, of in DIFFERENCES.items():
+        np.subtract(arrays[of][..., window], ideal[of], out=arrays[name][..., window])  # no copy: half the time
+    if "link_angle" in arrays:
+        links, turned = labels(system)["link"], wrapped(arrays["link_angle"][:, window] - ideal["link_angle"])
+        arrays["link_error"][:, window] = turned
+        for i, (_, (first, second)) in enumerate(system.joints.values()):
+            arrays["joint_rotation_error"][i, window] = turned[links.index(second)] - turned[links.index(first)]
+    else:
+        for i, (built, meant) in enumerate(zip(arrays["link_rotation"], ideal["link_rotation"], strict=True)):
+            arrays["link_error"][i, :, window] = _rotation_vector(built[:, window], meant)
+        turned = wrapped(arrays["joint_rotation"][:, window] - ideal["joint_rotation"])
+        arrays["joint_rotation_error"][:, window] = turned
+    blank(arrays, arrays["status"][window].astype(np.int8), window)
+
+
+def _rotation_vector(built: NDArray[np.float64], meant: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation from one quaternion to another, rad, global axes: 2 atan2(|v|, w) along v of q₂ q₁*."""
+    w, v = built[0], built[1:]
+    scalar = w * meant[0] + np.sum(v * meant[1:], axis=0)
+    vector = meant[0] * v - w * meant[1:] - np.cross(v, meant[1:], axis=0)
+    sign = np.where(scalar < 0, -1.0, 1.0)
+    size = np.sqrt(np.sum(vector**2, axis=0))
+    share = np.where(size > 0, 2 * np.arctan2(size, sign * scalar) / np.where(size > 0, size, 1.0), 2.0)
+    return np.asarray(sign * share * vector)
+
+
+# ---- whole walks ----------------------------------------------------------------------------------------------------
+
+
+def fill_chunk(
+    arrays: Arrays,
+    back: Backward,
+    time: NDArray[np.float64],
+    window: slice,
+    causes: Causes | None = None,
+) -> None:
+    """Write one chunk into the result; what a status rules out becomes NaN."""
+    status = status_of(back, arrays["status"][window].shape)
+    arrays["status"][window] = status
+    if causes:
+        causes.note(back, status, np.arange(window.start, window.stop))
+    with np.errstate(all="ignore"):
+        write(arrays, back, time, window)
+    blank(arrays, status, window)
+
+
+def fill_lanes(
+    arrays: Arrays,
+    back: Backward,
+    time: NDArray[np.float64],
+    lanes: tuple[NDArray[np.intp], ...],
+    causes: Causes | None = None,
+) -> None:
+    """The same of some positions, wherever they are: their numbers in the last dims of the arrays."""
+    place: Any = (..., *lanes)
+    there = {name: array for name, array in arrays.items() if array.flags.writeable and array.strides[-1]}
+    some = {name: array[place] for name, array in arrays.items()}
+    some |= {name: some[other] for name, other in results.SAME_AS.items() if name in some}
+    fill_chunk(some, back, time, slice(0, len(lanes[-1])))
+    if causes:
+        causes.note(back, some["status"].astype(np.int8), lanes[-1])
+    for name, array in there.items():
+        # rows that stay as they are may be zeros that take no memory until they are written
+        for row in np.argwhere(np.any(some[name] != array[place], axis=-1)):
+            array[(*row, *lanes)] = some[name][tuple(row)]
+
+
+def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
+    """Every variable but the status, of one walk."""
+    fill_motion(arrays, back, window)
+    fill_forces(arrays, back, window)
+    _fill_settled(arrays, back, window)
+    fill_power(arrays, back, time, window)
+    if "seat_offset" in arrays:
+        fill_seats(arrays, back, window)
+    if CONDITIONS in arrays:
+        for i, (group, pose) in enumerate(zip(back.walk.system.groups, back.walk.poses, strict=True)):
+            arrays[CONDITIONS][i, window] = group.condition(pose)
+
+
+def _fill_settled(arrays: Into, back: Backward, window: slice) -> None:
+    """Figures of the friction iteration."""
+    settled = back.settled
+    for key, field in (
+        ("friction_iterations", "iterations"),
+        ("friction_change", "change"),
+        ("friction_residual", "residual"),
+        ("friction_contraction", "contraction"),
+    ):
+        worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
+        arrays[key][window] = worst
+    arrays["locking_margin"][window] = locking_margin(back)
+
+
+def blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
+    """NaN for every number that a status rules out."""
+    if not np.any(status >= Status.NOT_CONVERGED):
+        return
+    for names, where in (
+        (FORCES, status >= Status.NOT_CONVERGED),
+        (RATES, status >= Status.SINGULAR),
+        (["locking_margin"], status >= Status.LOAD_UNDEFINED),
+        (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
+    ):
+        for name in names:
+            if name in arrays and arrays[name].flags.writeable:
+                arrays[name][..., window][..., where] = np.nan
+    # a driver's own link is known where the rest is not; a whole position is either assembled or not
+    for name in POSES:
+        if name in arrays and arrays[name].flags.writeable:
+            arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
 
 
 # ---- angles that run on ---------------------------------------------------------------------------------------

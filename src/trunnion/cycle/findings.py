@@ -1,7 +1,7 @@
 """What is to be known of a mechanism over its cycle: a list of questions, each of them a small function.
 
 What concerns the cycle is read of courses, so that it does not depend on which positions were asked for; causes of
-positions without an answer are those of the positions (`diagnosis`).
+positions without an answer are those of the positions (`causes`).
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses, Place
+from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.dual import primal
-from trunnion.cycle import contact_loss, diagnosis
+from trunnion.cycle import contact_loss
 from trunnion.cycle.course import CycleCourse, magnitude
-from trunnion.cycle.locking_course import LockingCourse, locking_course
+from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
 from trunnion.cycle.means import Means
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
@@ -27,29 +27,34 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
+from trunnion.model.tolerances import tolerated
 from trunnion.model.units import KINDS
 from trunnion.results.quantities import quantity, readable
 from trunnion.results.sentences import finding_for
 from trunnion.solve import loads
+from trunnion.solve.end_loads import NO_LOAD, EndLoads
 from trunnion.solve.loads import Stated, stated_walk, useful_loads, useful_springs
-from trunnion.solve.memory import in_blocks
-from trunnion.solve.seating import seating_of
-from trunnion.solve.switches import accuracy_of, breaks_between
+from trunnion.solve.seating import ROUNDS as SEAT_ROUNDS
+from trunnion.solve.seating import UNSETTLED, seating_of
 from trunnion.solve.system import System, felt, rubbing
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "model_notes"]
+__all__ = ["Cycle", "beside_the_drive", "effort_units", "findings", "listed", "model_notes", "shared_dimensions"]
 
 Array = NDArray[np.float64]
 RESISTING = ("resisting_torque", "resisting_force")  # loads that are to be positive
 FAR = 1.0  # of the size: a hint farther off than this was meant for other lengths
 MEETS = 1e-6  # of its largest length: a spring that is no longer has its ends in one place
+CLASS_TWO = 2
+NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
-MOST_PLACES = 3  # named in one sentence
+MOST_PLACES = 8  # named in one sentence
+APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
+ENDS = ("", " (end 1)", " (end 2)", " (along its axis)")  # by the place of an end
 JUMP = 0.2  # of the largest effort: what changes by more at a break jumps there
 ALIKE = 0.5  # of a jump: another that differs by less may be the same elsewhere
 NEAR = 1 / 8  # of the cycle: how far a jump is moved at most
@@ -82,19 +87,26 @@ class Cycle:
         run = self.run
 
         def rows(time: Array) -> tuple[Array, NDArray[np.intp]]:
-            numbers = look(time if run.cycle.duration > 0 else 0.0 * time)
+            numbers = look(time)
             return np.array([np.broadcast_to(primal(row), time.shape) for row in numbers]), np.zeros(time.shape, int)
 
-        bends = np.array([bend.time for bend in run.bends])
-        breaks = breaks_between(run.cycle, bends) if run.cycle.duration > 0 else np.array([0.0, 1.0])
-        with np.errstate(all="ignore"):
-            in_parts = in_blocks(rows, len(run.system.joints))
-            return Courses.of(in_parts, breaks, None, accuracy_of(run.cycle, Accuracy()))
+        return run.courses(rows)
 
     def place(self, *times: float) -> str:
         """One time, s, or the range between two, on the dial of the drive."""
         dial = self.run.system.dial(self.run.values, np.array([*times, self.run.cycle.duration]))
         return dial.at(0) if len(times) == 1 else f"between {dial.at(0)} and {dial.at(1)}"
+
+    def between(self, low: float, high: float) -> str:
+        """A range, s, as one place if its ends read alike."""
+        return f"at {self.place(low)}" if self.place(low) == self.place(high) else self.place(low, high)
+
+
+def listed(places: Sequence[str]) -> str:
+    """Places in words, in their order; of many how often, and the first and the last."""
+    if len(places) <= MOST_PLACES:
+        return ", ".join(places)
+    return f"{len(places)} times, first {places[0]}, last {places[-1]}"
 
 
 def findings(cycle: Cycle) -> list[Finding]:
@@ -169,19 +181,134 @@ def model_notes(mechanism: Mechanism, system: System) -> list[Finding]:
     return notes
 
 
+def shared_dimensions(mechanism: Mechanism) -> Iterator[Finding]:
+    """Of each toleranced dimension that alone sets points of more than one link: as one they vary together, as parts do
+    not.
+
+    Where it stands beside other dimensions, as the radius of a roller between two links does, it is one part's own.
+    """
+    placed = [
+        (path, entry.depends)
+        for path, entry in mechanism.parameter_set.entries.items()
+        if path.startswith("links.") and ".points." in path
+    ]
+    for tolerance in tolerated(mechanism):
+        used = [path for path, depends in placed if depends == (tolerance.path,)]
+        links = list(dict.fromkeys(path.split(".")[1] for path in used))
+        if tolerance.path.startswith("dimensions.") and len(links) > 1:
+            name = tolerance.path.removeprefix("dimensions.")
+            shown = [path.removeprefix("links.").replace(".points.", ".") for path in used]
+            more = f" and {len(shown) - MOST_PLACES} more" if len(shown) > MOST_PLACES else ""
+            phrases = {"shown": ", ".join(shown[:MOST_PLACES]) + more}
+            yield finding_for("tolerance.shared_dimension", tolerance.path, phrases=phrases, name=name, links=links)
+
+
 # ---- assembly, locking and singular positions -----------------------------------------------------------------
 
 
-def _without_answer(cycle: Cycle) -> list[Finding]:
-    """Why positions have no answer."""
-    run, at, scales, units = cycle.run, cycle.at, scales_of(cycle.run), effort_units(cycle.run.system)
-    efforts = {}
-    for i, (name, unit) in enumerate(zip(cycle.mechanism.drivers, units, strict=True)):
-        lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
-        efforts[name] = lower, upper, unit
-    status, condition, margin = (at.arrays[name] for name in ("status", "condition", "locking_margin"))
-    joints = felt(run.system, run.values)
-    return diagnosis.findings(at.causes, at.dial, status, condition, efforts, margin, scales, cycle.locking, joints)
+def _not_assembled(cycle: Cycle) -> Iterator[Finding]:
+    """Modules that do not close, and by how much."""
+    dial, mechanism = cycle.at.dial, cycle.mechanism
+    for (number, *reasons), (places, sizes) in sorted(cycle.at.causes.of("open").items(), key=lambda item: item[0][0]):
+        module, at = cycle.run.system.plan.modules[number], dial.intervals(places)
+        everywhere, where = len(places) == len(dial.values) > 1, f"links {', '.join(module.links)}"
+        if reasons:
+            gaps = {reason: np.nanmax(row) for reason, row in zip(reasons, sizes, strict=True) if np.any(row > 0)}
+            yield finding_for("assembly.gap", where, at=at, everywhere=everywhere, gaps=gaps)
+        else:
+            yield finding_for(
+                "assembly.open", where, at=at, everywhere=everywhere, redundant=bool(module.redundant),
+                errors=mechanism.has_errors, start=bool(np.any(places == 0)),
+            )  # fmt: skip
+
+
+def _undecided_senses(cycle: Cycle) -> Iterator[Finding]:
+    """Where only the travel of seats decides the sense of a friction."""
+    for places, _ in cycle.at.causes.of("stuck").values():
+        places = places[cycle.at.arrays["status"][places] == Status.ZERO_SLIP]
+        if len(places):
+            yield finding_for("friction.sense", "joints", at=cycle.at.dial.intervals(places))
+
+
+def _singular(cycle: Cycle) -> Iterator[Finding]:
+    """Modules that are singular."""
+    condition = cycle.at.arrays["condition"]
+    for number, (places, _) in cycle.at.causes.of("singular").items():
+        module = cycle.run.system.plan.modules[number]
+        kind = "dead centre (singular position)" if module.rank == CLASS_TWO else "singular position"
+        yield finding_for(
+            "position.singular", f"links {', '.join(module.links)}", at=cycle.at.dial.intervals(places),
+            condition=_most(condition[places]), phrases={"kind": kind},
+        )  # fmt: skip
+
+
+def _undefined(cycle: Cycle) -> Iterator[Finding]:
+    """Loads and springs that have no value."""
+    for path, (places, _) in cycle.at.causes.of("undefined").items():
+        code = "load.undefined" if path.startswith("loads.") else "spring.undefined"
+        yield finding_for(code, path, at=cycle.at.dial.intervals(places))
+
+
+def _locked(cycle: Cycle) -> Iterator[Finding]:
+    """Modules that lock: how far they are from running, the joint that decides, and whether they lock backward too."""
+    rubs = felt(cycle.run.system, cycle.run.values)
+    for number, (places, share) in cycle.at.causes.of("locked").items():
+        module = cycle.run.system.plan.modules[number]
+        reverse, decides, multiple = "", "", None
+        if cycle.locking is not None:
+            states, responsible = cycle.locking.all_states(), cycle.locking.responsible
+            if LockingState.JAMMED in states:
+                reverse = "some" if LockingState.LOCKED in states else "all"
+            if responsible and responsible[0] in module.joints:
+                decides, multiple = responsible
+        yield finding_for(
+            "friction.locked", f"links {', '.join(module.links)}", at=cycle.at.dial.intervals(places),
+            share=np.min(share), joints=[name for name in module.joints if name in rubs], reverse=reverse,
+            decides=decides, multiple=multiple,
+            whole=float(np.nanmin(cycle.at.arrays["locking_margin"][places], initial=np.inf)),
+        )  # fmt: skip
+
+
+def _badly_solved(cycle: Cycle) -> Iterator[Finding]:
+    """Positions whose friction does not converge, and such as are close to singular."""
+    status, condition, dial = cycle.at.arrays["status"], cycle.at.arrays["condition"], cycle.at.dial
+    if len(late := np.flatnonzero(status == Status.NOT_CONVERGED)):
+        yield finding_for("friction.not_converged", "joints", at=dial.intervals(late))
+    if len(close := np.flatnonzero(status == Status.NEAR_SINGULAR)):
+        yield finding_for(
+            "position.near_singular", "links", at=dial.intervals(close), condition=_most(condition[close])
+        )
+
+
+def _most(values: Array) -> float:
+    """The largest; ∞ if any has no value."""
+    return float(np.max(values)) if len(values) and np.all(np.isfinite(values)) else np.inf
+
+
+def _resting(cycle: Cycle) -> Iterator[Finding]:
+    """Joints at rest, those that are at the same positions as one, and the interval of the efforts there."""
+    system, at, scales = cycle.run.system, cycle.at, scales_of(cycle.run)
+    holding = {*felt(system, cycle.run.values), *system.resisted}  # without friction either way is the same
+    together: dict[bytes, tuple[list[str], NDArray[np.intp]]] = {}
+    for joint, (places, _) in at.causes.of("rest").items():
+        if joint in holding:
+            together.setdefault(places.tobytes(), ([], places))[0].append(joint)
+    for joints, places in together.values():
+        widest: dict[str, dict[str, float | str]] = {}
+        matters = not cycle.mechanism.drivers
+        for i, (driver, unit) in enumerate(zip(cycle.mechanism.drivers, effort_units(system), strict=True)):
+            lower, upper = (scales.zeroed(at.arrays[f"drive_effort_{end}"][i], unit) for end in ("lower", "upper"))
+            widths, largest = (upper - lower)[places], np.nanmax(np.abs([lower, upper]), initial=0.0)
+            least = max(NEGLIGIBLE * largest, scales.floor(unit))
+            matters |= bool(np.any(np.isnan(widths) | (widths > least)))
+            if np.any(np.isfinite(widths)):
+                k = places[int(np.nanargmax(widths))]
+                widest[driver] = {"from": lower[k], "to": upper[k], "unit": unit, "at": f"at {at.dial.at(k)}"}
+        if matters:
+            yield finding_for(
+                "friction.interval", f"joints.{', '.join(joints)}", joints=joints, at=at.dial.intervals(places),
+                efforts=widest, locks=bool(cycle.mechanism.drivers),
+            )  # fmt: skip
 
 
 def _ranges(cycle: Cycle) -> Iterator[Finding]:
@@ -223,8 +350,7 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
         ends = np.flatnonzero(np.diff(np.concatenate([[0], below, [0]]).astype(int)))
         places = [cycle.place(*cut.edges[pair]) for pair in ends.reshape(-1, 2)]
         if places:
-            more = f" and in {len(places) - MOST_PLACES} more places" * (len(places) > MOST_PLACES)
-            yield finding_for("load.drives", path, at=", ".join(places[:MOST_PLACES]) + more)
+            yield finding_for("load.drives", path, at=listed(places))
 
 
 def _springs(cycle: Cycle) -> Iterator[Finding]:
@@ -325,12 +451,73 @@ def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
             yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))
 
 
-def _lost_contacts(cycle: Cycle) -> Iterable[Finding]:
-    """Pins that lose contact."""
-    at = cycle.at
-    if not cycle.run.seats:
-        return ()
-    return contact_loss.findings(at.arrays, seating_of(cycle.run, at.method), at.time, at.dial)
+def _lost_contacts(cycle: Cycle) -> Iterator[Finding]:
+    """Pins that lose contact, those that do at the same places as one, and pins that nothing presses."""
+    run, at = cycle.run, cycle.at
+    if not run.seats:
+        return
+    seating = seating_of(run, at.method)
+    loads, joints = seating.loads, list(run.system.joints)
+    yield from _unloaded(cycle, loads)
+    lost: dict[tuple[str, str], list[str]] = {}
+    lifted: dict[tuple[str, str], list[str]] = {}
+    for seat in run.seats:
+        joint, part = seat.joint, "pin" if any(len(end) > 1 for end in seat.play.model.ends) else "slider"
+        crossings = [cross for cross in loads.passages if cross.end.seat.joint == joint]
+        halts = [
+            (halt.low, halt.high) for halt in seating.halts
+            if halt.joint == joint and not any(halt.low <= cross.high and cross.low <= halt.high for cross in crossings)
+        ]  # fmt: skip
+        if crossings:
+            places = [f"at {cycle.place(cross.time)}{ENDS[cross.end.place]}" for cross in crossings]
+            lost.setdefault((part, listed(places)), []).append(joint)
+        elif seat.given is None and loads.largest > 0 and all(end.seat.joint != joint for end, _ in loads.pressed):
+            yield finding_for("seat.unloaded", f"joints.{joint}", part=part)
+        if halts:
+            spans = _joined(halts, APART * run.cycle.duration)
+            lifted.setdefault((part, listed([cycle.between(*span) for span in spans])), []).append(joint)
+    for (part, text), names in lost.items():
+        nearest = min(
+            (cross for cross in loads.passages if cross.end.seat.joint in names),
+            key=lambda cross: cross.least / cross.peak,
+        )
+        least = nearest.least if nearest.least > NO_LOAD * nearest.peak else 0.0  # less than that is rounding
+        numbers, number, turning = at.arrays["contact_loss_number"][[joints.index(name) for name in names]], None, ""
+        if part == "pin" and np.any(np.isfinite(numbers)):  # the load of a slider has no direction that can turn
+            number = np.nanmax(numbers)
+            turning = f"at {at.dial.at(int(np.nanargmax(numbers)) % numbers.shape[1])}"
+        yield finding_for(
+            "contact.lost", f"joints.{', '.join(names)}", part=part, least=least, peak=nearest.peak, at=text,
+            likely=contact_loss.EARLES_WU, number=number, turning=turning, count=len(names),
+        )  # fmt: skip
+    for (part, text), names in lifted.items():
+        yield finding_for("contact.lifted", f"joints.{', '.join(names)}", part=part, at=text, count=len(names))
+    unsettled = (at.arrays["contact_lost"] > 0) & (seating.states(at.time) == UNSETTLED)
+    for i in np.flatnonzero(np.any(unsettled, axis=1)):
+        intervals = at.dial.intervals(np.flatnonzero(unsettled[i]))
+        change = np.max(at.arrays["seat_change"][unsettled[i]])
+        yield finding_for("seat.unsettled", f"joints.{joints[i]}", rounds=SEAT_ROUNDS, at=intervals, change=change)
+
+
+def _unloaded(cycle: Cycle, loads: EndLoads) -> Iterator[Finding]:
+    """The joints that bear no load over a range, with the end that does not where the other does."""
+    ranges: dict[str, dict[str, str]] = {}
+    for end, low, high in loads.idle:
+        ends = ranges.setdefault(cycle.between(low, high), {})
+        ends[end.seat.joint] = "" if end.seat.joint in ends else ENDS[end.place]
+    for text, ends in ranges.items():
+        yield finding_for("contact.unloaded", "joints", joints=[name + end for name, end in ends.items()], at=text)
+
+
+def _joined(spans: Sequence[tuple[float, float]], apart: float) -> list[tuple[float, float]]:
+    """Times from and to, s, in their order; those that are hardly apart as one."""
+    joined: list[tuple[float, float]] = []
+    for low, high in sorted(spans):
+        if joined and low - joined[-1][1] <= apart:
+            joined[-1] = joined[-1][0], max(joined[-1][1], high)
+        else:
+            joined.append((low, high))
+    return joined
 
 
 def _moved_jumps(cycle: Cycle) -> Iterator[Finding]:
@@ -383,6 +570,7 @@ def _between(one: int, other: int, count: int) -> NDArray[np.intp]:
 
 
 QUESTIONS: tuple[Callable[[Cycle], Iterable[Finding]], ...] = (
-    _of_the_model, _without_answer, _ranges, _no_common_period, _driving_resistances, _springs, _idle_loads,
-    _beside_gaps, _moved_jumps, _uncounted_work, _lost_contacts,
+    _of_the_model, _not_assembled, _undecided_senses, _singular, _undefined, _locked, _badly_solved, _resting,
+    _ranges, _no_common_period, _driving_resistances, _springs, _idle_loads, _beside_gaps, _moved_jumps,
+    _uncounted_work, _lost_contacts,
 )  # fmt: skip

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import shared_dimensions
-from trunnion.cycle.findings import Cycle, findings
+from trunnion.cycle.findings import Cycle, findings, shared_dimensions
 from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity
@@ -77,7 +76,7 @@ def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None
     rank = run.determinacy.mobility if run.determinacy else _rank(walk)
     if run.determinacy is None and rank is not None and rank != run.system.plan.mobility:
         found.append(finding_for("mobility.special", "joints", formula=run.system.plan.mobility, rank=rank))
-    found += [*shared_dimensions.findings(mechanism), *_unplaced(run)]
+    found += [*shared_dimensions(mechanism), *_unplaced(run)]
     order = list(Severity)
     found.sort(key=lambda finding: order.index(finding.severity))
     return Check(run.system.plan, rank, run.chosen.found, choices(run), tuple(found), _gears(run))
@@ -110,19 +109,16 @@ def _gears(run: Run) -> tuple[GearPair, ...]:
 def _rank(walk: Forward) -> int | None:
     """Mobility by rank at the first assembled position."""
     system = walk.system
-    places = {}
-    for name, (_, (_, second)) in system.joints.items():
-        places[name] = np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(second, name)))
-    length = max((len(place[0]) for place in places.values()), default=1)
-    table = {name: np.array([np.broadcast_to(n, length) for n in place]) for name, place in places.items()}
-    solved = np.all([np.isfinite(place).all(axis=0) for place in table.values()], axis=0)
+    places = {
+        name: np.stack(np.broadcast_arrays(*(np.atleast_1d(primal(n)) for n in walk.element(second, name))))
+        for name, (_, (_, second)) in system.joints.items()
+    }
+    length = max((place.shape[1] for place in places.values()), default=1)
+    places = {name: np.broadcast_to(place, (len(place), length)) for name, place in places.items()}
+    solved = np.all([np.isfinite(place).all(axis=0) for place in places.values()], axis=0)
     if not np.any(solved):
         return None
-    first = int(np.argmax(solved))
-    at = {
-        name: (float(p[0, first]), float(p[1, first]), float(p[2, first]), float(p[3, first]))
-        for name, p in table.items()
-    }
+    at = {name: tuple(place[:, np.argmax(solved)].tolist()) for name, place in places.items()}
     gears = {
         name: (gear.joints, float(np.ravel(primal(walk.values[f"gears.{name}.ratio"]))[0]))
         for name, gear in system.mechanism.gears.items()

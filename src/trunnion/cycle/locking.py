@@ -6,13 +6,19 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.cycle.analyse import analyse_run
 from trunnion.cycle.findings import beside_the_drive
-from trunnion.cycle.locking_course import LockingCourse, holding_multiples, locking_course
-from trunnion.cycle.locking_states import HELD_AND_DRIVEN, NEAR, LockingRange, LockingState
-from trunnion.cycle.passage import Passage, critical_multiples, reverse
+from trunnion.cycle.locking_course import (
+    HELD_AND_DRIVEN,
+    NEAR,
+    LockingRange,
+    LockingState,
+    critical_multiples,
+    holding_multiples,
+    locking_course,
+    reverse,
+)  # fmt: skip
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
 from trunnion.errors import Finding, MechanismError, Status
@@ -35,6 +41,7 @@ __all__ = [
 ]  # fmt: skip
 
 MOST_STEPS = 8192
+METHOD = FrictionMethod(margin_up_to=MARGIN)
 
 VARIABLES = {
     "critical_multiple": Variable(
@@ -84,42 +91,37 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     result = analyse_run(run, steps, progress=progress)
     time, status = result["time"].values, result["status"].values
     back = run.solve(time, method=FrictionMethod())
-    multiples = critical_multiples(back, MARGIN)
-    other = reverse(run, back.walk, FrictionMethod())
-    known = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
-    course, nothing = _course(run), np.full(len(time), np.nan)
+    other, multiples = reverse(run, back.walk, FrictionMethod()), critical_multiples(back, MARGIN)
+    answered = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
+    course, nothing = locking_course(run, METHOD), np.full(len(time), np.nan)
     state = np.full(len(time), int(LockingState.RUNS)) if course is None else course.states_at(time)
     efforts = [np.where(other.locked, np.nan, other.efforts[name]) for name in mechanism.drivers]
+    given = (other.given > scales_of(run).floor("W")) & ~other.locked
     arrays: dict[str, Any] = {
         "critical_multiple": [
-            np.where(known, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values
+            np.where(answered, multiples.get(str(name), nothing), np.nan) for name in result["joint"].values
         ],
         "drive_effort_reverse": np.array(efforts).reshape(len(efforts), len(time)),
         "power_delivered_reverse": np.where(other.locked, np.nan, other.delivered),
         "power_acting_reverse": other.acting,
         "power_given_reverse": other.given,
-        "efficiency_reverse_instant": _efficiency_reverse(other, scales_of(run).floor("W")),
+        "efficiency_reverse_instant": np.where(given, other.delivered / other.given, np.nan),
         "holding_multiple": holding_multiples(run, time),
-        "locking_state": np.where(known, state, int(LockingState.UNSOLVED)).astype(np.int8),
+        "locking_state": np.where(answered, state, int(LockingState.UNSOLVED)).astype(np.int8),
     }
-    found = with_variables(result, described(arrays, VARIABLES, member_units(run.system)))
-    found["locking_state"].attrs.update(codes("flag", LockingState))
-    said = finding_rows(_notes(run))
-    findings = {"findings": [*attribute(found, "findings"), *said]} if said else {}
+    result = with_variables(result, described(arrays, VARIABLES, member_units(run.system)))
+    result["locking_state"].attrs.update(codes("flag", LockingState))
+    notes = finding_rows(_notes(run))
+    findings = {"findings": [*attribute(result, "findings"), *notes]} if notes else {}
     ranges = {} if course is None else {"locking_ranges": course.attribute(time, near)}
-    return found.assign_attrs(encoded({**ranges, **findings}))
-
-
-def _course(run: Run) -> LockingCourse | None:
-    """Locking over the cycle; None without a driver."""
-    return locking_course(run, FrictionMethod(margin_up_to=MARGIN))
+    return result.assign_attrs(encoded({**ranges, **findings}))
 
 
 def _notes(run: Run) -> list[Finding]:
     """What the states leave out: seats of pins; loads that move them."""
     notes = []
     if run.seats:
-        notes.append(finding_for("locking.pins_centred", "joints", joints=[one.joint for one in run.seats]))
+        notes.append(finding_for("locking.pins_centred", "joints", joints=[seat.joint for seat in run.seats]))
     mechanism = run.system.mechanism
     beside = beside_the_drive(mechanism) if rubbing(run.system) else []
     if beside:
@@ -127,14 +129,9 @@ def _notes(run: Run) -> list[Finding]:
     return notes
 
 
-def _efficiency_reverse(back: Passage, least: float) -> NDArray[np.float64]:
-    """Of every position; NaN where the useful loads supply no power backward, or where that motion locks."""
-    return np.where((back.given > least) & ~back.locked, back.delivered / back.given, np.nan)
-
-
-def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
+def report_figures(run: Run, result: xr.Dataset) -> list[Figure]:
     """The figures of a result of `look` that one looks at first."""
-    course, useful = _course(run), has_useful_work(run.system.mechanism)
+    course, useful = locking_course(run, METHOD), has_useful_work(run.system.mechanism)
     why = "the useful loads do no net work backward" if useful else NOTHING_USEFUL
     none = Figure(
         "efficiency_reverse", f"efficiency when backdriven ({why})", None, note="" if useful else STATE_USEFUL
@@ -142,7 +139,7 @@ def report_figures(run: Run, found: xr.Dataset) -> list[Figure]:
     if course is None:
         return [none]
     what = ", all friction together" if rubbing(run.system) else " (no joint has friction)"
-    table = {str(joint): found["critical_multiple"].sel(joint=joint).values for joint in found["joint"].values}
+    table = {str(joint): result["critical_multiple"].sel(joint=joint).values for joint in result["joint"].values}
     figures = [
         course.margin_figure(f"locking margin{what}", ""),
         *course.critical_figures(table),

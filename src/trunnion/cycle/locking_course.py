@@ -1,17 +1,18 @@
 """Locking over the cycle, read of courses: ranges of its states, the margin, the joint that decides, the way back, and
 the friction that holds the loads.
 
-Powers of the mechanism passed forward and backward are rows over time, its state is that of their panels: so the ends
-of a range are breaks of the course, and nothing depends on which positions are asked for.
+Powers of the mechanism passed forward and backward are rows over time. Its state changes where one of these passes zero
+or a module locks, whatever positions are asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from math import floor, isfinite, isnan, log10
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,44 +21,238 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.course import CycleCourse, course_of, margin_of
-from trunnion.cycle.locking_states import (
-    BACK_LOCKED,
-    HELD,
-    HELD_AND_DRIVEN,
-    NEAR,
-    NO_MARGIN,
-    PUSHES,
-    LockingRange,
-    LockingState,
-    on_dial,
-    states,
-)  # fmt: skip
-from trunnion.cycle.passage import critical_multiples, passage, passed, reverse
 from trunnion.cycle.scales import scales_of
-from trunnion.errors import Status
+from trunnion.errors import Coded, Status
 from trunnion.results.figure import MORE_THAN, Figure
-from trunnion.solve.friction_method import MARGIN, FrictionMethod
-from trunnion.solve.loads import has_useful_work, useful_loads, useful_springs
-from trunnion.solve.memory import in_blocks
+from trunnion.results.quantities import readable
+from trunnion.solve import continuation
+from trunnion.solve.backward import Backward, Given, backward
+from trunnion.solve.bristles import histories
+from trunnion.solve.forward import Forward
+from trunnion.solve.friction import FrictionProblem, frictionless, scaled
+from trunnion.solve.friction_method import MARGIN, FrictionMethod, peak
+from trunnion.solve.loads import has_useful_work, useful_loads, useful_powers, useful_springs
 from trunnion.solve.status import status_of
-from trunnion.solve.switches import MARGINS, accuracy_of, breaks_between
+from trunnion.solve.switches import MARGINS
 from trunnion.solve.system import felt, law_of
 
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["LockingCourse", "critical_figure", "holding_multiples", "locking_course"]
+__all__ = [
+    "HEAD", "HELD_AND_DRIVEN", "NEAR", "NO_MARGIN", "LockingCourse", "LockingRange", "LockingState", "Passage",
+    "critical_figure", "critical_multiples", "holding_multiples", "locking_course", "locks", "reverse",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
-STATES = list(LockingState)  # by their codes
+NEAR = 1.5  # a locking margin below it counts as near locking, unless another is stated
+HEAD = ("state", "from", "to", "smallest margin", "at")  # of the table of ranges
 TIMES = "times the friction"  # what a locking margin is
 LITTLE = 1e-3  # of what the useful loads give: what masses, other loads and springs may supply beside it
-BACK = Accuracy(1e-7, shortest=1e-8, rounds=14, most=32)  # beside a locked position each one takes long
+BACK = Accuracy(1e-8, shortest=1e-8, rounds=14, most=32)  # beside a locked position each one takes long
 HOLDING = Accuracy(1e-12, 1e-14, widest=1.0, rounds=12)
-SHORT = 1e-5  # of the cycle: a range that is less is none, as where loads have no power for a moment
+SHORT = 3e-5  # of the cycle, as 0.01° of a turn: a range that is less is none, and an end as near to a break is at it
 BITS = 48  # joints that are told apart by the state of their critical multiples
 MOST_PLACES = 3  # named in one figure
 BESIDE = 1e-8  # of the cycle: a position that is next to an end is behind it
+CLOSE = 1e-3  # degrees of the drive to which an end is told: two decimals are shown
+SHARE = 1e-5  # of the drive's travel, where that is not in degrees
+
+
+class LockingState(Coded):
+    """What friction does at a position, forward and when all speeds are reversed; in a sentence, and for tables.
+
+    The loads are all that acts: loads and springs, useful or not, weight and inertia.
+    """
+
+    short: str
+
+    RUNS = 0, "runs; what acts on it pushes it neither backward nor forward", "loads do not push"
+    BACKDRIVABLE = 1, "can be backdriven: the loads drive it backward, and the drive brakes it", "can be backdriven"
+    SELF_LOCKING = 2, "self-locking: the loads push it backward, but do not overcome friction", "self-locking"
+    LOCKED_BACKWARD = 3, "locked backward: no drive effort can move it backward", "locked backward"
+    LOCKED = 4, "locked: no drive effort can move it forward", "locked"
+    JAMMED = 5, "jammed: locked forward and backward", "jammed"
+    UNSOLVED = 6, "not solved", "not solved"
+    SELF_LOCKING_FORWARD = (
+        7, "self-locking: the loads push it forward, but do not overcome friction", "self-locking, pushed forward",
+    )  # fmt: skip
+    DRIVEN_ON = 8, "the loads drive it forward, and the drive brakes it", "loads drive it on"
+
+    def __new__(cls, value: int, text: str, short: str) -> Self:
+        """A member: its code, what it says, and that in a word or two."""
+        state = int.__new__(cls, value)
+        state._value_ = value
+        state.text, state.short = text, short
+        return state
+
+
+STATES = list(LockingState)  # by their codes
+HELD = {LockingState.SELF_LOCKING, LockingState.SELF_LOCKING_FORWARD}
+PUSHES = {*HELD, LockingState.BACKDRIVABLE, LockingState.DRIVEN_ON}
+HELD_AND_DRIVEN = {LockingState.SELF_LOCKING_FORWARD, LockingState.DRIVEN_ON}
+NO_MARGIN = (LockingState.LOCKED, LockingState.JAMMED, LockingState.UNSOLVED)  # these are not near locking
+BACK_LOCKED = (LockingState.LOCKED_BACKWARD, LockingState.JAMMED)
+
+
+# ---- passed forward and backward ------------------------------------------------------------------------------
+
+
+class Passage(NamedTuple):
+    """Positions passed forward or backward: effort of every driver, where it locks, and what flows where.
+
+    delivered: power that the drivers take out, W; acting: power that loads, springs, weight and inertia put in, W;
+    given: that of the useful loads and springs alone.
+    """
+
+    efforts: dict[str, Array]
+    locked: NDArray[np.bool_]
+    delivered: Array
+    acting: Array
+    given: Array
+
+    @classmethod
+    def of(cls, back: Backward) -> Passage:
+        """As the positions are passed in the direction of a walk that is solved."""
+        walk, shape = back.walk, np.shape(back.walk.time)
+        efforts = {name: np.broadcast_to(effort, shape) for name, effort in back.efforts.items()}
+        delivered = -sum((effort * walk.rate(name) for name, effort in efforts.items()), np.zeros(shape))
+        useful = useful_powers(walk.system.mechanism, back.load_powers, back.springs)
+        every = [back.body_power, *back.load_powers.values(), *(spring.power for spring in back.springs.values())]
+        given, acting = (
+            sum((np.broadcast_to(power, shape) for power in powers), np.zeros(shape)) for powers in (useful, every)
+        )
+        return cls(efforts, locks(back), delivered, acting, given)
+
+
+def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Passage:
+    """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
+    with them; inertia stays, for accelerations do."""
+    return _passed(run, ahead.backward(), method)
+
+
+def _passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
+    """Positions of a walk, in its direction."""
+    turned, time = walk.direction < 0, np.asarray(walk.time, float)
+    past = histories(run.system, run.values, run.chosen.assembly, run.cycle, turned)
+    time = run.cycle.duration - time if turned else time
+    deflections = {joint: history.at(time) for joint, history in past.items()}
+    with np.errstate(all="ignore"):
+        return Passage.of(backward(walk, method, Given({}, deflections)))
+
+
+def locks(back: Backward) -> NDArray[np.bool_]:
+    """Where a module locks."""
+    shape = np.shape(back.walk.time)
+    locked = np.zeros(shape, bool)
+    for settled in back.settled:
+        locked |= np.broadcast_to(np.asarray(settled.share) < 1.0, shape)
+    return locked
+
+
+# ---- multiples of the friction --------------------------------------------------------------------------------
+
+
+def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
+    """For each joint the multiple of its own friction at which it locks its module, the others' being as they are.
+
+    ∞ where it does not up to `most`, 0 where the module locks even without friction in this joint, NaN where it has no
+    loads, because another one locks.
+    """
+    system, positions = back.walk.system, np.shape(back.walk.time)
+    multiples: dict[str, Array] = {}
+    for number, settled in zip(reversed(range(len(system.plan.modules))), back.settled, strict=True):
+        if settled.problem is None:
+            continue
+        contacts = settled.problem.contacts
+        places = list(dict.fromkeys(contact.joint for contact in contacts if contact.rubs))
+        if not places:  # nothing but gears pushed apart
+            continue
+        masks = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
+        loads = peak(settled.problem.state([0.0] * len(contacts)).normals)
+        for place, multiple in zip(places, _alone(settled.problem, masks, most), strict=True):
+            multiple = np.where(np.isfinite(loads), multiple, np.nan)
+            multiples[system.places[number][place].joint] = np.broadcast_to(multiple, positions)
+    return {joint: multiples[joint] for joint in system.joints if joint in multiples}
+
+
+def _alone(problem: FrictionProblem, masks: NDArray[np.bool_], most: float) -> Array:
+    """The multiples for the contacts of each joint: the others' friction is raised to full first, then theirs.
+
+    masks: which contacts are those of the joint, (joint, contact). The joints are followed side by side, each in lanes
+    of its own.
+    """
+    every, lanes = problem.picked(True)
+    bounds = [np.asarray(problem.bound([most if mine else 1.0 for mine in mask])) for mask in masks]
+    doubtful = np.array([np.broadcast_to(np.isfinite(bound) & (bound >= 1.0), lanes.shape) for bound in bounds])
+    result = np.full(doubtful.shape, np.inf)
+    joint, lane = np.nonzero(doubtful.reshape(len(masks), -1))
+    if len(lane):
+        part, mine = every.mapped(lambda number: number[lane]), masks[joint].T
+
+        def weights(share: Array) -> Sequence[Array]:
+            return list(np.where(mine, np.maximum(share - 1.0, 0.0), np.minimum(share, 1.0)))
+
+        _, reached = continuation.follow(scaled(part, weights), frictionless(part), 1.0 + most)
+        result[doubtful] = np.where(reached >= 1.0 + most, np.inf, np.maximum(reached - 1.0, 0.0))
+    return result
+
+
+def holding_multiples(run: Run, time: Array) -> Array:
+    """Multiple of all friction down to which friction holds the loads, at each time, s; NaN where it does not.
+
+    There the power delivered to the drivers, in the direction in which the loads push, rises from 0. 0 where it is
+    held without the friction that follows loads.
+    """
+    multiples, least = np.full(len(time), np.nan), scales_of(run).floor("W")
+    walk = run.walk(time)
+    for direction in (walk, walk.backward()):
+        full = _passed(run, direction, FrictionMethod())
+        holding = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
+        if not len(holding):
+            continue
+
+        def released(
+            lane: NDArray[np.intp], multiple: Array, times: Array = time[holding], back: bool = direction.direction < 0
+        ) -> tuple[Array, NDArray[np.intp]]:
+            """Power delivered to the drivers for multiples of all friction; below 0 where it locks."""
+            part = run.walk(np.repeat(times[lane], multiple.shape[1]))
+            through = _passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
+            power = np.where(through.locked, -np.abs(through.acting), through.delivered)
+            return power.reshape(1, *multiple.shape), through.locked.reshape(multiple.shape).astype(np.intp)
+
+        with np.errstate(all="ignore"):
+            each = Courses.many(released, [np.array([0.0, 1.0])] * len(holding), None, HOLDING)
+        for lane, course in zip(holding, each, strict=True):
+            passages = course.passages(0)
+            none = course.ends(0)[1][0] <= 0.0
+            multiples[lane] = 0.0 if none or not len(passages) else passages[0]
+    return multiples
+
+
+# ---- over the cycle -------------------------------------------------------------------------------------------
+
+
+class LockingRange(NamedTuple):
+    """A part of the cycle in one state, or with a margin below the one that counts as near locking.
+
+    state: None of the latter; low, high: its ends, s; margin: the smallest locking margin in it, ∞ beyond what is
+    looked for, NaN if it is not known; at: where, in words; ends, places: on the dial of the drive, and in words.
+    """
+
+    state: LockingState | None
+    low: float
+    high: float
+    margin: float
+    at: str
+    ends: list[float]
+    places: list[str]
+
+    def cells(self, near: float = NEAR) -> list[str]:
+        """The row of the table with HEAD."""
+        state = f"margin below {near:g}" if self.state is None else self.state.short
+        margin = readable(self.margin) if isfinite(self.margin) else f"more than {MARGIN:g}"
+        return [state, *self.places, "—" if isnan(self.margin) else margin, self.at]
 
 
 def locking_course(run: Run, method: FrictionMethod) -> LockingCourse | None:
@@ -74,62 +269,79 @@ class LockingCourse:
     run: Run
     method: FrictionMethod
 
-    # ---- the way back -----------------------------------------------------------------------------------------
-
     @cached_property
-    def courses(self) -> Courses:
-        """Powers, W, delivered to the drivers, given by the useful loads and by all else, backward; then the effort of
-        every driver backward. The states of the panels are codes of `LockingState`, pins in the middle of their play.
+    def course(self) -> CycleCourse:
+        """Power, W: delivered to the drivers forward, and put in by all that acts; the same backward; there that of the
+        useful loads, and of all else; then the effort of every driver backward. The states of the panels are codes of
+        `LockingState`, pins in the middle of their play.
         """
         run, plain = self.run, replace(self.method, name="newton", margin_up_to=0.0)
         seated = course_of(run, replace(self.method, margin_up_to=0.0)) if run.seats else None
-        least = scales_of(run).floor("W")
+        least, drivers = scales_of(run).floor("W"), run.system.mechanism.drivers
 
-        def look(time: Array) -> tuple[Array, NDArray[np.int8]]:
-            back = run.solve(time if run.cycle.duration > 0 else 0.0 * time, method=plain)
-            ahead, other = passage(back), reverse(run, back.walk, plain)
+        def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+            back = run.solve(time, method=plain)
+            ahead, other = Passage.of(back), reverse(run, back.walk, plain)
             status: NDArray[np.integer] = status_of(back, time.shape)
+            locked = ahead.locked
             if seated is not None:  # where it locks pins are in their seats
                 status = seated.status[seated.courses.panels_of(time)]
-                ahead = ahead._replace(locked=status == Status.LOCKED)
+                locked = status == Status.LOCKED
             answered = ((status < Status.NOT_CONVERGED) | (status == Status.LOCKED)) & np.isfinite(other.acting)
-            efforts = [other.efforts[name] for name in run.system.mechanism.drivers]
-            powers = [other.delivered, other.given, other.acting - other.given]
-            return np.stack([*powers, *efforts]), states(ahead, other, answered, least)
+            forward = np.where(ahead.locked | locked, np.nan, [ahead.delivered, ahead.acting])
+            powers = [*forward, other.delivered, other.acting, other.given, other.acting - other.given]
+            held = np.where(answered, 2 * locked + other.locked, 4)  # 0: runs both ways; 3: neither
+            return np.stack([*powers, *(other.efforts[name] for name in drivers)]), held
 
         def like(sizes: Array) -> Array:
-            return np.concatenate([np.full(3, np.max(sizes[:3])), np.full(len(sizes) - 3, np.max(sizes[3:]))])
+            return np.concatenate([np.full(6, np.max(sizes[:6])), np.full(len(drivers), np.max(sizes[6:]))])
 
-        bends = [bend.time for bend in run.bends]
-        bends = bends if seated is None else [*bends, *seated.courses.breaks]
-        breaks = breaks_between(run.cycle, np.array(bends)) if run.cycle.duration > 0 else np.array([0.0, 1.0])
-        with np.errstate(all="ignore"):
-            in_parts = in_blocks(look, len(run.system.joints))
-            return Courses.of(in_parts, breaks, like, accuracy_of(run.cycle, BACK))
+        bends = [*(bend.time for bend in run.bends), *(seated.courses.breaks if seated else ())]
+        courses = run.courses(look, bends, BACK, like)
+        levels = (-least, least, 0.0, least)
+        times = np.concatenate([courses.passages(row, level) for row, level in enumerate(levels)])
+        away = np.min(np.abs(times[:, None] - courses.breaks), axis=1)  # a power that is 0 at a break passes there
+        cut = courses.parted(times[away > SHORT * courses.span])
+        delivered, acting, back_delivered, back_acting, *_ = cut.at(cut.edges[:-1] + cut.half)
+        driven, beyond = back_acting > least, acting > least
+        cases = [
+            (cut.states == 4, LockingState.UNSOLVED),
+            (cut.states == 3, LockingState.JAMMED),
+            (cut.states == 2, LockingState.LOCKED),
+            (cut.states == 1, LockingState.LOCKED_BACKWARD),
+            (driven & (back_delivered > 0), LockingState.BACKDRIVABLE),
+            (beyond & (delivered >= -least), LockingState.DRIVEN_ON),
+            (driven, LockingState.SELF_LOCKING),
+            (beyond, LockingState.SELF_LOCKING_FORWARD),
+        ]
+        where, codes = zip(*cases, strict=True)
+        states = np.select(where, [int(code) for code in codes], int(LockingState.RUNS))
+        breaks = np.union1d(courses.breaks, cut.edges[1:-1][np.diff(states) != 0])
+        shapes = {"forward": (2,), "delivered": (), "acting": (), "given": (), "others": (), "effort": (len(drivers),)}
+        return CycleCourse(run, shapes, replace(cut, states=states, breaks=breaks))
 
     def all_states(self) -> set[LockingState]:
         """The states that there are."""
-        return {STATES[code] for code in np.unique(self.courses.states)}
+        return {STATES[code] for code in np.unique(self.course.status)}
 
     def pushed(self) -> bool:
         """Whether anything acts on it."""
-        return bool(np.nanmax(np.abs(self.courses.coefficients[:, 1:3]), initial=0.0) > 0)
+        return bool(np.nanmax(np.abs(self.course.courses.coefficients[:, 3:6]), initial=0.0) > 0)
 
     def states_at(self, time: Array) -> NDArray[np.int8]:
         """The code of the state at times, s; where it changes that of what follows."""
-        return self.courses.states[self.courses.panels_of(time)].astype(np.int8)
+        return self.course.status[self.course.courses.panels_of(time)].astype(np.int8)
 
     def reverse_figure(self) -> Figure | None:
         """Power that reaches the drivers over that of the useful loads and springs; None if these do not drive.
 
         A mean over the cycle, so it is called self-locking only if friction holds the loads wherever they push.
         """
-        run, courses = self.run, self.courses
+        run, courses = self.run, self.course.courses.picked(np.array([2, 4, 5]))
         name, subject = "efficiency_reverse", "efficiency when backdriven by the useful loads" + centred(run)
         if not has_useful_work(run.system.mechanism):
             return None
-        error = np.maximum(courses.error(), CANCELLED * courses.mean(np.abs))[:3]
-        means = courses.mean()[:3]
+        error, means = np.maximum(courses.error(), CANCELLED * courses.mean(np.abs)), courses.mean()
         delivered, useful, others = np.where(np.abs(means) <= error, 0.0, means)
         if np.isfinite(useful) and not useful > 0:
             return None
@@ -141,22 +353,21 @@ class LockingCourse:
             return Figure(name, subject, None, note=_beside(run))
         pushes = self.all_states() & PUSHES
         value = min(float(delivered / useful), 1.0)
-        if value <= 0 and pushes <= {LockingState.SELF_LOCKING}:
-            return Figure(name, subject, value, note="self-locking")
+        note = "the mean; see the ranges of `locking`" * bool(len(pushes) > 1 and felt(run.system, run.values))
         if value <= 0:
-            return Figure(name, subject, value, note="it takes work on the whole; see the ranges of `locking`")
-        differ = len(pushes) > 1 and felt(run.system, run.values)
-        return Figure(name, subject, value, note="the mean; see the ranges of `locking`" * bool(differ))
+            held = pushes <= {LockingState.SELF_LOCKING}
+            note = "self-locking" if held else "it takes work on the whole; see the ranges of `locking`"
+        return Figure(name, subject, value, note=note)
 
     def reversing_figures(self) -> Iterator[Figure]:
         """The largest effort that each driver has to supply to go back over its range, as to open a clamp."""
-        run, scales = self.run, scales_of(self.run)
+        run, scales, courses = self.run, scales_of(self.run), self.course.courses
         if run.cycle.periodic:
             return
         for i, name in enumerate(run.system.mechanism.drivers):
             unit = "N m" if run.system.turns(name) else "N"
             # a drive supplies effort against the sense in which it went forward; it goes one way where it has a dial
-            middles = self.courses.edges[:-1] + self.courses.half
+            middles = courses.edges[:-1] + courses.half
             sense = np.sign(primal(run.system.drive(run.values, name, middles)[1])) * np.ones(len(middles))
             tops = []
             for sign in (1.0, -1.0):
@@ -165,14 +376,7 @@ class LockingCourse:
             supplied, top = max(tops, key=lambda pair: pair[0], default=(0.0, None))
             if top is not None and supplied > scales.floor(unit):
                 subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} to reverse the motion"
-                place = self.course.told(top)
-                yield Figure(f"{name}.effort_reverse", subject, top.value, unit, "largest", place)
-
-    @cached_property
-    def course(self) -> CycleCourse:
-        """The rows by name."""
-        efforts = len(self.run.system.mechanism.drivers)
-        return CycleCourse(self.run, {"power": (3,), "effort": (efforts,)}, self.courses)
+                yield Figure(f"{name}.effort_reverse", subject, top.value, unit, "largest", self.course.told(top))
 
     # ---- ranges -----------------------------------------------------------------------------------------------
 
@@ -182,23 +386,24 @@ class LockingCourse:
         return self.run.once(("locking ranges", self.method, near), lambda: self._ranges(near))
 
     def _ranges(self, near: float) -> list[LockingRange]:
-        parts = _merged(self.courses.edges, self.courses.states, SHORT * self.courses.span)
-        ranges: list[tuple[LockingState | None, float, float]] = [
-            (STATES[code], low, high) for code, low, high in parts
+        courses = self.course.courses
+        parts: list[tuple[LockingState | None, float, float]] = [
+            (STATES[code], low, high)
+            for code, low, high in _merged(courses.edges, courses.states, SHORT * courses.span)
         ]
         if self.margins is not None:
-            ranges += [(None, low, high) for low, high in self._close_to_locking(self.margins.courses, near)]
-        values, places = on_dial(self.run, [end for _, *ends in ranges for end in ends])
+            parts += [(None, low, high) for low, high in self._close_to_locking(self.margins.courses, near)]
+        values, places = _on_dial(self.run, [end for _, *ends in parts for end in ends])
         return [
             LockingRange(
                 state, low, high, *self._least(low, high), values[2 * k : 2 * k + 2], places[2 * k : 2 * k + 2]
             )
-            for k, (state, low, high) in enumerate(ranges)
+            for k, (state, low, high) in enumerate(parts)
         ]
 
     def _close_to_locking(self, margins: Courses, near: float) -> list[tuple[float, float]]:
         """Begin and end, s, of where it runs with a margin below `near`."""
-        cut = margins.parted(np.concatenate([self.courses.edges, margins.passages(0, near)]))
+        cut = margins.parted(np.concatenate([self.course.courses.edges, margins.passages(0, near)]))
         middles = cut.edges[:-1] + cut.half
         close = (cut.at(middles)[0] < near) & ~np.isin(self.states_at(middles), NO_MARGIN)
         parts = _merged(cut.edges, close.astype(int), SHORT * cut.span)
@@ -258,31 +463,25 @@ class LockingCourse:
             return Figure(name, subject, self.method.margin_up_to, aspect=MORE_THAN, note=note)
         return Figure(name, subject, None, note=note)
 
+    @cached_property
     def responsible(self) -> tuple[str, float] | None:
         """The joint whose friction, changed alone, decides at the place of the least margin, and the multiple of it.
 
         Of a mechanism that runs, the first to lock it; of one that is locked, the one that need be lowered the least.
         """
-        sound = {joint: multiple for joint, multiple in self._critical.items() if np.isfinite(multiple)}
-        locked = [joint for joint, multiple in sound.items() if multiple < 1.0]
-        if locked:
-            joint = max(locked, key=sound.__getitem__)
-            return (joint, sound[joint]) if sound[joint] > 0 else None
-        joint = min(sound, key=sound.__getitem__, default="")
-        return (joint, sound[joint]) if joint else None
-
-    @cached_property
-    def _critical(self) -> dict[str, float]:
-        """The critical multiples of the joints at the place of the least margin."""
         margins = self.margins
         least = None if margins is None else margins.extreme("locking_margin", sign=-1.0, panels=margins.valid)
         if margins is None or least is None:
-            return {}
+            return None
         time = np.array([margins.side(least, "locking_margin", -1.0)])
         plain = replace(self.method, name="newton", margin_up_to=0.0)
         with np.errstate(all="ignore"):
             multiples = critical_multiples(self.run.solve(time, method=plain), self.method.margin_up_to)
-        return {joint: float(multiple[0]) for joint, multiple in multiples.items()}
+        finite = [(float(multiple[0]), joint) for joint, multiple in multiples.items() if np.isfinite(multiple[0])]
+        locked = [pair for pair in finite if pair[0] < 1.0]
+        choose, pairs = (max, locked) if locked else (min, finite)
+        multiple, joint = choose(pairs, key=lambda pair: pair[0], default=(0.0, ""))
+        return (joint, multiple) if joint and (multiple > 0 or not locked) else None
 
     def critical_figures(self, tables: dict[str, Array]) -> Iterator[Figure]:
         """The least critical multiple of each joint whose friction is not 0, and its friction there.
@@ -292,7 +491,6 @@ class LockingCourse:
         run, joints = self.run, felt(self.run.system, self.run.values)
 
         def look(time: Array) -> tuple[Array, NDArray[np.int64]]:
-            time = time if run.cycle.duration > 0 else 0.0 * time
             multiples = critical_multiples(run.solve(time, method=FrictionMethod()), MARGIN)
             rows = np.array([multiples.get(joint, np.full(time.shape, np.nan)) for joint in joints])
             rows = np.where(np.isfinite(rows), rows, np.nan)
@@ -300,11 +498,12 @@ class LockingCourse:
 
         if not joints:
             return
-        with np.errstate(all="ignore"):
-            in_parts = in_blocks(look, len(run.system.joints) * len(joints))
-            courses = Courses.of(in_parts, self.courses.breaks, None, accuracy_of(run.cycle, MARGINS))
-        course = CycleCourse(run, {"multiple": (len(joints),)}, courses)
-        every = np.ones(len(courses.half), bool)
+        breaks = self.course.courses.breaks
+        course = CycleCourse(
+            run, {"multiple": (len(joints),)},
+            run.courses(look, breaks, MARGINS, joints=len(run.system.joints) * len(joints)),
+        )  # fmt: skip
+        every = np.ones(len(course.status), bool)
         for i, joint in enumerate(joints):
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
             least = course.extreme("multiple", i, sign=-1.0, panels=every)
@@ -312,13 +511,11 @@ class LockingCourse:
                 bounded = np.any(np.isinf(tables[joint]))
                 yield Figure(name, subject, MARGIN if bounded else None, aspect=MORE_THAN * bool(bounded))
                 continue
-            figure = Figure(name, subject, least.value, aspect="minimum", place=course.told(least))
             alone = critical_figure(run, joint, least.value, course.told(least))
-            if alone.name != name:
-                yield figure
+            if least.value > 0:
+                yield Figure(name, subject, least.value, aspect="minimum", place=course.told(least))
+            if alone.name != name or not least.value > 0:
                 yield alone
-            else:
-                yield alone if least.value == 0 else figure
 
     # ---- friction that holds the loads ------------------------------------------------------------------------
 
@@ -331,26 +528,23 @@ class LockingCourse:
         everywhere = bool(pushes) and pushes <= HELD
         if not everywhere and run.cycle.periodic:
             return []
-        duration = run.cycle.duration
+        end = np.array([run.cycle.duration])
         if everywhere:
 
             def look(time: Array) -> tuple[Array, NDArray[np.int64]]:
                 multiples = holding_multiples(run, time)
                 return multiples[None], np.isfinite(multiples).astype(int)
 
-            breaks = self.courses.breaks
-            courses = Courses.of(look, breaks, None, accuracy_of(run.cycle, MARGINS._replace(tolerance=1e-9)))
+            courses = run.courses(look, self.course.courses.breaks, MARGINS._replace(tolerance=1e-9))
             course = CycleCourse(run, {"multiple": ()}, courses)
-            every = np.ones(len(courses.half), bool)
-            top = course.extreme("multiple", panels=every)
+            top = course.extreme("multiple", panels=np.ones(len(course.status), bool))
             multiple, place = (0.0, "") if top is None else (top.value, course.told(top))
         else:
-            multiple = float(holding_multiples(run, np.array([duration]))[0])
-            place = f"at {run.system.dial(run.values, np.array([duration])).at(0)}"
+            multiple, place = float(holding_multiples(run, end)[0]), f"at {run.system.dial(run.values, end).at(0)}"
         if not multiple > 0:
             return []
         aspect, subject = "maximum" * everywhere, "down to which it is self-locking" + centred(run)
-        forward = self.states_at(np.array([duration]))[0] == LockingState.SELF_LOCKING_FORWARD
+        forward = self.states_at(end)[0] == LockingState.SELF_LOCKING_FORWARD
         note = "below it the loads drive it on, onto a stop there" * bool(forward and not run.cycle.periodic)
         more = ("1", aspect, place, note)
         figures = [Figure("holding_multiple", f"multiple of all friction {subject}", multiple, *more)]
@@ -362,49 +556,16 @@ class LockingCourse:
         return figures
 
 
-def holding_multiples(run: Run, time: Array) -> Array:
-    """Multiple of all friction down to which friction holds the loads, at each time, s; NaN where it does not.
-
-    There the power delivered to the drivers, in the direction in which the loads push, rises from 0. 0 where it is
-    held without the friction that follows loads.
-    """
-    multiples, least = np.full(len(time), np.nan), scales_of(run).floor("W")
-    walk = run.walk(time)
-    for direction in (walk, walk.backward()):
-        full = passed(run, direction, FrictionMethod())
-        holding = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
-        if not len(holding):
-            continue
-
-        def released(
-            lane: NDArray[np.intp], multiple: Array, times: Array = time[holding], back: bool = direction.direction < 0
-        ) -> tuple[Array, NDArray[np.intp]]:
-            """Power delivered to the drivers for multiples of all friction; below 0 where it locks."""
-            part = run.walk(np.repeat(times[lane], multiple.shape[1]))
-            through = passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
-            power = np.where(through.locked, -np.abs(through.acting), through.delivered)
-            return power.reshape(1, *multiple.shape), through.locked.reshape(multiple.shape).astype(np.intp)
-
-        with np.errstate(all="ignore"):
-            each = Courses.many(released, [np.array([0.0, 1.0])] * len(holding), None, HOLDING)
-        for lane, course in zip(holding, each, strict=True):
-            passages = course.passages(0)
-            none = course.ends(0)[1][0] <= 0.0
-            multiples[lane] = 0.0 if none or not len(passages) else passages[0]
-    return multiples
-
-
 # ---- words ----------------------------------------------------------------------------------------------------
 
 
 def critical_figure(run: Run, joint: str, multiple: float, place: str) -> Figure:
     """The critical friction of a joint alone: its coefficient if its law is proportional to one, else the multiple."""
     parameter = law_of(run.system, joint).scale
-    if not multiple > 0:
-        subject = f"critical multiple of the friction of {joint} alone (it locks even without)"
-        return Figure(f"{joint}.critical_multiple", subject, 0.0, place=place)
-    if not parameter:
-        subject = f"critical multiple of the friction of {joint} alone"
+    if not multiple > 0 or not parameter:
+        subject = f"critical multiple of the friction of {joint} alone" + " (it locks even without)" * (
+            not multiple > 0
+        )
         return Figure(f"{joint}.critical_multiple", subject, multiple, place=place)
     value = float(np.ravel(primal(run.values[f"joints.{joint}.friction.{parameter}"]))[0])
     subject = f"critical friction {parameter} of {joint} alone"
@@ -427,6 +588,17 @@ def _beside(run: Run) -> str:
     }
     others = [source for source, supplies in sources.items() if supplies]
     return f"{', '.join(others)} supply work too" if others else "more than 1: not solved accurately enough"
+
+
+def _on_dial(run: Run, times: Sequence[float]) -> tuple[list[float], list[str]]:
+    """Times, s, on the dial of the drive, as accurately as they are known, and as a person reads them."""
+    dial = run.system.dial(run.values, np.array([*times, 0.0, run.cycle.duration]))
+    accuracy = CLOSE if dial.unit == "°" else SHARE * float(np.ptp(dial.values[-2:]))
+    digits = floor(-log10(accuracy)) if accuracy > 0 else 15
+    values = [round(float(value), digits) + 0.0 for value in dial.values[:-2]]  # so that an end at 0 is 0
+    if dial.unit == "°":
+        return values, [f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".") + "°" for value in values]
+    return values, [f"{value:.5g}{dial.unit}" for value in values]
 
 
 def _merged(edges: Array, codes: NDArray[np.integer], shortest: float) -> list[tuple[int, float, float]]:

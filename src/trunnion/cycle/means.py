@@ -7,23 +7,15 @@ and each has the error of its integral. A mean that this error, or rounding, may
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.panels import CANCELLED
-from trunnion.errors import Status
-from trunnion.model.mechanism import Mechanism
-from trunnion.solve.loads import has_useful_work
-
-__all__ = ["IDEAL", "MOST_SUPPOSED", "RESIDUALS", "SUPPOSED", "Mean", "Means", "still", "unknown"]
+__all__ = ["MOST_SUPPOSED", "RESIDUALS", "SUPPOSED", "Mean", "Means", "unknown"]
 
 Array = NDArray[np.float64]
-# what the means of the ideal mechanism are made of
-IDEAL = ("drive_power", "useful_power", "friction_power", "drive_effort", "power_residual", "status")
 SUPPOSED = "supposed_power"  # W: by how much that through the drivers differs from what stands in for it
 MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
 RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
@@ -90,23 +82,7 @@ class Means:
         return self.integration_error + abs(self.efficiency) * self.supposed
 
 
-def unknown(means: Means) -> Means:
-    """The same means without an answer; what share of them is supposed stays."""
-    no = Mean(np.nan, np.nan, np.nan, np.nan)
-    lost, efforts = (np.full_like(one, np.nan) for one in (means.friction_power_mean, means.drive_effort_rms))
-    return Means(no, no, no, lost, efforts, means.supposed, means.has_useful_work)
-
-
-def still(arrays: Mapping[str, Array], mechanism: Mechanism) -> Means:
-    """The means of a mechanism that stands, in its one position; NaN where positions have no answer."""
-    alone = len(arrays["status"]) == 1 and arrays["status"][0] < Status.NOT_CONVERGED
-    driven, useful, lost, efforts = (
-        arrays[name][..., 0] + (0.0 if alone else np.nan)
-        for name in ("drive_power", "useful_power", "friction_power", "drive_effort")
-    )
-
-    def of(number: Array) -> Mean:
-        value = float(np.sum(number))
-        return Mean(value, 0.0, abs(value), CANCELLED * abs(value))
-
-    return Means(of(driven), of(useful), of(lost), lost, np.abs(efforts), has_useful_work=has_useful_work(mechanism))
+def unknown(drivers: int, joints: int, supposed: float = 0.0, has_useful_work: bool = True) -> Means:
+    """Means without an answer; what share of them is supposed stays."""
+    none = Mean(np.nan, np.nan, np.nan, np.nan)
+    return Means(none, none, none, np.full(joints, np.nan), np.full(drivers, np.nan), supposed, has_useful_work)

@@ -2,31 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.cycle import contact_loss, diagnosis, resting_joints
+from trunnion.cycle import contact_loss, resting_joints
+from trunnion.cycle.causes import Causes
 from trunnion.cycle.course import CycleCourse, course_of
 from trunnion.cycle.cycle_kernel import CycleKernel, compiles
-from trunnion.cycle.deviations import COMPARED, fill_errors
-from trunnion.cycle.fill import allocate, labels, unwrap
-from trunnion.cycle.kept import needed
-from trunnion.cycle.means import IDEAL, Means, still
-from trunnion.cycle.unanswered import blank
-from trunnion.cycle.written import Arrays, fill_chunk, link_numbers
+from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors, labels, unwrap
+from trunnion.cycle.means import Means, unknown
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.names import nearest
+from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import SETTLED, seating_of
-from trunnion.solve.system import Dial, Values
+from trunnion.solve.system import Dial, System, Values
 
-__all__ = ["Arrays", "Positions", "check_steps", "positions", "stretch"]
+__all__ = ["ALL", "Arrays", "Kept", "Positions", "check_steps", "positions", "stretch"]
 
 
+NUMBERS = ("float64", "float32")
+# what summary and findings are made of
+BOOKS = {
+    "condition", "drive_effort", "drive_power", "friction_iterations", "friction_power", "joint_slide",
+    "locking_margin", "power_residual", "reaction_force", "reaction_moment", "spring_elongation", "spring_power",
+    "status", "useful_power",
+}  # fmt: skip
+# what makes an angle run on over whole turns
+TURNED = {
+    "joint_rotation": ("joint_rotation_velocity", "link_angle", "link_angle_velocity"),
+    "link_angle": ("link_angle_velocity",),
+}
 MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, some variables of it less
 
 
@@ -34,6 +46,48 @@ def check_steps(steps: int) -> None:
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
         remedy = f"give a whole number from 1 to {MOST_STEPS:,}, for all positions are held in memory"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
+
+
+@dataclass(frozen=True)
+class Kept:
+    """variables: names of `results.VARIABLES`, all if not given; the status is always kept. dtype: of the floats."""
+
+    variables: tuple[str, ...] | None = None
+    dtype: str = "float64"
+
+    @classmethod
+    def read(cls, variables: Sequence[str] | None, dtype: str) -> Kept:
+        """What somebody asks for; MechanismError for a name or a kind of number that there is not."""
+        if dtype not in NUMBERS:
+            what = f"results are not kept as '{dtype}'"
+            raise MechanismError(Finding(what, "dtype", f"use {' or '.join(NUMBERS)}"))
+        if isinstance(variables, str):
+            variables = [variables]
+        for name in variables or ():
+            if name not in results.VARIABLES:
+                remedy = nearest(str(name), list(results.VARIABLES))
+                raise MechanismError(Finding(f"a result has no variable '{name}'", "variables", remedy))
+        return cls(None if variables is None else (*dict.fromkeys([*variables, "status"]),), dtype)
+
+    @property
+    def margin(self) -> bool:
+        """Whether the locking margin is to be found, which may take longer than all else."""
+        return self.variables is None or "locking_margin" in self.variables
+
+
+ALL = Kept()
+
+
+def needed(wanted: Collection[str], system: System, erring: bool) -> set[str]:
+    """The variables that have to be found for those that are wanted and for the books of the cycle."""
+    found = {*wanted, *BOOKS}
+    if erring:
+        parts = {name for name, one in results.VARIABLES.items() if one.part}
+        found |= {*parts, *COMPARED}
+    found |= {results.SAME_AS[name] for name in found & results.SAME_AS.keys()}
+    if any(PAIRS[kind].threaded for kind, _ in system.joints.values()):  # a screw's slide follows its rotation
+        found.add("joint_rotation")
+    return found | {other for name in found & TURNED.keys() for other in TURNED[name]}
 
 
 @dataclass(frozen=True)
@@ -49,7 +103,7 @@ class Positions:
     time: NDArray[np.float64]
     dial: Dial
     method: FrictionMethod
-    causes: diagnosis.Causes
+    causes: Causes
     means: Means
     ideal: Means | None
     course: CycleCourse | None = None
@@ -95,31 +149,22 @@ def stretch(
     """The same at some times of the cycle, s, in a row and equally spaced; the means are NaN."""
     steps, wanted = len(time), None if wanted is None else needed(wanted, run.system, run.erring)
     names = labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
-    parts = [part for part, there in (("seats", run.seats), ("errors", run.erring)) if there]
-    arrays = allocate(run.system, steps, parts, wanted)
-    causes = diagnosis.Causes(run.system)
-    ideal = {name: np.zeros(arrays[name].shape, arrays[name].dtype) for name in IDEAL} if run.erring else {}
-    compiled = compiles(engine, run, steps, method) and _fill_compiled(
-        arrays, ideal, run, time, method, causes, engine == "auto"
-    )
+    parts = [part for part, has in (("seats", run.seats), ("errors", run.erring)) if has]
+    arrays, causes = allocate(run.system, steps, parts, wanted), Causes(run.system)
+    compiled = compiles(engine, run, steps, method) and _compiled(arrays, run, time, method, causes, engine == "auto")
     for window in blocks(0 if compiled else steps, len(run.system.joints)):
-        if run.erring:
-            _fill_as_built(arrays, ideal, run, time, window, method, causes)
-        else:
-            back = run.solve(time[window], method=method)
-            fill_chunk(arrays, back, time[window], window, causes)
+        _fill(arrays, run, time[window], window, method, causes)
         if progress:
             progress(window.stop)
-    quick = replace(method, margin_up_to=0.0)  # the margin is known by now
-    offsets = seating_of(run, method).offsets(time) if run.seats else {}
-    resting_joints.bracket(arrays, run, time, quick, causes.zero_slip(), offsets)
-    if run.seats:
-        contact_loss.find(arrays, seating_of(run, method), time)
+    quick, seating = replace(method, margin_up_to=0.0), seating_of(run, method) if run.seats else None
+    resting = {joint: places for joint, (places, _) in causes.of("rest").items()}
+    resting_joints.bracket(arrays, run, time, quick, resting, seating)
+    if seating:
+        contact_loss.find(arrays, seating, time)
     unwrap(arrays, run.system, run.values, time)
-    means = still(arrays, run.system.mechanism)
-    meant = still(ideal, run.system.mechanism) if run.erring else None
+    means = unknown(len(run.system.mechanism.drivers), len(run.system.joints))
     dial = run.system.dial(run.values, time)
-    return Positions(arrays, names, time, dial, method, causes, means, meant)
+    return Positions(arrays, names, time, dial, method, causes, means, means if run.erring else None)
 
 
 def _refuse_seats(run: Run) -> None:
@@ -133,72 +178,41 @@ def _refuse_seats(run: Run) -> None:
             raise MechanismError(Finding(what, f"joints.{names[0]}.seat", remedy))
 
 
-def _fill_as_built(
-    arrays: Arrays,
-    ideal: Arrays,
-    run: Run,
-    time: NDArray[np.float64],
-    window: slice,
-    method: FrictionMethod,
-    causes: diagnosis.Causes,
+def _fill(
+    arrays: Arrays, run: Run, time: NDArray[np.float64], window: slice, method: FrictionMethod, causes: Causes
 ) -> None:
-    """One chunk of a mechanism with errors beside the ideal one."""
-    part, quick = time[window], replace(method, margin_up_to=0.0)
-    scratch = allocate(run.system, len(part), wanted={*IDEAL, *COMPARED})
-    fill_chunk(scratch, run.ideal(part, quick), part, slice(0, len(part)))
-    for name, array in ideal.items():
-        array[..., window] = scratch[name]
+    """One chunk of positions; of a mechanism with errors beside the ideal one."""
     seating = seating_of(run, method) if run.seats else None
-    seated = seating.at(part, method) if seating else None
-    back = seated.back if seated else run.solve(part, method=method)
-    fill_chunk(arrays, back, part, window, causes)
+    seated = seating.at(time, method) if seating else None
+    fill_chunk(arrays, seated.back if seated else run.solve(time, method=method), time, window, causes)
     if seating and seated:
-        causes.note_sticking(np.flatnonzero(seated.sticks) + window.start)
+        causes.keep("stuck", "", seated.sticks, np.arange(window.start, window.stop))
         arrays["seat_rounds"][window], arrays["seat_change"][window] = seated.rounds, seating.change[seated.states]
         arrays["seat_travel"][window] = seated.states == SETTLED
         status = arrays["status"][window]
         np.maximum(status, np.where(seated.sticks, status.dtype.type(Status.ZERO_SLIP), 0), out=status)
-    fill_errors(arrays, scratch, link_numbers(run.system), window)
-    blank(arrays, arrays["status"][window].astype(np.int8), window)
+    if run.erring:
+        meant = allocate(run.system, len(time), wanted=COMPARED)
+        fill_chunk(meant, run.ideal(time, replace(method, margin_up_to=0.0)), time, slice(0, len(time)))
+        fill_errors(arrays, meant, run.system, window)
 
 
-def _fill_compiled(
-    arrays: Arrays,
-    ideal: Arrays,
-    run: Run,
-    time: NDArray[np.float64],
-    method: FrictionMethod,
-    causes: diagnosis.Causes,
-    or_not: bool,
+def _compiled(
+    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: Causes, or_not: bool
 ) -> bool:
     """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
     try:
-        own = _kernel(run, run.values, time, arrays, method)
+        kernel = _kernel(run, run.values, time, arrays, method)
     except MechanismError:
         if or_not:
             return False
         raise
-    own.fill(arrays, run.values, time, causes)
+    kernel.fill(arrays, run.values, time, causes)
     if run.erring:
-        _fill_beside_ideal(arrays, ideal, run, time, method)
+        meant, quick = allocate(run.system, len(time), wanted=COMPARED), replace(method, margin_up_to=0.0)
+        _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)
+        fill_errors(arrays, meant, run.system, slice(0, len(time)))
     return True
-
-
-def _fill_beside_ideal(
-    arrays: Arrays,
-    ideal: Arrays,
-    run: Run,
-    time: NDArray[np.float64],
-    method: FrictionMethod,
-) -> None:
-    """The ideal mechanism at all positions, compiled, and what differs from it."""
-    quick, system, everywhere = replace(method, margin_up_to=0.0), run.system, slice(0, len(time))
-    meant = allocate(system, len(time), wanted={*IDEAL, *COMPARED})
-    _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)
-    for name, array in ideal.items():
-        array[...] = meant[name]
-    fill_errors(arrays, meant, link_numbers(system), everywhere)
-    blank(arrays, arrays["status"].astype(np.int8), everywhere)
 
 
 def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle.fill import allocate
-from trunnion.cycle.written import fill_chunk
+from trunnion.cycle.fill import allocate, fill_chunk
 from trunnion.errors import Status
 from trunnion.results.scales import Scales
 from trunnion.solve.run import Run

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Place
 from trunnion.cycle.course import CycleCourse, magnitude
 from trunnion.cycle.findings import Cycle, effort_units, findings
-from trunnion.cycle.kept import ALL, Kept
 from trunnion.cycle.locking_course import critical_figure
 from trunnion.cycle.means import MOST_SUPPOSED, Means
-from trunnion.cycle.model_measures import Watched, watched
-from trunnion.cycle.positions import Positions
+from trunnion.cycle.model_measures import watched
+from trunnion.cycle.positions import ALL, Kept, Positions
 from trunnion.cycle.scales import peak, scales_of
-from trunnion.cycle.scene import COURSE, DRAWN, courses, planar, spatial
+from trunnion.cycle.scene import load_courses, scene_of
 from trunnion.errors import Status
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
@@ -27,7 +27,7 @@ from trunnion.results.attributes import KEPT, cited, encoded, finding_rows, orig
 from trunnion.results.dataset import MemberUnits, driven
 from trunnion.results.figure import Figure
 from trunnion.results.result import Result
-from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, stated_walk, useful_loads
+from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
 from trunnion.solve.system import System, rubbing
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from trunnion.solve.run import Run
 
-__all__ = ["inputs", "member_units", "references", "result_of", "scene_of"]
+__all__ = ["inputs", "member_units", "references", "result_of"]
 
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -52,45 +52,36 @@ PEZZUTI = (
 )
 
 
-def result_of(run: Run, found: Positions, kept: Kept = ALL) -> Result:
-    """The result of a cycle. kept: the variables that its Dataset has."""
-    attributes, measured = books(run, found, kept)
-    return Result(attributes, lambda: dataset_of(run, found, measured, attributes, kept))
+def result_of(run: Run, at: Positions, kept: Kept = ALL) -> Result:
+    """The result of a cycle: formula, findings, summary, input data, drawing data, provenance; and its Dataset.
 
-
-def books(run: Run, found_positions: Positions, kept: Kept = ALL) -> tuple[dict[str, Any], Watched]:
-    """What the result says: formula, findings, summary, input data, drawing data, provenance; and the measures."""
-    mechanism, arrays, time = run.system.mechanism, found_positions.arrays, found_positions.time
-    method = found_positions.method
-    cycle = Cycle(run, found_positions)
+    kept: the variables that the Dataset has.
+    """
+    mechanism, cycle = run.system.mechanism, Cycle(run, at)
     near = cycle.locking if cycle.course else None
-    measured = watched(run, time, method, arrays["status"])
+    measured = watched(run, at.time, at.method, at.arrays["status"])
     drawn = run.once("inputs, scene", lambda: encoded({"inputs": inputs(mechanism), "scene": scene_of(run)}))
-    drawn = drawn | _courses(run, time)
     attributes = encoded(
         {
             **origin(mechanism, run.system.plan.formula, mobility=run.system.plan.mobility),
-            "method": method.name,
+            "method": at.method.name,
             **cited(references(mechanism)),
             "findings": finding_rows([*findings(cycle), *measured.findings]),
             **scales_of(run).summary([*figures(cycle), *measured.summary()]),
-            **({"locking_ranges": near.attribute(time)} if near and near.pushed() else {}),
+            **({"locking_ranges": near.attribute(at.time)} if near and near.pushed() else {}),
             **drawn,
+            **load_courses(run, at.time),
             "periodic": int(run.cycle.periodic),
             **({} if kept.variables is None else {KEPT: kept.variables}),
         }
     )
 
-    return attributes, measured
+    def dataset() -> xr.Dataset:
+        along, units = driven(at.time, *at.dial), member_units(run.system)
+        parts = at.arrays, at.labels, along, at.means, attributes, units, at.ideal
+        return measured.joined(results.dataset(*parts, kept.variables, kept.dtype))
 
-
-def dataset_of(
-    run: Run, found: Positions, measured: Watched, attributes: Mapping[str, Any], kept: Kept = ALL
-) -> xr.Dataset:
-    """The Dataset of some positions."""
-    along = driven(found.time, *found.dial)
-    own = found.arrays, found.labels, along, found.means, attributes, member_units(run.system), found.ideal
-    return measured.joined(results.dataset(*own, kept.variables, kept.dtype))
+    return Result(attributes, dataset)
 
 
 def member_units(system: System) -> dict[str, MemberUnits]:
@@ -137,9 +128,9 @@ def _efforts(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     for i, (name, unit) in enumerate(zip(system.mechanism.drivers, effort_units(system), strict=True)):
         subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name}"
         for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)):
-            top = course.top("drive_effort", i, sign=sign, unit=unit)
+            top = course.extreme("drive_effort", i, sign=sign, unit=unit)
             if top is not None:
-                yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, top.place)
+                yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, course.told(top))
         yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
 
 
@@ -152,12 +143,12 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     planar = system.mechanism.space == "planar"
     for i, (name, (kind, _)) in enumerate(system.joints.items()):
         for what, variable, unit in loads:
-            top = course.top(variable, i, of=magnitude, unit=unit)
+            top = course.extreme(variable, i, of=magnitude, unit=unit)
             if top is None:
                 continue
             if planar or top.value > scales.floor(unit):
                 key = f"{name}.{what.replace(' ', '_')}_max"
-                yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", top.place)
+                yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", course.told(top))
         if PAIRS[kind].guided:
             ends = [course.extreme("joint_slide", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
@@ -171,16 +162,16 @@ def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         return
     if cycle.locking and (margin := cycle.locking.margin_figure()):
         yield margin
-        decides = cycle.locking.responsible()
+        decides = cycle.locking.responsible
         yield from [] if decides is None else [critical_figure(cycle.run, *decides, margin.place)]
     means = course.means
     yield Figure("friction_power_mean", "friction power", means.friction_power.net, "W", "mean")
     if means.supposed > 0:
         off = means.friction_power.error + means.supposed * abs(means.drive_power.net)
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
-    lost = course.top("friction_power", of=lambda rows: np.sum(rows, axis=0), unit="W")
+    lost = course.extreme("friction_power", of=lambda rows: np.sum(rows, axis=0), unit="W")
     if lost is not None:
-        yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", lost.place)
+        yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", course.told(lost))
 
 
 def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
@@ -217,34 +208,29 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
     if cycle.at.ideal is None:
         return
     run = cycle.run
-    points = [
-        (found.value, k, found)
-        for k in range(len(run.system.points))
-        if (found := course.extreme("point_error", k, of=magnitude, panels=course.valid)) is not None
-    ]
+
+    def largest(variable: str, i: int) -> Place | None:
+        return course.extreme(variable, i, of=magnitude, panels=course.valid)
+
+    points = [(top, k) for k in range(len(run.system.points)) if (top := largest("point_error", k)) is not None]
     if points:
-        highest = max(points)[0] * (1 - ALIKE)
-        farthest, k, found = next(one for one in points if one[0] >= highest)  # of equal ones the first
+        highest = max(top.value for top, _ in points) * (1 - ALIKE)
+        top, k = next(pair for pair in points if pair[0].value >= highest)  # of equal ones the first
         most = f"largest: {'.'.join(run.system.points[k])}"
-        yield Figure("point_error_max", "position error", farthest, "m", most, course.told(found))
+        yield Figure("point_error_max", "position error", top.value, "m", most, course.told(top))
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
-        error = course.extreme(f"joint_{what}_error", i, of=magnitude, panels=course.valid)
-        if error is not None:
+        if (error := largest(f"joint_{what}_error", i)) is not None:
             name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
             yield Figure(name, subject, error.value, unit, "largest magnitude", course.told(error))
     for i, joint in enumerate(run.system.mechanism.drivers):
         kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
         subject, name = f"change of the drive {kind} of {joint} by the errors", f"{joint}.effort_change_max"
-        ends = [
-            found
-            for sign in (1.0, -1.0)
-            if (found := course.extreme("drive_effort_change", i, sign=sign, panels=course.valid))
-        ]
-        if ends:
-            change = max(ends, key=lambda one: abs(one.value))
+        ends = [course.extreme("drive_effort_change", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
+        change = max(filter(None, ends), key=lambda end: abs(end.value), default=None)
+        if change is not None:
             yield Figure(name, subject, change.value, unit, "largest magnitude", course.told(change))
 
 
@@ -307,19 +293,3 @@ def inputs(mechanism: Mechanism) -> list[dict[str, Any]]:
             value = float(values[path]) if path in values else None  # an expression of the motion has many
             rows.append({"path": path, "value": value, "unit": unit, "text": text})
     return rows
-
-
-def _courses(run: Run, time: NDArray[np.float64]) -> dict[str, Any]:
-    """Loads that vary at every position, for the drawing; beyond COURSE positions it shows their largest value."""
-    if len(time) > COURSE:
-        return {}
-    found = courses(run.system, run.values, stated_walk(run.system, run.values, run.chosen.assembly, time))
-    return {"load_courses": found} if found else {}
-
-
-def scene_of(run: Run) -> dict[str, Any]:
-    """What a drawing needs to know beside the positions of the points."""
-    system = run.system
-    walk = stated_walk(system, run.values, run.chosen.assembly, run.cycle.times(DRAWN))
-    scene = spatial if system.mechanism.space == "spatial" else planar
-    return scene(system, run.values, walk, useful_loads(system.mechanism))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.cycle import fill
-from trunnion.cycle.written import fill_chunk
+from trunnion.cycle.fill import fill_chunk
 from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.opened import Opened
 from trunnion.dynamics.rest import Rest

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
-from trunnion.cycle.summary import inputs, member_units, references, scene_of
+from trunnion.cycle.scene import scene_of
+from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.contact_motion import Impact
 from trunnion.dynamics.course import OVER_TIME, Courses
 from trunnion.dynamics.energy import kinetic_energy, potential_energy

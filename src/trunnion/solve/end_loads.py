@@ -28,7 +28,6 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.seats import GivenSeat
 from trunnion.solve.status import status_of
-from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import rubbing
 
 if TYPE_CHECKING:
@@ -311,7 +310,7 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
         vectors = [_on_ends([end for end in ends if end.seat.joint == joint]) for joint in system.joints]
 
     def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
-        back = run.solve(time if run.cycle.duration > 0 else 0.0 * time, method=method)
+        back = run.solve(time, method=method)
         numbers = [part for seat in seats for load in loads_of(back, seat) for part in load]
         numbers += [reactions(back, numbers)]
         numbers += [part for joint in system.joints for part in tuple(flat(tuple(back.reactions[joint])))[:count]]
@@ -322,10 +321,7 @@ def _end_loads(run: Run, method: FrictionMethod) -> EndLoads:
     def like(sizes: Array) -> Array:
         return np.concatenate([np.full(rates, np.max(sizes[:rates])), sizes[rates:]])
 
-    stands = run.cycle.duration <= 0
-    breaks = [0.0, 1.0] if stands else breaks_between(run.cycle, np.array([bend.time for bend in run.bends], float))
-    with np.errstate(all="ignore"):
-        courses = Courses.of(look, np.asarray(breaks), like, accuracy_of(run.cycle, Accuracy(shortest=1e-7)))
+    courses = run.courses(look, None, Accuracy(shortest=1e-7), like)
     return EndLoads(
         run, courses, [end for end in ends if end.radius > 0 and end.seat.given is None], first, senses, vectors
     )

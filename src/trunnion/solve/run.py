@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.groups.gear import rotation
@@ -21,17 +22,13 @@ from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.geometry import build
-from trunnion.solve.memory import keep_pages
+from trunnion.solve.memory import in_blocks, keep_pages
 from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy
-from trunnion.solve.switches import Bend, Mechanisms, parted, stated_bends
+from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, parted, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values
 
-if TYPE_CHECKING:
-    pass
-
 __all__ = ["Run", "prepare"]
-
 
 TURN_STEPS = 720
 COMES_BACK = 1e-6  # of the mechanism's size
@@ -121,6 +118,41 @@ class Run:
     def bends(self) -> list[Bend]:
         """Where in the cycle its forces may jump or bend as the model says it, in no order; see `switches`."""
         return stated_bends(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))
+
+    @functools.cached_property
+    def ideal_bends(self) -> list[Bend]:
+        """The same of the mechanism without errors."""
+        if self._ideal_values is None:
+            return self.bends
+        return stated_bends(Mechanisms(self.system, self.chosen.assembly, self._ideal_values, [self.cycle]))
+
+    @np.errstate(all="ignore")
+    def courses(
+        self,
+        look: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.integer]]],
+        bends: Sequence[float] | NDArray[np.float64] | None = None,
+        accuracy: Accuracy | None = None,
+        like: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        joints: int | None = None,
+    ) -> Courses:
+        """Courses over the cycle; of what stands as if for a second.
+
+        Parameters
+        ----------
+        look
+            Rows, (row, time), and states at some times, s.
+        bends
+            Times, s, at which rows may jump or bend; those of the mechanism if not given.
+        accuracy, like
+            See `Courses.many`.
+        joints
+            Whose numbers a look holds in memory at once; those of the mechanism if not given.
+        """
+        moves = self.cycle.duration > 0
+        times = np.array([bend.time for bend in self.bends] if bends is None else bends, float)
+        breaks = breaks_between(self.cycle, times) if moves else np.array([0.0, 1.0])
+        in_parts = in_blocks(look if moves else lambda time: look(0.0 * time), joints or len(self.system.joints))
+        return Courses.of(in_parts, breaks, like, accuracy_of(self.cycle, accuracy or Accuracy()))
 
     @property
     def ideal_values(self) -> Values:

@@ -120,8 +120,12 @@ class Seating:
         added = iter(np.where(states == SETTLED, rows[len(self.paths) :], 0.0))
         travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
         back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
-        sticks = np.any((self.turned[0] <= time[:, None]) & (time[:, None] < self.turned[1]), axis=1)
-        return Seated(back, states, sticks, self.rounds[self.courses.panel(time)])
+        return Seated(back, states, self.sticks(time), self.rounds[self.courses.panel(time)])
+
+    def sticks(self, time: Array) -> NDArray[np.bool_]:
+        """Where the travel of the seats turns round the sense of a joint."""
+        time = self._within(time)
+        return np.asarray(np.any((self.turned[0] <= time[:, None]) & (time[:, None] < self.turned[1]), axis=1))
 
     def offsets(self, time: Array) -> dict[str, Array]:
         """Where the pins lie at times, s, m, by the names of `shifts`."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib import rc_context
 
-from trunnion.cycle.drawable import drawable
+from trunnion.cycle.analyse import drawable
 from trunnion.cycle.inspect import check
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.mechanism import Mechanism

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.cycle import shared_dimensions
-from trunnion.cycle.findings import model_notes
+from trunnion.cycle.findings import model_notes, shared_dimensions
 from trunnion.cycle.scales import scales_of
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status
@@ -123,7 +122,7 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
         yield finding_for("tolerance.pressed", "joints", phrases={"where": pressed[1]}, joints=pressed[0])
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
-    yield from shared_dimensions.findings(mechanism)
+    yield from shared_dimensions(mechanism)
     yield from slow_motions(study.run, (of.measure for of in study.linear.measures), study.inputs.names)
     yield from _play_sizes(outcome)
     yield from _measured(outcome)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle.locking_states import HEAD
+from trunnion.cycle.locking_course import HEAD
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, quantity
 from trunnion.views.common.bundle import bundle, web_text

@@ -25,10 +25,9 @@ from trunnion.model.names import strict_keywords
 from trunnion.results.figure import Figure
 from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.solve.forward import Forward, forward
-from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status
-from trunnion.solve.switches import Mechanisms, accuracy_of, breaks_between, knots_of
+from trunnion.solve.switches import Mechanisms, knots_of
 from trunnion.studies.motor import Motor, motor
 
 __all__ = [
@@ -308,7 +307,6 @@ def _moved(run: Run) -> _Motion:
     system, places = run.system, dict[tuple[str, str], int]()
 
     def look(time: Array) -> tuple[Array, NDArray[np.intp]]:
-        time = time if run.cycle.duration > 0 else 0.0 * time
         walk = forward(system, run.values, run.chosen.assembly, time)
         numbers = _numbers(walk, time)
         places.update({name: row for row, name in enumerate(numbers)})
@@ -321,10 +319,8 @@ def _moved(run: Run) -> _Motion:
         return np.maximum(sizes, [least.get(kind, 0.0) for kind, _ in places])
 
     scales = scales_of(run)
-    knots = np.array([time for _, time in knots_of(Mechanisms(system, run.chosen.assembly, run.values, [run.cycle]))])
-    breaks = breaks_between(run.cycle, knots) if run.cycle.duration > 0 else np.array([0.0, 1.0])
-    courses = Courses.of(in_blocks(look, len(system.joints)), breaks, like, accuracy_of(run.cycle, EXACT))
-    return _Motion(places, courses)
+    knots = [time for _, time in knots_of(Mechanisms(system, run.chosen.assembly, run.values, [run.cycle]))]
+    return _Motion(places, run.courses(look, knots, EXACT, like))
 
 
 def _numbers(walk: Forward, time: Array) -> dict[tuple[str, str], Number]:

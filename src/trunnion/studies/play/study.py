@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
+from trunnion.algebra.course import Accuracy
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.unwrap import unwrap_row
@@ -46,11 +46,9 @@ from trunnion.solve import shifts
 from trunnion.solve.backward import under
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.memory import in_blocks
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.shifts import HOLE, Play
 from trunnion.solve.status import pose_status, status_of
-from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import System, Values
 from trunnion.studies.play.effect import Effect
 from trunnion.studies.play.exact import beyond_first_order, figures_with
@@ -232,20 +230,16 @@ def _theres(run: Run, measures: Sequence[Measure], known: Mapping[str, Play]) ->
 
 def _largest(run: Run, measure: Measure, known: Mapping[str, Play]) -> float:
     """Time, s, of the largest worst case of a measure in the cycle, away from dead centres if it is anywhere else."""
-    cycle = run.cycle
-    if cycle.duration <= 0:
-        return 0.0
 
     def look(time: Array) -> tuple[Array, NDArray[np.intp]]:
         effect = _over(run, [measure], known, time)
         return effect.total, effect.status.astype(np.intp)
 
-    breaks = breaks_between(cycle, np.array([bend.time for bend in run.bends]))
-    courses = Courses.of(in_blocks(look, len(run.system.joints)), breaks, None, accuracy_of(cycle, LOCATED))
+    courses = run.courses(look, accuracy=LOCATED)
     sound = courses.states < Status.NEAR_SINGULAR
     floor = scales_of(run).floor(measure.unit(run.system))
     place = courses.extreme(lambda rows: rows[0], 1.0, sound if np.any(sound) else None, floor)
-    return 0.0 if place is None or place.everywhere else place.time
+    return 0.0 if place is None or place.everywhere or run.cycle.duration <= 0 else place.time
 
 
 def _check(known: Mapping[str, Play]) -> None:

@@ -16,7 +16,8 @@ from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction import FrictionProblem, frictionless, scaled
-from trunnion.solve.friction_method import FrictionMethod, peak
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.friction_problem import largest
 from trunnion.solve.loads import useful_powers
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
         if not places:  # nothing but gears pushed apart
             continue
         own = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
-        loads = peak(settled.problem.state([0.0] * len(contacts)).normals)
+        loads = largest(settled.problem.state([0.0] * len(contacts)).normals)
         for place, multiple in zip(places, _alone(settled.problem, own, most), strict=True):
             multiple = np.where(np.isfinite(loads), multiple, np.nan)
             found[system.places[number][place].joint] = np.broadcast_to(multiple, positions)

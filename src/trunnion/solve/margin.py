@@ -17,11 +17,10 @@ from trunnion.solve.friction import (
     Contact,
     FrictionProblem,
     frictionless,
-    primal_of,
     scaled,
     with_own,
 )
-from trunnion.solve.friction_method import peak
+from trunnion.solve.friction_problem import largest
 
 __all__ = ["locking_margin"]
 
@@ -79,7 +78,7 @@ def _together(back: Backward, count: int) -> FrictionProblem:
             pass_on(flows[-1], number, column, [contact], rubbed[i : i + 1], [1.0])
             influence.append([(0.0,) * len(reaction) for reaction in start[:before]] + column)
             contacts.append(contact._replace(joint=before + contact.joint))
-    return primal_of(FrictionProblem(contacts, start, influence))
+    return FrictionProblem(contacts, start, influence).real
 
 
 def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: Number) -> Number:
@@ -95,4 +94,4 @@ def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: N
 
 def _loaded(problem: FrictionProblem) -> Number:
     """Where its loads are numbers."""
-    return np.isfinite(peak(problem.state([0.0] * len(problem.contacts)).normals))
+    return np.isfinite(largest(problem.state([0.0] * len(problem.contacts)).normals))

@@ -15,10 +15,9 @@ from trunnion.algebra.vector import cross, dot, plus, scaled
 from trunnion.joints.pairs import PAIRS
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward
+from trunnion.solve.contacts import bearing_middle
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.loads import has_useful_work, useful_powers
-from trunnion.solve.space.contacts import bearing_middle
-from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import System, Values
 
 __all__ = [

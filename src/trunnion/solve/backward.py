@@ -16,6 +16,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
 from trunnion.groups.spatial import SpatialGroup
 from trunnion.joints.friction import FrictionLaw, LawFunction
+from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
@@ -205,7 +206,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
     back = Backward(walk, unloaded(walk), travels=bool(given.travel), margin_up_to=method.margin_up_to)
-    back.contacts.update((joint, list(system.geometry.contacts(walk, joint))) for joint in rubbing(system))
+    back.contacts.update((joint, list(contacts_of(walk, joint))) for joint in rubbing(system))
     back.slips.update((joint, _slip(back, joint)) for joint in system.joints)
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip, given.rests)

@@ -18,12 +18,11 @@ from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.geometry import build
 from trunnion.solve.memory import keep_pages
 from trunnion.solve.seats import GivenSeat, seats
-from trunnion.solve.space.determinacy import Determinacy
+from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, parted, stated_bends
-from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values
+from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
 if TYPE_CHECKING:
     pass
@@ -147,8 +146,7 @@ class Run:
     @functools.cached_property
     def determinacy(self) -> Determinacy | None:
         """What of motion and reactions the joints leave open; None in the plane, where the structure decides it."""
-        found: Determinacy | None = self.system.geometry.determinacy(self.system, self.values, self.chosen, self.cycle)
-        return found
+        return look(self.system, self.values, self.chosen, self.cycle) if self.system.spatial else None
 
     @functools.cached_property
     def _past(self) -> dict[str, History]:

@@ -27,6 +27,7 @@ from trunnion.groups.tree import Pose
 from trunnion.results.sentences import finding_for
 from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
+from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates, felt
@@ -183,7 +184,7 @@ def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: 
     """
     found = np.zeros((len(names), CONTACTS, stress.shape[-1]))
     for k, joint in enumerate(names):
-        for i, contact in enumerate(walk.system.geometry.contacts(walk, joint) if joint in rubbing else ()):
+        for i, contact in enumerate(contacts_of(walk, joint) if joint in rubbing else ()):
             found[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
     return found
 

@@ -28,8 +28,7 @@ from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
 from trunnion.joints.spatial import MOTIONS
 from trunnion.solve import shifts
-from trunnion.solve.space.system import SpatialSystem
-from trunnion.solve.system import Values, driven_coordinates
+from trunnion.solve.system import System, Values, driven_coordinates
 
 __all__ = ["End", "LinearLoops", "Loops", "ends_of"]
 
@@ -59,7 +58,7 @@ class LinearLoops(NamedTuple):
     effect: Array
 
 
-def ends_of(system: SpatialSystem, values: Values, every_pin: bool) -> list[End]:
+def ends_of(system: System, values: Values, every_pin: bool) -> list[End]:
     """The ends of all plays that are stated, and of pins that state none if `every_pin`; NaN lengths are left in."""
     found: list[End] = []
     for name, (kind, _) in system.joints.items():
@@ -85,7 +84,7 @@ class Loops:
     or (lane,).
     """
 
-    system: SpatialSystem
+    system: System
     values: Values
     ends: tuple[End, ...]
     holes: Mapping[tuple[str, str], Any]
@@ -93,7 +92,7 @@ class Loops:
     size: float
 
     @classmethod
-    def of(cls, system: SpatialSystem, values: Values, ends: Sequence[End], time: Array) -> Loops:
+    def of(cls, system: System, values: Values, ends: Sequence[End], time: Array) -> Loops:
         """The loops at the given times, s."""
         holes, module = system.holes(values), system.plan.modules[0]
         drive = driven_coordinates(system, module, system.places[0], values, time)[0]

@@ -15,8 +15,7 @@ from trunnion.solve.assembly import Chosen, choose, distance
 from trunnion.solve.forward import forward, start
 from trunnion.solve.space.determinacy import look
 from trunnion.solve.space.loops import Loops
-from trunnion.solve.space.system import SpatialSystem
-from trunnion.solve.system import Cycle, Values
+from trunnion.solve.system import Cycle, System, Values
 from trunnion.solve.track import GUESSES, SEED, guess_reaches
 
 __all__ = ["Start", "start_of"]
@@ -37,7 +36,7 @@ class Start(Protocol):
 class _Ideal:
     """The mechanism without errors, which closes."""
 
-    system: SpatialSystem
+    system: System
     values: Values
     chosen: Chosen
 
@@ -60,7 +59,7 @@ class _Nearly:
         return np.asarray(self.rows[near])
 
 
-def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle) -> tuple[Start, list[Finding]]:
+def start_of(system: System, values: Values, ideal: Values, cycle: Cycle) -> tuple[Start, list[Finding]]:
     """Where to start from, and what there is to say of it.
 
     Raises MechanismError where the mechanism leaves a freedom undetermined, or is nowhere even nearly closed.
@@ -79,7 +78,7 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     return nearly, [misfit]
 
 
-def _followed(system: SpatialSystem, values: Values, cycle: Cycle) -> _Nearly | None:
+def _followed(system: System, values: Values, cycle: Cycle) -> _Nearly | None:
     """The assembly nearest the hints, of those nearly closed, from the first position that has one on, and back."""
     time = np.linspace(0.0, cycle.duration, FOLLOWED + 1 if cycle.duration else 1)
     loops = Loops.of(system, values, (), time)
@@ -100,7 +99,7 @@ def _followed(system: SpatialSystem, values: Values, cycle: Cycle) -> _Nearly | 
     return _Nearly(time, rows, cycle.periodic)
 
 
-def _nearest(system: SpatialSystem, values: Values, loops: Loops) -> Array | None:
+def _nearest(system: System, values: Values, loops: Loops) -> Array | None:
     """Coordinates of the assembly nearest the hints at one position, from many guesses; None if none nearly closes."""
     rng = np.random.default_rng(SEED)
     guesses = [rng.uniform(-reach, reach, GUESSES) for reach in guess_reaches(loops.group, loops.size)]

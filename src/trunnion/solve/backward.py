@@ -15,7 +15,6 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.joints.friction import FrictionLaw, LawFunction
 from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
@@ -32,7 +31,6 @@ __all__ = [
     "Slip",
     "backward",
     "body_loads",
-    "held",
     "pass_on",
     "sense_of",
     "solve",
@@ -70,43 +68,6 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
     """The share to take for one contact of a joint, with its sign."""
     sense = zero_slip.get(joint, 0.0)
     return sense[contact] if isinstance(sense, tuple) else sense
-
-
-def held(
-    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share, sliding: bool = False
-) -> tuple[FrictionLaw, dict[str, Number], Number]:
-    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests. sliding: see Given"""
-    if not np.any(zero):
-        return law, parameters, speed
-    forced = np.sign(sense) * np.maximum(np.abs(primal(speed)), 1e-300)
-    speed = namespace(speed).where(zero, forced, speed)
-    if law.at_rest is not None and not sliding:
-        law = replace(law, function=functools.partial(_resting, law.function, law.at_rest))
-        parameters = {**parameters, "resting": np.where(zero, 1.0, 0.0)}
-    if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
-        share = np.where(zero, np.abs(sense), 1.0)
-        return replace(law, function=functools.partial(_shared, law.function)), {**parameters, "share": share}, speed
-    return law, parameters, speed
-
-
-def _slip_known(slip: Number, sense: Share, rests: bool) -> tuple[Number, Number]:
-    """Slip and where it is zero, of a contact of which it is known whether it rests or slides in a sense."""
-    if rests:
-        return slip, np.True_
-    return namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense), np.False_
-
-
-def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Number, **parameters: Number) -> Number:
-    """A share of what the law says."""
-    return share * function(normal, slip, **parameters)
-
-
-def _resting(
-    function: LawFunction, at_rest: LawFunction, normal: Number, slip: Number, *, resting: Number, **parameters: Number
-) -> Number:
-    """What the law says at rest, where it rests."""
-    moving = function(normal, slip, **parameters)
-    return namespace(moving).where(resting > 0, at_rest(normal, slip, **parameters), moving)
 
 
 @dataclass(frozen=True)
@@ -364,22 +325,27 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Ru
     """One contact of a joint, its i-th, as `friction` sees it."""
     walk, law = back.walk, law_of(back.walk.system, joint)
     parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
-    sense = sense_of(given.zero_slip, joint, i)
-    slip, zero, known = one.slip, one.zero, joint in given.rests
-    if known:
-        slip, zero = _slip_known(slip, sense, given.rests[joint])
-    law, parameters, speed = held(law, parameters, slip, zero, sense, given.sliding and not known)
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
+    sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), one.slip, one.zero, given.sliding
+    if joint in given.rests:  # it is known whether it rests or slides in a sense
+        zero, sliding = np.bool_(given.rests[joint]), False
+        if not zero:
+            slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
+    resting: Number = 0.0
+    share: Number = 1.0
+    if np.any(zero):
+        slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
+        if not sliding:
+            resting = np.where(zero, 1.0, 0.0)
+        if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
+            share = np.where(zero, np.abs(sense), 1.0)
     first, second = walk.system.joints[joint][1]
-    units = []
-    for link in links:
-        if link in (first, second):
-            unit = walk.on_link(link, one.unit, joint)
-            units.append(unit if link == second else walk.algebra.times(-1.0, unit))
-        else:
-            units.append(walk.algebra.ZERO_LOAD)
-    return Contact(k, units, one.load, law, parameters, speed, own=tuple(flat(one.unit)) if one.felt else None)
+    unit = walk.on_link(second, one.unit, joint)
+    on = {first: walk.algebra.times(-1.0, unit), second: unit}
+    own = tuple(flat(one.unit)) if one.felt else None
+    units = [on.get(link, walk.algebra.ZERO_LOAD) for link in links]
+    return Contact(k, units, one.load, law, parameters, slip, own=own, resting=resting, share=share)
 
 
 def _record(

@@ -12,9 +12,7 @@ happens is reported.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -24,7 +22,6 @@ from trunnion.algebra import linalg
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, apart, looped
 from trunnion.algebra.nested import replaced
-from trunnion.joints.friction import LawFunction
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
@@ -83,24 +80,15 @@ def settle(
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
     if method.multiple is not None:
-        contacts = [_times(method.multiple, contact) if contact.rubs else contact for contact in contacts]
+        contacts = [
+            contact._replace(share=method.multiple * contact.share) if contact.rubs else contact for contact in contacts
+        ]
     influence = [with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)
     if problem.one_way and method.name == "newton":  # no law looks at what friction changes
         forces = problem.target(problem.state([0.0] * len(contacts)).normals)
         return Settled(problem.reactions(forces), forces, 1, 0.0, 0.0, True, problem=problem.real)
     return _iterated(problem, method)
-
-
-def _times(multiple: Number, contact: Contact) -> Contact:
-    """The contact with a multiple of its friction."""
-    law = replace(contact.law, function=functools.partial(_multiplied, contact.law.function))
-    return contact._replace(law=law, parameters={**contact.parameters, "multiple": multiple})
-
-
-def _multiplied(function: LawFunction, normal: Number, slip: Number, *, multiple: Number, **own: Number) -> Number:
-    """A multiple of what the law says."""
-    return multiple * function(normal, slip, **own)
 
 
 def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.literal import is_zero, less, plus
-from trunnion.algebra.namespace import Number, apart
+from trunnion.algebra.literal import is_zero, less, plus, times
+from trunnion.algebra.namespace import Number, apart, namespace
 from trunnion.algebra.nested import replaced
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
@@ -31,7 +31,8 @@ class Contact(NamedTuple):
     links; load: normal load and its gradient from the joint's reaction; law with parameters; slip: m/s.
     rubs: False for the separating force of a gear pair, which follows the tooth force as friction follows the
     normal load, but is there in full whatever the friction. own: what the unit load adds to what the joint itself
-    carries, where its load depends on that.
+    carries, where its load depends on that. resting: above 0 where the law takes its value at rest; share: of what the
+    law says.
     """
 
     joint: int
@@ -42,12 +43,23 @@ class Contact(NamedTuple):
     slip: Number
     rubs: bool = True
     own: Reaction | None = None
+    resting: Number = 0.0
+    share: Number = 1.0
+
+    @property
+    def slope(self) -> Number:
+        """Friction force for each newton of normal load: every law is proportional to it."""
+        slope = self.law.function(1.0, self.slip, **self.parameters)
+        if self.law.at_rest is not None and not is_zero(self.resting):
+            slope = namespace(slope).where(self.resting > 0, self.law.at_rest(1.0, self.slip, **self.parameters), slope)
+        return times(self.share, slope)
 
     def mapped(self, change: Callable[[Number], Number]) -> Contact:
         """The same with `change` applied to every number that the laws see."""
         parameters = {name: change(value) for name, value in self.parameters.items()}
         load: ContactLoad = self.load.mapped(change)
-        return self._replace(load=load, parameters=parameters, slip=change(self.slip))
+        slip, resting, share = change(self.slip), change(self.resting), change(self.share)
+        return self._replace(load=load, parameters=parameters, slip=slip, resting=resting, share=share)
 
 
 class Rubbing(NamedTuple):
@@ -127,7 +139,7 @@ class FrictionProblem:
 
         for contact in self.contacts:
             contact.load.mapped(note)
-            found += [contact.slip, *contact.parameters.values()]
+            found += [contact.slip, contact.resting, contact.share, *contact.parameters.values()]
         return [*found, *(n for wrenches in (self.start, *self.influence) for wrench in wrenches for n in wrench)]
 
     @cached_property
@@ -185,7 +197,7 @@ class FrictionProblem:
     @cached_property
     def slopes(self) -> list[Number]:
         """Friction force for each newton of normal load: every law is proportional to it."""
-        return [contact.law.function(1.0, contact.slip, **contact.parameters) for contact in self.contacts]
+        return [contact.slope for contact in self.contacts]
 
     def target(self, normals: Sequence[Number]) -> list[Number]:
         """What the laws say for these normal loads."""

@@ -31,33 +31,26 @@ def locking_margin(back: Backward) -> Number:
     Below 1 where the position is locked; NaN of numbers that are compiled where the search does not come to an end.
     """
     if back.margin is None:
-        back.margin = _found(back)
+        back.margin = _margin(back, back.margin_up_to)
     return back.margin
 
 
-def _found(back: Backward) -> Number:
-    most = back.margin_up_to
-    known = [(k, one.problem) for k, one in enumerate(back.settled) if one.problem is not None]
-    iterated = [(k, problem) for k, problem in known if not problem.one_way]
-    if most <= 0 or not iterated:
-        return np.inf
+def _margin(back: Backward, most: float) -> Number:
     margin: Number = np.inf
     left: Number = np.True_
-    for k, own in reversed(iterated):  # a module without a certificate is followed with those that load it
-        doubtful = left & (own.bound() * most >= 1.0)
+    for k in reversed(range(len(back.settled) if most > 0 else 0)):
+        problem, share = back.settled[k].problem, back.settled[k].share
+        if problem is None or problem.one_way:
+            continue
+        # a module without a certificate is followed with those that load it
+        doubtful = left & (problem.bound() * most >= 1.0)
         left = left & ~doubtful
-        if np.any(doubtful):
-            alone = _alone(back, k)
-            problem = own if alone else _together(back, k + 1)
-            margin = np.where(
-                doubtful, _followed(problem, doubtful, most, back.settled[k].share if alone else 1.0), margin
-            )
+        if not np.any(doubtful):
+            continue
+        if any(contacts for contacts, _ in back.rubbed[:k]):
+            problem, share = _together(back, k + 1), 1.0
+        margin = np.where(doubtful, _followed(problem, doubtful, most, share), margin)
     return margin
-
-
-def _alone(back: Backward, k: int) -> bool:
-    """Whether nothing rubs in the modules that were settled before one."""
-    return not any(contacts for contacts, _ in back.rubbed[:k])
 
 
 def _together(back: Backward, count: int) -> FrictionProblem:
@@ -89,9 +82,5 @@ def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: N
         _, share = continuation.follow(scaled(part), frictionless(part), most, wanted)
         return np.where(share >= most, np.inf, share)
 
-    return problem.in_lanes(reached, doubtful & ~known & _loaded(problem), np.where(known, shares, np.inf))
-
-
-def _loaded(problem: FrictionProblem) -> Number:
-    """Where its loads are numbers."""
-    return np.isfinite(largest(problem.state([0.0] * len(problem.contacts)).normals))
+    loaded = np.isfinite(largest(problem.state([0.0] * len(problem.contacts)).normals))
+    return problem.in_lanes(reached, doubtful & ~known & loaded, np.where(known, shares, np.inf))

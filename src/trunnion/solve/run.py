@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,6 @@ from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, parted, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["Run", "prepare"]
 
@@ -50,31 +47,16 @@ class Run:
         method: FrictionMethod | None = None,
         zero_slip: Mapping[str, Sense] | None = None,
     ) -> Backward:
-        """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`.
+        """Motion and forces at the given times (s), nominal or with other values; see `backward.solve`.
 
-        zero_slip: see `kinetostatics.Given`.
+        zero_slip: see `backward.Given`.
         """
         values = self.values if values is None else values
-        past = self._past if values is self.values else self._histories(values)
-        return self._solve(time, values, past, method, zero_slip)
+        return self._solve(time, values, method, Given(zero_slip or {}), self._bristles(values))
 
     def walk(self, time: Number) -> Forward:
         """Motion alone at the given times (s)."""
         return forward(self.system, self.values, self.chosen.assembly, time)
-
-    def _solve(
-        self,
-        time: Number,
-        values: Values,
-        past: Mapping[str, History],
-        method: FrictionMethod | None,
-        zero_slip: Mapping[str, Sense] | None = None,
-        travel: Mapping[str, Travel] | None = None,
-        rests: Mapping[str, bool] | None = None,
-    ) -> Backward:
-        deflections = {joint: history.at(time) for joint, history in past.items()}
-        given = Given(zero_slip or {}, deflections, travel or {}, rests=rests or {})
-        return solve(self.system, values, self.chosen.assembly, time, method, given)
 
     def at(
         self,
@@ -86,11 +68,29 @@ class Run:
         rests: Mapping[str, bool] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
-        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, travel, rests)
+        given = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
+        return self._solve(time, {**self.values, **offsets}, method, given, self._bristles(self.values))
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
-        return self._solve(time, self.ideal_values, self._ideal_past, method)
+        return self.solve(time, self.ideal_values, method)
+
+    def _solve(
+        self, time: Number, values: Values, method: FrictionMethod | None, given: Given, past: Mapping[str, History]
+    ) -> Backward:
+        deflections = {joint: history.at(time) for joint, history in past.items()}
+        return solve(self.system, values, self.chosen.assembly, time, method, replace(given, deflections=deflections))
+
+    def _bristles(self, values: Values) -> dict[str, History]:
+        """Histories of the bristles; of the nominal values, and of those without errors, found once."""
+
+        @np.errstate(all="ignore")
+        def find() -> dict[str, History]:
+            return histories(self.system, values, self.chosen.assembly, self.cycle)
+
+        if values is self.values:
+            return self.once("bristles", find)
+        return self.once("bristles without errors", find) if values is self._ideal_values else find()
 
     @functools.cached_property
     def _found(self) -> dict[Hashable, Any]:
@@ -136,22 +136,9 @@ class Run:
         return bool(self.seats) or self._ideal_values is not None
 
     @functools.cached_property
-    def _ideal_past(self) -> dict[str, History]:
-        return self._past if self._ideal_values is None else self._histories(self._ideal_values)
-
-    def _histories(self, values: Values) -> dict[str, History]:
-        with np.errstate(all="ignore"):
-            return histories(self.system, values, self.chosen.assembly, self.cycle)
-
-    @functools.cached_property
     def determinacy(self) -> Determinacy | None:
         """What of motion and reactions the joints leave open; None in the plane, where the structure decides it."""
         return look(self.system, self.values, self.chosen, self.cycle) if self.system.spatial else None
-
-    @functools.cached_property
-    def _past(self) -> dict[str, History]:
-        """Histories of the bristles at the nominal values."""
-        return self._histories(self.values)
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so

@@ -398,7 +398,7 @@ def _share(back: Backward, joint: str) -> Number | None:
     if joint not in back.turning:
         return None
     contact, turning = back.turning[joint]
-    slope = contact.law.function(1.0, contact.slip, **contact.parameters)
+    slope = contact.slope
     return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 

@@ -59,13 +59,13 @@ class Dial(NamedTuple):
 
     def intervals(self, positions: Positions) -> str:
         """Positions as intervals: 'at 0° and 12°, between 132° and 228° of A'."""
-        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
         if len(positions) == len(self.values):
             return "at every position" if len(self.values) > 1 else "in its one position"
+        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
         texts: list[str] = []
-        for alone, some in itertools.groupby(runs[:MOST_INTERVALS], lambda run: len(run) == 1):
-            ends = [(self.at(run[0]), self.at(run[-1])) for run in some]
-            if alone:
+        for single, group in itertools.groupby(runs[:MOST_INTERVALS], lambda run: len(run) == 1):
+            ends = [(self.at(run[0]), self.at(run[-1])) for run in group]
+            if single:
                 *others, last = (first for first, _ in ends)
                 texts.append(f"at {', '.join(others)} and {last}" if others else f"at {last}")
             else:
@@ -379,13 +379,12 @@ class System:
     @cached_property
     def _driver_paths(self) -> dict[str, list[tuple[str, str]]]:
         """(key, path) of the numbers of each driver."""
-        found: dict[str, list[tuple[str, str]]] = {name: [] for name in self.mechanism.drivers}
-        for path in self.mechanism.parameter_set.entries:
-            section, _, rest = path.partition(".")
-            if section == "drivers":
-                name, _, key = rest.partition(".")
-                found[name].append((key, path))
-        return found
+        paths = list(self.mechanism.parameter_set.entries)
+        starts = {name: f"drivers.{name}." for name in self.mechanism.drivers}
+        return {
+            name: [(path.removeprefix(start), path) for path in paths if path.startswith(start)]
+            for name, start in starts.items()
+        }
 
     def dial(self, values: Values, time: NDArray[np.float64]) -> Dial:
         """Positions by the coordinate of the only driver if it runs one way, else by time (s)."""
@@ -398,11 +397,8 @@ class System:
 
     def pace(self, values: Values) -> Number:
         """Angular speed typical of the mechanism, rad/s: the peak of its fastest driver, a slide's per size."""
-        rates: list[Number] = [0.0]
-        for name in self.mechanism.drivers:
-            speed = self.span(values, name).peak
-            rates.append(speed if self.turns(name) else speed / self.size(values))
-        return functools.reduce(np.maximum, rates)
+        peaks = ((self.span(values, name).peak, self.turns(name)) for name in self.mechanism.drivers)
+        return functools.reduce(np.maximum, (peak if turns else peak / self.size(values) for peak, turns in peaks), 0.0)
 
     def size(self, values: Values, elements: Mapping[tuple[str, str], Any] | None = None) -> Number:
         """Length typical of the mechanism, m: the widest spread of two joints on one link.
@@ -438,36 +434,36 @@ class System:
             return Cycle(0.0, periodic=False)
         nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
         spans = {name: self.span(nominal, name) for name in drivers}
-        findings: list[Finding] = []
-        for name, span in spans.items():
-            if span.duration < 0:
-                speed = nominal[f"drivers.{name}.speed"]
-                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
-                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
-                findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
         found = {name for name, driver in drivers.items() if free and driver.found}
-        longest = float(
-            max(span.duration for name, span in spans.items() if name not in found or len(found) == len(spans))
-        )
+        longest = float(max(span.duration for name, span in spans.items() if name not in found or found == set(spans)))
+        findings = list(self._backward_ranges(nominal, spans))
         ending = [name for name, span in spans.items() if not span.periodic]
-        for name in ending:
-            if (
-                not findings
-                and name not in found
-                and not spans[name].rests
-                and abs(spans[name].duration - longest) > 1e-9 * longest
-            ):
-                what = f"its range lasts {spans[name].duration:g} s, the whole cycle lasts {longest:g} s"
+        for name in ending if not findings else ():
+            span = spans[name]
+            if name not in found and not span.rests and abs(span.duration - longest) > 1e-9 * longest:
+                what = f"its range lasts {span.duration:g} s, the whole cycle lasts {longest:g} s"
                 findings.append(Finding(what, f"drivers.{name}", "use the same duration for all drivers with a range"))
+                break
         if findings:
             raise MechanismError(findings)
         periods = [longest / span.duration for span in spans.values()]
         if self.mechanism.gears:
             periods += self.geared_turns(values, longest, turns).values()
-        whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
-        periodic = bool(whole and not ending)
-        duration = whole * longest if periodic else longest
-        return Cycle(duration, periodic, max(self._turns(name, span, duration) for name, span in spans.items()))
+        count = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
+        periodic = bool(count and not ending)
+        duration = count * longest if periodic else longest
+        # turns that a driver would make at its largest rate; of a slide, how often it would travel
+        ways = {name: 2 * np.pi if self.turns(name) else span.travel for name, span in spans.items()}
+        return Cycle(duration, periodic, max(float(spans[name].peak * duration / way) for name, way in ways.items()))
+
+    def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:
+        """Drivers whose range runs against their speed."""
+        for name, span in spans.items():
+            if span.duration < 0:
+                speed = nominal[f"drivers.{name}.speed"]
+                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
+                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
+                yield Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign")
 
     def geared_turns(
         self, values: Values, duration: float, known: Mapping[str, float] | None = None
@@ -487,11 +483,6 @@ class System:
                 elif second in turns:
                     turns[first] = turns[second] / ratio
         return turns
-
-    def _turns(self, driver: str, span: Span, duration: float) -> float:
-        """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
-        revolute = self.turns(driver)
-        return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
 
 
 def _widest(links: Sequence[Sequence[Sequence[Number]]]) -> Number:

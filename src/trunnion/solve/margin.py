@@ -47,7 +47,7 @@ def _margin(back: Backward, most: float) -> Number:
         left = left & ~doubtful
         if not np.any(doubtful):
             continue
-        if any(contacts for contacts, _ in back.rubbed[:k]):
+        if any(back.rubbed[:k]):
             problem, share = _together(back, k + 1), 1.0
         margin = np.where(doubtful, _followed(problem, doubtful, most, share), margin)
     return margin
@@ -58,17 +58,17 @@ def _together(back: Backward, count: int) -> FrictionProblem:
     walk = back.walk
     bare, flows = Backward(walk, dict(back.stated)), list[Backward]()  # without friction, and 1 N of each friction
     contacts, start, influence = list[Contact](), list[Reaction](), list[list[Reaction]]()
-    for number, (own, rubbed) in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
+    for number, rubbed in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
         group, links = walk.reacting(walk.system.groups[number]), walk.system.plan.modules[number].links
         before = len(start)
         for found, flow in [(start, bare), *zip(influence, flows, strict=True)]:
             reactions = group.reactions(walk.poses[number], [flow.loads[link] for link in links])
             found += reactions
-            pass_on(flow, number, reactions, (), (), ())
-        for i, contact in enumerate(own):
+            pass_on(flow, number, reactions, (), ())
+        for contact, rub in rubbed:
             column = with_own(contact, list(group.reactions(walk.poses[number], contact.unit_loads)))
             flows.append(Backward(walk, unloaded(walk)))
-            pass_on(flows[-1], number, column, [contact], rubbed[i : i + 1], [1.0])
+            pass_on(flows[-1], number, column, [(contact, rub)], [1.0])
             influence.append([(0.0,) * len(reaction) for reaction in start[:before]] + column)
             contacts.append(contact._replace(joint=before + contact.joint))
     return FrictionProblem(contacts, start, influence).real

@@ -7,7 +7,7 @@ plane has its wrench about its point on its second link, where a pin carries no 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -554,23 +554,25 @@ def forward(
     NaN from the first module that cannot be assembled onward, lane by lane. travel: how the links also move, since the
     seats of pins travel.
     """
-    walk = start(system, values)
-    walk.time = time
-    with np.errstate(all="ignore"):
-        for number in range(len(system.plan.modules)):
-            walk.take(number, pose_of(walk, number, assembly[number], time), time)
-        if travel:
-            walk.carried(travel)
+    walk = _walked(system, values, assembly, time, lambda walk, number, pose: walk.take(number, pose, time))
+    if travel:
+        walk.carried(travel)
     return walk
 
 
 def posed(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
     """The walk of `forward` for what the places alone decide: every link is left at rest."""
+    return _walked(system, values, assembly, time, lambda walk, number, pose: walk.stand(number, pose))
+
+
+def _walked(
+    system: System, values: Values, assembly: Assembly, time: Number, add: Callable[[Forward, int, Any], None]
+) -> Forward:
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
         for number in range(len(system.plan.modules)):
-            walk.stand(number, pose_of(walk, number, assembly[number], time))
+            add(walk, number, pose_of(walk, number, assembly[number], time))
     return walk
 
 

@@ -69,11 +69,12 @@ class Run:
     ) -> Backward:
         """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
         given = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
-        return self._solve(time, {**self.values, **offsets}, method, given, self._bristles(self.values))
+        return self._solve(time, {**self.values, **offsets}, method, given, self._past)
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
-        return self.solve(time, self.ideal_values, method)
+        past = self.once("bristles without errors", lambda: self._bristles(self.ideal_values))
+        return self._solve(time, self.ideal_values, method, Given(), past)
 
     def _solve(
         self, time: Number, values: Values, method: FrictionMethod | None, given: Given, past: Mapping[str, History]
@@ -82,15 +83,16 @@ class Run:
         return solve(self.system, values, self.chosen.assembly, time, method, replace(given, deflections=deflections))
 
     def _bristles(self, values: Values) -> dict[str, History]:
-        """Histories of the bristles; of the nominal values, and of those without errors, found once."""
+        """Histories of the bristles; those of the nominal values are found once."""
+        return self._past if values is self.values else self._histories(values)
 
-        @np.errstate(all="ignore")
-        def find() -> dict[str, History]:
-            return histories(self.system, values, self.chosen.assembly, self.cycle)
+    @functools.cached_property
+    def _past(self) -> dict[str, History]:
+        return self._histories(self.values)
 
-        if values is self.values:
-            return self.once("bristles", find)
-        return self.once("bristles without errors", find) if values is self._ideal_values else find()
+    @np.errstate(all="ignore")
+    def _histories(self, values: Values) -> dict[str, History]:
+        return histories(self.system, values, self.chosen.assembly, self.cycle)
 
     @functools.cached_property
     def _found(self) -> dict[Hashable, Any]:

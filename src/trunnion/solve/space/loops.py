@@ -136,20 +136,20 @@ class Loops:
         def column(number: Number) -> Number:
             return np.asarray(number, float)[:, None] if deep and np.ndim(number) else number
 
-        return self.group.coordinates([column(one) for one in q.T], [column(one) for one in self.drive])
+        return self.group.coordinates([column(row) for row in q.T], [column(number) for number in self.drive])
 
     def linear(self, q: Array, c: Array) -> LinearLoops:
         """Gap and its derivatives at coordinates (lane, kept) and offsets (lane, component), m."""
         group, count = self.group, c.shape[1]
         joints = self._coordinates(q)
-        _, placed, screws = group.place(self._elements(list(c.T)), joints)
+        _, placed, screws = self._place(q, c)
         gap = _full(group.gaps(placed, joints, self.size), (len(q),))
         jacobian = np.broadcast_to(
             stacked(group.jacobian(placed, screws, self.size)), (len(q), gap.shape[1], len(group.free))
         )
         if not count:
             return LinearLoops(gap, jacobian, np.zeros((*gap.shape, 0)))
-        seeds = [Dual(one[:, None], row[None, :]) for one, row in zip(c.T, np.eye(count), strict=True)]
+        seeds = [Dual(offset[:, None], row[None, :]) for offset, row in zip(c.T, np.eye(count), strict=True)]
         deep = self._coordinates(q, deep=True)
         opened = group.gaps(group.place(self._elements(seeds), deep)[1], deep, self.size)
         effect = _full([n.dual if isinstance(n, Dual) else 0.0 for n in opened], (len(q), count))
@@ -157,13 +157,17 @@ class Loops:
 
     def opening(self, q: Array, c: Array) -> Array:
         """Largest opening of a loop at every lane, in units of the size; rad."""
-        joints = self._coordinates(q)
-        placed = self.group.place(self._elements(list(c.T)), joints)[1]
+        joints, (_, placed, _) = self._coordinates(q), self._place(q, c)
         return np.broadcast_to(self.group.opening(placed, joints, self.size), (len(q),)) / self.size
 
     def frames(self, q: Array, c: Array) -> tuple[Any, ...]:
         """Frames of the links."""
-        return self.group.place(self._elements(list(c.T)), self._coordinates(q))[0]
+        frames: tuple[Any, ...] = self._place(q, c)[0]
+        return frames
+
+    def _place(self, q: Array, c: Array) -> tuple[Any, ...]:
+        placed: tuple[Any, ...] = self.group.place(self._elements(list(c.T)), self._coordinates(q))
+        return placed
 
     def moved(self, q: Array, steps: Array) -> Array:
         """Coordinates (lane, kept) after steps (lane, free) in every free coordinate, slides in units of the size."""

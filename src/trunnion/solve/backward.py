@@ -232,7 +232,7 @@ def _slip(back: Backward, joint: str) -> Slip:
     walk = back.walk
     if not walk.pair(joint).count:
         return Slip(0.0, False)
-    zeros = [one.zero for one in back.contacts.get(joint, [])]
+    zeros = [rub.zero for rub in back.contacts.get(joint, [])]
     zeros += [walk.still(joint, turns) for turns in walk.system.resisted.get(joint, ())]
     return Slip(walk.speed(joint), functools.reduce(operator.or_, zeros) if zeros else False)
 
@@ -257,13 +257,13 @@ def _add_body_loads(back: Backward) -> None:
         back.add(link, load)
 
 
-def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], known: Container[str]) -> None:
+def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], sensed: Container[str]) -> None:
     """The loads and springs of the model, with the power each gives the mechanism."""
     senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
-    for name, action in stated_loads(back.walk, senses, known):
+    for name, action in stated_loads(back.walk, senses, sensed):
         back.load_powers[name] = action.power
         back.act(action, f"loads.{name}")
-    for name, action, effort in losses(back.walk, senses, known):
+    for name, action, effort in losses(back.walk, senses, sensed):
         back.drags[name] = effort, -action.power
         back.act(action)
     for name, action, state in springs(back.walk):
@@ -328,13 +328,13 @@ def _pass_joints(
             _record(back, place, wrench, own, driven)
 
 
-def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Rubbing, given: Given, i: int) -> Contact:
+def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, given: Given, i: int) -> Contact:
     """One contact of a joint, its i-th, as `friction` sees it."""
     walk, law = back.walk, law_of(back.walk.system, joint)
     parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
-    sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), one.slip, one.zero, given.sliding
+    sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), rub.slip, rub.zero, given.sliding
     if joint in given.rests:  # it is known whether it rests or slides in a sense
         zero, sliding = np.bool_(given.rests[joint]), False
         if not zero:
@@ -348,11 +348,11 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Ru
         if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
             share = np.where(zero, np.abs(sense), 1.0)
     first, second = walk.system.joints[joint][1]
-    unit = walk.on_link(second, one.unit, joint)
+    unit = walk.on_link(second, rub.unit, joint)
     on = {first: walk.algebra.times(-1.0, unit), second: unit}
-    own = tuple(flat(one.unit)) if one.felt else None
+    felt = tuple(flat(rub.unit)) if rub.felt else None
     units = [on.get(link, walk.algebra.ZERO_LOAD) for link in links]
-    return Contact(k, units, one.load, law, parameters, slip, own=own, resting=resting, share=share)
+    return Contact(k, units, rub.load, law, parameters, slip, own=felt, resting=resting, share=share)
 
 
 def _record(

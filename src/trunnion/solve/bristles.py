@@ -156,10 +156,10 @@ def _stepped(per_way: PerWay, slip: _Slip, left: Number, right: Number) -> tuple
     """One step of z′ = z_s − z by x = ∫ d dt, where z_s = v/d changes evenly from z₀ to z₁:
     z ↦ e z + z₁ − e z₀ − (z₁ − z₀) (1 − e)/x, e = exp(−x). d/|v| is that of the middle."""
     v0, middle, v1 = slip.speed(left), slip.speed((left + right) / 2), slip.speed(right)
-    way = slip.length * (right - left) * (v0 + 4 * middle + v1) / 6
-    xp = namespace(way)
-    sense = xp.sign(way)
-    x = per_way(middle) * xp.abs(way)
+    travel = slip.length * (right - left) * (v0 + 4 * middle + v1) / 6
+    xp = namespace(travel)
+    sense = xp.sign(travel)
+    x = per_way(middle) * xp.abs(travel)
     z0, z1 = (sense / per_way(speed) for speed in (v0, v1))
     xp = namespace(x)
     left_over = xp.exp(-x)
@@ -180,8 +180,8 @@ def _chained(keep: Number, gain: Number, periodic: bool) -> Number:
     """Deflections at all ends of intervals from their maps, periodic or from rest: by doubling the span of the maps."""
     xp = namespace(keep, gain)
     count = np.shape(primal(gain))[-1]
-    known = np.isfinite(primal(keep) + primal(gain))  # where there is no motion the bristles come to rest
-    keep, gain = xp.where(known, keep, 0.0), xp.where(known, gain, 0.0)
+    finite = np.isfinite(primal(keep) + primal(gain))  # where there is no motion the bristles come to rest
+    keep, gain = xp.where(finite, keep, 0.0), xp.where(finite, gain, 0.0)
     whole_keep, whole_gain = keep, gain
     index = np.arange(count)
     reach = 1

@@ -91,9 +91,9 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     moment = Screw(NULL, scaled(lever, axis))
     if pair.threaded:
         lead = walk.system.lead(walk.values, joint)
-        way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
-        unit = _mixed(axis, middle, lever, lever / way, lead / way)
-        yield Rubbing(load, way * turn, unit, zero[0], amount=lever * lever / way)
+        helix = namespace(lead, lever).sqrt(lever * lever + lead * lead)
+        unit = _mixed(axis, middle, lever, lever / helix, lead / helix)
+        yield Rubbing(load, helix * turn, unit, zero[0], amount=lever * lever / helix)
     elif not pair.slides:
         yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
     elif walk.system.summed(joint):

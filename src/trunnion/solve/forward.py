@@ -161,8 +161,8 @@ class Forward:
 
     def placed(self, frame: Any, link: str, name: str) -> Vector:
         """Place of a named point of a link that lies in a frame."""
-        found: Vector = self.algebra.point_of(frame, self.local_place(link, name))
-        return found
+        place: Vector = self.algebra.point_of(frame, self.local_place(link, name))
+        return place
 
     def local_place(self, link: str, name: str) -> Vector:
         """A named point of a link in its own frame, m."""
@@ -198,14 +198,14 @@ class Forward:
 
     def carried(self, travel: Mapping[str, Travel]) -> None:
         """Let the links also move as the seats of their pins travel."""
-        for link, own in travel.items():
+        for link, added in travel.items():
             motion = self.motions[link]
-            twist, acceleration = (zipped(operator.add, *both) for both in zip(motion[1:], own, strict=True))
+            twist, acceleration = (zipped(operator.add, *both) for both in zip(motion[1:], added, strict=True))
             self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
 
     def outside(self, place: Place) -> tuple[Any, Any]:
         """Motion of the known link of a module's joint; of a witness that of its second link against its first."""
-        outer = [self.motions[link] for link, known in zip(place.links, place.outer, strict=True) if known]
+        outer = [self.motions[link] for link, is_outer in zip(place.links, place.outer, strict=True) if is_outer]
         if len(outer) < 2:
             return (outer[0].twist, outer[0].acceleration) if outer else (None, None)
         first, second = outer
@@ -222,8 +222,8 @@ class Forward:
         module, places = system.plan.modules[number], system.places[number]
         _, rates, seconds = driven_coordinates(system, module, places, self.values, time)
         outer = [self.outside(place) for place in places]
-        known = [twist for twist, _ in outer], [second for _, second in outer]
-        twists, accelerations = system.groups[number].moved(pose, *known, rates, seconds)
+        carried = [twist for twist, _ in outer], [second for _, second in outer]
+        twists, accelerations = system.groups[number].moved(pose, *carried, rates, seconds)
         for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
             self.motions[link] = Motion(frame, twist, second)
         self.poses.append(pose)
@@ -326,14 +326,14 @@ class Forward:
 
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction on a joint's second link as the file names it; a module may see it from the other."""
-        found = Wrench(*reaction)
+        force = Wrench(*reaction)
         if not place.reversed_:
-            return found
-        found = plane.times(-1.0, found)
+            return force
+        force = plane.times(-1.0, force)
         if self.system.turns(place.joint):
-            return found
+            return force
         first, second = self.ends(place.joint)  # the module's second point is the file's first
-        return Wrench(found.x, found.y, plane.moment_at(found, (second.x - first.x, second.y - first.y)))
+        return Wrench(force.x, force.y, plane.moment_at(force, (second.x - first.x, second.y - first.y)))
 
     def bare(self, joint: str, wrench: Any) -> Any:
         """A reaction without what acts along the freedom of its joint: rounding, and of a pin exactly nothing."""

@@ -249,8 +249,8 @@ def _follow(
     """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
     part, chosen = problem.picked(lanes)
     shape = chosen.shape
-    found, reached = continuation.follow(scaled(part), frictionless(part))
-    result = [replaced(force, chosen, value) for force, value in zip(forces, found, strict=True)]
+    reached_forces, reached = continuation.follow(scaled(part), frictionless(part))
+    result = [replaced(force, chosen, value) for force, value in zip(forces, reached_forces, strict=True)]
     shares = np.ones(shape)
     shares[chosen] = reached
     return result, shares

@@ -187,16 +187,16 @@ def stated_walk(system: System, values: Values, assembly: Assembly, time: Number
 
 
 def stated_loads(
-    walk: Forward, zero_slip: Mapping[str, Share], known: Container[str] = ()
+    walk: Forward, zero_slip: Mapping[str, Share], sensed: Container[str] = ()
 ) -> Iterator[tuple[str, LoadAction]]:
-    """The loads of the model, by name. zero_slip: see `backward.Given`; known: joints of which it tells all."""
+    """The loads of the model, by name. zero_slip: see `backward.Given`; sensed: joints of which it tells all."""
     stated = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
         path, joint = f"loads.{name}", load.joint
         if joint is None:
             yield name, _push(stated, load, path)
         else:
-            yield name, _resist(stated, load, path, zero_slip.get(joint, 0.0), joint in known)
+            yield name, _resist(stated, load, path, zero_slip.get(joint, 0.0), joint in sensed)
 
 
 def _push(stated: Stated, load: Load, path: str) -> LoadAction:
@@ -213,25 +213,25 @@ def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
-def _resist(stated: Stated, load: Load, path: str, at_rest: Share, known: bool) -> LoadAction:
+def _resist(stated: Stated, load: Load, path: str, at_rest: Share, sensed: bool) -> LoadAction:
     """A torque or force that opposes the motion of a joint, whichever way it goes or one way only."""
     walk, joint = stated.walk, load.joint or ""
     torque, force = stated.get(f"{path}.resisting_torque"), stated.get(f"{path}.resisting_force")
     size, turns = (force, False) if torque is None else (torque, True)
     speed = walk.rates(joint)[0 if turns else 1]
-    sign = _sense(walk, joint, turns, speed, at_rest, known)
+    sign = _sense(walk, joint, turns, speed, at_rest, sensed)
     if load.only is not None:
         sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, joint, -sign * size, turns, speed)
 
 
-def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share, known: bool) -> Number:
+def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share, sensed: bool) -> Number:
     """Sign of the speed of a joint.
 
-    at_rest: the share of what resists where there is no motion, with the sign of that which is about to begin; known:
+    at_rest: the share of what resists where there is no motion, with the sign of that which is about to begin; sensed:
     whatever the speed says.
     """
-    return at_rest if known else np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
+    return at_rest if sensed else np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
 
 
 def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> LoadAction:
@@ -246,14 +246,14 @@ def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Num
 
 
 def losses(
-    walk: Forward, zero_slip: Mapping[str, Share], known: Container[str] = ()
+    walk: Forward, zero_slip: Mapping[str, Share], sensed: Container[str] = ()
 ) -> Iterator[tuple[str, LoadAction, Number]]:
     """What resists the joints whatever their load: −sgn(v) constant − viscous v, its power, and the effort itself."""
     for joint in walk.system.lossy:
         turns, path = walk.system.turns(joint), f"joints.{joint}.losses"
         speed = walk.rates(joint)[0 if turns else 1]
         constant, viscous = (walk.values.get(f"{path}.{key}", 0.0) for key in ("constant", "viscous"))
-        sign = _sense(walk, joint, turns, speed, zero_slip.get(joint, 0.0), joint in known)
+        sign = _sense(walk, joint, turns, speed, zero_slip.get(joint, 0.0), joint in sensed)
         effort = -sign * constant - viscous * speed
         yield joint, _in_joint(walk, joint, effort, turns, speed), effort
 

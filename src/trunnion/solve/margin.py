@@ -61,9 +61,9 @@ def _together(back: Backward, count: int) -> FrictionProblem:
     for number, rubbed in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
         group, links = walk.reacting(walk.system.groups[number]), walk.system.plan.modules[number].links
         before = len(start)
-        for found, flow in [(start, bare), *zip(influence, flows, strict=True)]:
+        for total, flow in [(start, bare), *zip(influence, flows, strict=True)]:
             reactions = group.reactions(walk.poses[number], [flow.loads[link] for link in links])
-            found += reactions
+            total += reactions
             pass_on(flow, number, reactions, (), ())
         for contact, rub in rubbed:
             column = with_own(contact, list(group.reactions(walk.poses[number], contact.unit_loads)))
@@ -76,11 +76,11 @@ def _together(back: Backward, count: int) -> FrictionProblem:
 
 def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: Number) -> Number:
     """The multiple for each lane. shares: those at which lanes are known to lock, 1 of the others."""
-    known = np.asarray(shares) < 1.0
+    locked = np.asarray(shares) < 1.0
 
     def reached(part: FrictionProblem, wanted: Number) -> Number:
         _, share = continuation.follow(scaled(part), frictionless(part), most, wanted)
         return np.where(share >= most, np.inf, share)
 
     loaded = np.isfinite(largest(problem.state([0.0] * len(problem.contacts)).normals))
-    return problem.in_lanes(reached, doubtful & ~known & loaded, np.where(known, shares, np.inf))
+    return problem.in_lanes(reached, doubtful & ~locked & loaded, np.where(locked, shares, np.inf))

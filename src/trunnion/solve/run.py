@@ -152,10 +152,10 @@ def prepare(mechanism: Mechanism, free: bool = False) -> Run:
     """
     free = free and len(mechanism.drivers) > 1  # else it is all the same
     key = "run of free drivers" if free else "run"
-    known: Run | None = mechanism.worked_out.get(key)
-    if known is None or known.system.mechanism is not mechanism:  # of one that this is a copy of
-        known = mechanism.worked_out[key] = _prepared(mechanism, free)
-    return known
+    run: Run | None = mechanism.worked_out.get(key)
+    if run is None or run.system.mechanism is not mechanism:  # of one that this is a copy of
+        run = mechanism.worked_out[key] = _prepared(mechanism, free)
+    return run
 
 
 def _prepared(mechanism: Mechanism, free: bool) -> Run:
@@ -174,13 +174,13 @@ def _prepared(mechanism: Mechanism, free: bool) -> Run:
 def _unknown_turns(run: Run) -> dict[str, float]:
     """Turns in the cycle of a joint of every chain of gear pairs that no driver turns, from a first walk."""
     mechanism = run.system.mechanism
-    found: dict[str, float] = {}
+    turns_of: dict[str, float] = {}
     if not mechanism.gears or not run.cycle.periodic:
-        return found
+        return turns_of
     duration = run.cycle.duration
     for gear in mechanism.gears.values():
         joint = gear.joints[0]
-        if joint in run.system.geared_turns(run.values, duration, found):
+        if joint in run.system.geared_turns(run.values, duration, turns_of):
             continue
         # up to just before the end: there a track begins again
         time = np.linspace(0.0, duration * (1 - 1e-9), TURN_STEPS)
@@ -188,6 +188,6 @@ def _unknown_turns(run: Run) -> dict[str, float]:
         first, second = (walk.motions[link].frame for link in run.system.joints[joint][1])
         angle = np.unwrap(np.ravel(rotation((first, second))))
         turns = (angle[-1] - angle[0]) / (2 * np.pi)
-        whole = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
-        found[joint] = float(whole if abs(whole - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
-    return found
+        fraction = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
+        turns_of[joint] = float(fraction if abs(fraction - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
+    return turns_of

@@ -174,10 +174,10 @@ class System:
     @cached_property
     def points(self) -> tuple[tuple[str, str], ...]:
         """(link, point) of every named point; the joints of a loop are points of its links."""
-        found = [(name, point) for name, link in self.mechanism.effective_links.items() for point in link.points]
+        points = [(name, point) for name, link in self.mechanism.effective_links.items() for point in link.points]
         if self.mechanism.loop:
-            found += [(link, joint) for joint, (_, links) in self.joints.items() for link in links]
-        return tuple(dict.fromkeys(found))
+            points += [(link, joint) for joint, (_, links) in self.joints.items() for link in links]
+        return tuple(dict.fromkeys(points))
 
     def _place(self, module: Module, name: str) -> Place:
         kind, (first, second) = self.joints[name]
@@ -224,15 +224,15 @@ class System:
 
         φ₁ = (φ₂ − φ₀)/i then says what φ₂ = i φ₁ + φ₀ leaves open by whole turns of φ₂.
         """
-        known, found = set(self.mechanism.drivers), set()
+        turned, reversed_ = set(self.mechanism.drivers), set()
         for _ in self.mechanism.gears:
             for name, gear in self.mechanism.gears.items():
                 first, second = gear.joints
-                if second in known and first not in known:
-                    found.add(name)
-                if first in known or second in known:
-                    known |= {first, second}
-        return frozenset(found)
+                if second in turned and first not in turned:
+                    reversed_.add(name)
+                if first in turned or second in turned:
+                    turned |= {first, second}
+        return frozenset(reversed_)
 
     def gear_joints(self, name: str) -> tuple[str, str]:
         """Joints of a gear pair, that whose turns are known first."""
@@ -249,11 +249,11 @@ class System:
 
         Seats are in the elements of the links that carry them.
         """
-        found = self.holes(values)
+        elements = self.holes(values)
         for name, (kind, (first, second)) in self.joints.items():
-            found[first, name] = shifts.journaled(self.mechanism.space, found[first, name], kind, values, name)
-            found[second, name] = shifts.seated(self.mechanism.space, found[second, name], kind, values, name)
-        return found
+            elements[first, name] = shifts.journaled(self.mechanism.space, elements[first, name], kind, values, name)
+            elements[second, name] = shifts.seated(self.mechanism.space, elements[second, name], kind, values, name)
+        return elements
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:
         """The same where every pin lies in the middle of its hole."""
@@ -288,25 +288,26 @@ class System:
     def _loop_elements(self, values: Values) -> dict[tuple[str, str], space.Frame]:
         """Elements from the dual Denavit–Hartenberg table: joint k is Z(θ̂), the link after it X(α̂) to joint k + 1."""
         rows = self.mechanism.loop
-        found: dict[tuple[str, str], space.Frame] = {}
+        elements: dict[tuple[str, str], space.Frame] = {}
         for row, after in zip(rows, (*rows[1:], rows[0]), strict=True):
             path = f"loop.{row.joint}"
             twist, distance = values[f"{path}.twist"], values[f"{path}.distance"]
             c, s = namespace(twist).cos(twist), namespace(twist).sin(twist)
-            own, following = space.ORIGIN, space.Frame((1.0, 0.0, 0.0), (0.0, c, s), (0.0, -s, c), (distance, 0.0, 0.0))
+            first = space.ORIGIN
+            following = space.Frame((1.0, 0.0, 0.0), (0.0, c, s), (0.0, -s, c), (distance, 0.0, 0.0))
             stated = self.mechanism.links.get(row.link)
             home = stated.frame if stated and stated.frame else None
             if home is None and row.link == self.mechanism.fixed_link:
                 home = after.joint
             if home == after.joint and home != row.joint:
-                own, following = space.relative(space.ORIGIN, following), space.ORIGIN
+                first, following = space.relative(space.ORIGIN, following), space.ORIGIN
             path = f"loop.{after.joint}"  # the first element of a joint is moved by its constant slide or rotation
             if f"{path}.slide" in values:
                 following = space.slid(following, values[f"{path}.slide"])
             if f"{path}.rotation" in values:
                 following = space.turned(following, values[f"{path}.rotation"])
-            found[row.link, row.joint], found[row.link, after.joint] = own, following
-        return found
+            elements[row.link, row.joint], elements[row.link, after.joint] = first, following
+        return elements
 
     def lead(self, values: Values, joint: str) -> Number:
         """Slide for one radian of a helical pair, m; 0 of others."""
@@ -330,14 +331,14 @@ class System:
     @cached_property
     def resisted(self) -> dict[str, set[bool]]:
         """Of every joint that loads or a constant loss resist, whether its turn (True) or its slide is."""
-        found: dict[str, set[bool]] = {}
+        resisted: dict[str, set[bool]] = {}
         for name, joint in self.lossy.items():
             if joint.constant is not None:
-                found.setdefault(name, set()).add(self.turns(name))
+                resisted.setdefault(name, set()).add(self.turns(name))
         for load in self.mechanism.loads.values():
             if load.joint is not None:
-                found.setdefault(load.joint, set()).add(load.resisting_torque is not None)
-        return found
+                resisted.setdefault(load.joint, set()).add(load.resisting_torque is not None)
+        return resisted
 
     def centre(self, values: Values, link: str) -> tuple[Number, ...]:
         """Local place of a link's mass centre, m."""
@@ -372,9 +373,9 @@ class System:
 
     def motion_of(self, values: Values, name: str) -> dict[str, Number]:
         """What the motion law of a driver is given."""
-        found: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
-        found.update(self.mechanism.drivers[name].options)
-        return found
+        numbers: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
+        numbers.update(self.mechanism.drivers[name].options)
+        return numbers
 
     @cached_property
     def _driver_paths(self) -> dict[str, list[tuple[str, str]]]:
@@ -434,13 +435,14 @@ class System:
             return Cycle(0.0, periodic=False)
         nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
         spans = {name: self.span(nominal, name) for name in drivers}
-        found = {name for name, driver in drivers.items() if free and driver.found}
-        longest = float(max(span.duration for name, span in spans.items() if name not in found or found == set(spans)))
+        free_drivers = {name for name, driver in drivers.items() if free and driver.found}
+        counted = spans.keys() - free_drivers or spans.keys()  # of free ones only where all are free
+        longest = float(max(spans[name].duration for name in counted))
         findings = list(self._backward_ranges(nominal, spans))
         ending = [name for name, span in spans.items() if not span.periodic]
         for name in ending if not findings else ():
             span = spans[name]
-            if name not in found and not span.rests and abs(span.duration - longest) > 1e-9 * longest:
+            if name not in free_drivers and not span.rests and abs(span.duration - longest) > 1e-9 * longest:
                 what = f"its range lasts {span.duration:g} s, the whole cycle lasts {longest:g} s"
                 findings.append(Finding(what, f"drivers.{name}", "use the same duration for all drivers with a range"))
                 break
@@ -466,10 +468,10 @@ class System:
                 yield Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign")
 
     def geared_turns(
-        self, values: Values, duration: float, known: Mapping[str, float] | None = None
+        self, values: Values, duration: float, others: Mapping[str, float] | None = None
     ) -> dict[str, float]:
-        """Turns that driven joints and those geared to them make in a time; known: of others, to start from."""
-        turns = dict(known or {})
+        """Turns that driven joints and those geared to them make in a time; others: of more joints, to start from."""
+        turns = dict(others or {})
         for name in self.mechanism.drivers:
             if self.turns(name):
                 ends = [float(np.ravel(primal(self.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
@@ -513,10 +515,10 @@ def _bristles(mechanism: Mechanism) -> Iterator[Finding]:
 
 def freed(values: Values, motions: Mapping[str, tuple[Number, Number, Number]]) -> dict[str, Number]:
     """The values with coordinates, rates and second derivatives of free drivers, which go before their motion laws."""
-    found = dict(values)
+    numbers = dict(values)
     for name, motion in motions.items():
-        found.update(zip((f"{STATE}{name}.{key}" for key in FREED), motion, strict=True))
-    return found
+        numbers.update(zip((f"{STATE}{name}.{key}" for key in FREED), motion, strict=True))
+    return numbers
 
 
 def driven_coordinates(
@@ -556,12 +558,12 @@ def rubbing(system: System) -> list[str]:
 
 def felt(system: System, values: Values) -> list[str]:
     """Joints with friction whose coefficient is not 0, as far as their law is proportional to one."""
-    found = []
+    joints = []
     for joint in rubbing(system):
         path = f"joints.{joint}.friction.{law_of(system, joint).scale}"
         if path not in values or np.any(np.asarray(primal(values[path])) != 0):
-            found.append(joint)
-    return found
+            joints.append(joint)
+    return joints
 
 
 def law_of(system: System, joint: str) -> FrictionLaw:

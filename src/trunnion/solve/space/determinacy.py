@@ -111,13 +111,13 @@ def _spins(walk: Forward) -> tuple[dict[str, float], dict[str, float]]:
         return {}, {}
     with np.errstate(all="ignore"):
         back = backward(walk, FrictionMethod(), Given())
-    found, dragged = {}, {}
+    torques, dragged = {}, {}
     for link, torque in back.spins.items():
         joints = [name for name, (_, links) in walk.system.joints.items() if link in links]
         force = max(_largest(np.sqrt(dot(back.reactions[name].u, back.reactions[name].u))) for name in joints)
         size = _largest(walk.system.size(walk.values))
         if _largest(torque) > PRESENT * force * size:
-            found[link] = _largest(torque)
+            torques[link] = _largest(torque)
         start, end = (walk.element(link, name).place for name in joints)
         line = minus(end, start)
         drag: Any = 0.0
@@ -128,7 +128,7 @@ def _spins(walk: Forward) -> tuple[dict[str, float], dict[str, float]]:
         drag = primal(drag) / np.where(length > 0, length, np.nan)
         if _largest(drag) > PRESENT * force * size:
             dragged[link] = _largest(drag)
-    return found, dragged
+    return torques, dragged
 
 
 def _largest(values: Any) -> float:
@@ -183,11 +183,11 @@ def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: 
 
     A normal load is a seminorm: |N(R + S) − N(R)| ≤ N(S). Where it is zero, so is what S changes of the friction.
     """
-    found = np.zeros((len(names), CONTACTS, stress.shape[-1]))
+    normals = np.zeros((len(names), CONTACTS, stress.shape[-1]))
     for k, joint in enumerate(names):
         for i, contact in enumerate(contacts_of(walk, joint) if joint in rubbing else ()):
-            found[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
-    return found
+            normals[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
+    return normals
 
 
 def _table(screws: Sequence[Screw], lanes: int) -> Array:
@@ -195,13 +195,13 @@ def _table(screws: Sequence[Screw], lanes: int) -> Array:
     return np.array([[np.broadcast_to(entry, lanes) for entry in flat(screw)] for screw in screws])
 
 
-def _present(names: Sequence[str], parts: Sequence[Array], wholes: Sequence[Array], lanes: Array) -> tuple[str, ...]:
+def _present(names: Sequence[str], parts: Sequence[Array], vectors: Sequence[Array], lanes: Array) -> tuple[str, ...]:
     """Names whose part in any null vector is, at any of the lanes, more than rounding of the whole.
 
     parts, wholes: (name, entry, lane) of each null vector.
     """
     present = np.zeros(len(names), bool)
-    for part, whole in zip(parts, wholes, strict=True):
+    for part, whole in zip(parts, vectors, strict=True):
         largest = np.max(np.linalg.norm(whole, axis=1), axis=0)
         present |= np.any((np.linalg.norm(part, axis=1) > PRESENT * largest) & lanes, axis=-1)
     return tuple(name for name, is_present in zip(names, present, strict=True) if is_present)
@@ -237,24 +237,24 @@ class Determinacy:
         spins, drivers = len(self.system.plan.passive), len(self.system.mechanism.drivers)
         counts: dict[str, Any] = {"formula": self.system.plan.mobility, "rank": self.mobility}
         code = "redundant" if self.system.mechanism.over_constraint == "refuse" else "redundant_least"
-        found: list[Finding] = []
+        findings: list[Finding] = []
         for part in self.parts:
             joints, links = list(part.joints), list(part.links)
             if part.surplus:
-                found.append(finding_for("mobility.overdriven", "drivers", **counts, spins=spins, drivers=drivers))
+                findings.append(finding_for("mobility.overdriven", "drivers", **counts, spins=spins, drivers=drivers))
             if part.undetermined:
                 counted = {**counts, "freedoms": part.undetermined}
-                found.append(finding_for("mobility.undetermined", "drivers", **counted, links=links))
+                findings.append(finding_for("mobility.undetermined", "drivers", **counted, links=links))
             if part.redundant:
                 counted = {**counts, "constraints": part.redundant}
-                found.append(finding_for(f"mobility.{code}", "joints", **counted, joints=joints))
+                findings.append(finding_for(f"mobility.{code}", "joints", **counted, joints=joints))
             if part.rubbing:
                 joints, constraints = list(part.rubbing), part.redundant
-                found.append(finding_for("mobility.friction_open", "joints", joints=joints, constraints=constraints))
+                findings.append(finding_for("mobility.friction_open", "joints", joints=joints, constraints=constraints))
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
                 spin: dict[str, Any] = {"where": f"links.{link}", "link": link, "points": points}
-                found.append(finding_for("mobility.spin", **spin, torque=self.dragged.get(link)))
+                findings.append(finding_for("mobility.spin", **spin, torque=self.dragged.get(link)))
                 if link in self.spins:
-                    found.append(finding_for("mobility.spin_loaded", **spin, torque=self.spins[link]))
-        return found
+                    findings.append(finding_for("mobility.spin_loaded", **spin, torque=self.spins[link]))
+        return findings

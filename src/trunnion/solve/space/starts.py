@@ -74,10 +74,10 @@ def _followed(system: System, values: Values, cycle: Cycle) -> Start | None:
     for order in (range(begin, len(time)), range(begin, -1, -1)):
         q = first
         for place in order:
-            found, gap = loops.at(np.array([place])).least_open(q[None], np.zeros((1, 0)))
-            if not gap[0] <= NEARLY or not np.max(np.abs(found[0] - q)) <= JUMP:
+            coordinates_, gap = loops.at(np.array([place])).least_open(q[None], np.zeros((1, 0)))
+            if not gap[0] <= NEARLY or not np.max(np.abs(coordinates_[0] - q)) <= JUMP:
                 break
-            rows[place] = q = found[0]
+            rows[place] = q = coordinates_[0]
 
     def coordinates(at: Array) -> Array:
         moment = np.mod(at, time[-1]) if cycle.periodic and time[-1] else np.asarray(at)

@@ -98,10 +98,8 @@ class Felt(NamedTuple):
 
     def under(self, forces: Sequence[Number]) -> Reaction:
         """What it is under friction forces."""
-        if all(is_zero(force) for force in forces):
-            return self.start
-        changes = (total([entry * forces[k] for k, entry in parts]) for parts in self.parts)
-        return tuple(plus(number, change) for number, change in zip(self.start, changes, strict=True))
+        changes = [total([entry * forces[k] for k, entry in parts]) for parts in self.parts]
+        return added(self.start, tuple(changes))
 
 
 class State(NamedTuple):
@@ -184,12 +182,15 @@ class FrictionProblem:
 
     def reactions(self, forces: Sequence[Number]) -> list[Reaction]:
         """Reactions of all joints under friction forces."""
+        if all(is_zero(force) for force in forces):
+            return list(self.start)
         joints = enumerate(self.start)
         return [Felt.of(start, [column[k] for column in self.influence]).under(forces) for k, start in joints]
 
     def state(self, forces: Sequence[Number], normals: list[Number] | None = None) -> State:
         """Reactions and normal loads at the contacts under friction forces. normals: where they are known."""
-        reactions = [felt.under(forces) for felt in self.felt]
+        frictionless = all(is_zero(force) for force in forces)
+        reactions = [felt.start if frictionless else felt.under(forces) for felt in self.felt]
         if normals is None:
             normals = [c.load.normal(reaction) for c, reaction in zip(self.contacts, reactions, strict=True)]
         return State(reactions, normals)
@@ -226,13 +227,13 @@ class FrictionProblem:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
         for contact, felt, slope, *at in zip(self.contacts, self.felt, self.slopes, *state, strict=True):
-            row: list[Number] = [0.0] * len(self.contacts)
+            row: list[list[Number]] = [[] for _ in self.contacts]
             for entry, parts in zip(contact.load.gradient(*at), felt.parts, strict=True):
                 if not is_zero(entry):
                     rate = slope * entry
                     for k, part in parts:
-                        row[k] = plus(row[k], rate * part)
-            rows.append(row)
+                        row[k].append(rate * part)
+            rows.append([total(summands) for summands in row])
         return rows
 
     def bound(self, multiples: Sequence[float] | None = None) -> Number:

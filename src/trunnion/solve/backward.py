@@ -20,7 +20,7 @@ from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
-from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links, power_of, teeth
+from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, power_of, teeth
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
@@ -391,5 +391,7 @@ def _record(
 
 def _push(back: Backward, number: int, done: Sequence[Any]) -> None:
     """Load the known links of a module with what its gear pairs do."""
-    for link, wrench in on_links(back.walk, number, done):
-        back.add(link, wrench)
+    for joint, side, wrench in done:
+        place = back.walk.system.places[number][joint]
+        if place.outer[side]:
+            back.add(place.links[side], wrench)

@@ -187,8 +187,8 @@ _SOLVE = (
     Fault(
         "screw-thread-lead-sign",
         "solve/contacts.py",
-        "unit = _mixed(axis, middle, lever, lever / way, lead / way)",
-        "unit = _mixed(axis, middle, lever, lever / way, -lead / way)",
+        "unit = _mixed(axis, middle, lever, lever / helix, lead / helix)",
+        "unit = _mixed(axis, middle, lever, lever / helix, -lead / helix)",
         ("tests/reference/test_space_friction.py", "-k", "screw"),
     ),
     Fault(

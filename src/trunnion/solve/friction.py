@@ -16,12 +16,10 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, apart, looped
-from trunnion.algebra.nested import replaced
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
@@ -122,7 +120,7 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
         if method.limit >= STUBBORN:
             left = left | ~((at.done > 0) | _obeyed(real, at))
         if apart(left):
-            forces, shares = _follow(real, at.forces, left)
+            *forces, shares = real.in_lanes(_followed, left, [*at.forces, 1.0])
             state = real.state(forces)
             again, gaps = np.where(left, 1.0, 0.0), real.gaps(state, forces)
             at = at._replace(forces=forces, normals=state.normals, gaps=gaps, excess=np.inf, slow=again, done=1 - again)
@@ -243,17 +241,10 @@ def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequen
     return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
-def _follow(
-    problem: FrictionProblem, forces: Sequence[Number], lanes: Number
-) -> tuple[list[Number], NDArray[np.float64]]:
-    """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
-    part, chosen = problem.picked(lanes)
-    shape = chosen.shape
-    reached_forces, reached = continuation.follow(scaled(part), frictionless(part))
-    result = [replaced(force, chosen, value) for force, value in zip(forces, reached_forces, strict=True)]
-    shares = np.ones(shape)
-    shares[chosen] = reached
-    return result, shares
+def _followed(part: FrictionProblem, lanes: Number) -> list[Number]:
+    """Forces followed from no friction, NaN where they lock, and the share of the friction reached."""
+    forces, share = continuation.follow(scaled(part), frictionless(part), 1.0, lanes)
+    return [*forces, share]
 
 
 def scaled(

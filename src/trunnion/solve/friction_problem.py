@@ -156,14 +156,19 @@ class FrictionProblem:
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
-    def in_lanes(self, function: Callable[[FrictionProblem, Number], Number], lanes: Number, others: Number) -> Number:
+    def in_lanes(
+        self,
+        function: Callable[[FrictionProblem, Number], Sequence[Number]],
+        lanes: Number,
+        others: Sequence[Number],
+    ) -> list[Number]:
         """function(problem, lanes that count) in some lanes, computed apart where that can be; `others` elsewhere."""
         if not np.any(lanes):
-            return others
+            return list(others)
         if not apart(lanes):
-            return np.where(lanes, function(self, lanes), others)
+            return [np.where(lanes, *both) for both in zip(function(self, lanes), others, strict=True)]
         part, chosen = self.picked(lanes)
-        return replaced(others, chosen, function(part, True))
+        return [replaced(old, chosen, new) for old, new in zip(others, function(part, True), strict=True)]
 
     @cached_property
     def felt(self) -> list[Felt]:

@@ -78,9 +78,9 @@ def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: N
     """The multiple for each lane. shares: those at which lanes are known to lock, 1 of the others."""
     locked = np.asarray(shares) < 1.0
 
-    def reached(part: FrictionProblem, wanted: Number) -> Number:
-        _, share = continuation.follow(scaled(part), frictionless(part), most, wanted)
-        return np.where(share >= most, np.inf, share)
+    def reached(part: FrictionProblem, lanes: Number) -> list[Number]:
+        _, share = continuation.follow(scaled(part), frictionless(part), most, lanes)
+        return [np.where(share >= most, np.inf, share)]
 
     loaded = np.isfinite(largest(problem.state([0.0] * len(problem.contacts)).normals))
-    return problem.in_lanes(reached, doubtful & ~locked & loaded, np.where(locked, shares, np.inf))
+    return problem.in_lanes(reached, doubtful & ~locked & loaded, [np.where(locked, shares, np.inf)])[0]

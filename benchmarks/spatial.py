@@ -21,7 +21,7 @@ from benchmarks.side import Side, take_turns
 from trunnion import Mechanism
 from trunnion.solve.assembly import choose
 from trunnion.solve.run import Run, prepare
-from trunnion.solve.space.system import SpatialSystem
+from trunnion.solve.system import System
 
 Array = NDArray[np.float64]
 EXAMPLE = Path(__file__).parents[1] / "examples" / "pezzuti-cardan.yaml"
@@ -45,16 +45,16 @@ def _general(run: Run) -> Run:
     """The same mechanism with its dyad solved by the general group."""
     modules = tuple(replace(module, kind="general") for module in run.system.plan.modules)
     plan = replace(run.system.plan, modules=modules)
-    system = SpatialSystem(run.system.mechanism, plan, run.system.geometry)
+    system = System(run.system.mechanism, plan)
     found = [choose(_hinted(run, system, way), run.values, run.cycle) for way in (1, 2)]
     efforts = run.solve(np.zeros(1)).efforts["input"]
     runs = [replace(run, system=system, chosen=chosen) for chosen in found]
     return min(runs, key=lambda one: float(abs(one.solve(np.zeros(1)).efforts["input"] - efforts)[0]))
 
 
-def _hinted(run: Run, system: SpatialSystem, way: int) -> SpatialSystem:
+def _hinted(run: Run, system: System, way: int) -> System:
     mechanism = Mechanism(**{**run.system.mechanism.data(), "assembly": {"cross": f"way-{way}"}})
-    return SpatialSystem(mechanism, system.plan, system.geometry)
+    return System(mechanism, system.plan)
 
 
 def _solve(run: Run) -> Callable[[int], Array]:

@@ -172,23 +172,23 @@ _SOLVE = (
     ),
     Fault(
         "gyroscopic-moment-dropped",
-        "solve/space/motion.py",
+        "solve/forward.py",
         "plus(apply(tensor, change), cross(w, apply(tensor, w)))",
         "apply(tensor, change)",
         ("tests/reference/test_newton_euler_space.py",),
     ),
     Fault(
         "friction-of-one-pin-of-a-cross-not-felt",
-        "solve/space/contacts.py",
+        "solve/contacts.py",
         "unit, still, amount=share * rate, felt=True)",
         "unit, still, amount=share * rate)",
         ("tests/reference/test_newton_euler_space.py",),
     ),
     Fault(
         "screw-thread-lead-sign",
-        "solve/space/contacts.py",
-        "unit = _mixed(axis, middle, lever, lever / way, lead / way)",
-        "unit = _mixed(axis, middle, lever, lever / way, -lead / way)",
+        "solve/contacts.py",
+        "unit = _mixed(axis, middle, lever, lever / helix, lead / helix)",
+        "unit = _mixed(axis, middle, lever, lever / helix, -lead / helix)",
         ("tests/reference/test_space_friction.py", "-k", "screw"),
     ),
     Fault(

@@ -122,12 +122,13 @@ def test_a_lane_does_not_depend_on_the_lanes_beside_it(
 ) -> None:
     """To the bit where a certificate says that no continuation is needed."""
     start, influence, contacts = case
-    whole = settled(start, influence, contacts, NEWTON)
-    for lane in np.flatnonzero(np.broadcast_to(whole.certain, (40,)))[:3]:
-        part = slice(lane, lane + 1)
-        own = [(load.mapped(lambda n: n[part] if np.ndim(n) else n), f[part]) for load, f in contacts]  # noqa: B023
-        alone = settled(start[..., part], influence[..., part], own, NEWTON)
-        assert np.array_equal(np.array(alone.forces)[:, 0], np.array(whole.forces)[:, lane], equal_nan=True)
+    for method in (NEWTON, FrictionMethod("successive-approximation", limit=2000)):
+        whole = settled(start, influence, contacts, method)
+        for lane in np.flatnonzero(np.broadcast_to(whole.certain, (40,)))[:3]:
+            part = slice(lane, lane + 1)
+            own = [(load.mapped(lambda n: n[part] if np.ndim(n) else n), f[part]) for load, f in contacts]  # noqa: B023
+            alone = settled(start[..., part], influence[..., part], own, method)
+            assert np.array_equal(np.array(alone.forces)[:, 0], np.array(whole.forces)[:, lane], equal_nan=True)
 
 
 def test_derivatives_are_those_of_the_side_of_the_kink() -> None:

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 import trunnion
 from mechanisms import Data
 from trunnion.results.attributes import summary_of
-from trunnion.solve.geometry import build
 from trunnion.solve.space.loops import Loops
+from trunnion.solve.system import build
 from trunnion.studies.assembly.study import AssemblyStatus, AssemblyStudy
 
 Array = NDArray[np.float64]

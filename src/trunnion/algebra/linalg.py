@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.literal import is_zero, plus
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
@@ -47,8 +48,8 @@ def weighted(weights: Sequence[Number], values: Sequence[Number]) -> Number:
     """Σ wᵢ vᵢ; a literal zero costs nothing."""
     total: Number = 0.0
     for weight, value in zip(weights, values, strict=True):
-        if not any(isinstance(one, float) and one == 0.0 for one in (weight, value)):
-            total = total + weight * value
+        if not (is_zero(weight) or is_zero(value)):
+            total = plus(total, weight * value)
     return total
 
 

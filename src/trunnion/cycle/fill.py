@@ -21,13 +21,12 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import clearance
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
+from trunnion.solve.contacts import bearing_middle
 from trunnion.solve.end_loads import loads_of
-from trunnion.solve.forward import Forward
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import locking_margin
 from trunnion.solve.seats import GivenSeat, seats
-from trunnion.solve.space.contacts import bearing_middle
-from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.status import status_of
 from trunnion.solve.system import System, Values
 

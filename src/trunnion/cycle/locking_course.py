@@ -30,7 +30,8 @@ from trunnion.solve.backward import Backward, Given, backward
 from trunnion.solve.bristles import histories
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction import FrictionProblem, frictionless, scaled
-from trunnion.solve.friction_method import MARGIN, FrictionMethod, peak
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
+from trunnion.solve.friction_problem import largest
 from trunnion.solve.loads import has_useful_work, useful_loads, useful_powers, useful_springs
 from trunnion.solve.status import status_of
 from trunnion.solve.switches import MARGINS
@@ -169,11 +170,16 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
         if not places:  # nothing but gears pushed apart
             continue
         masks = np.array([[contact.joint == place for contact in contacts] for place in places], bool)
-        loads = peak(settled.problem.state([0.0] * len(contacts)).normals)
+        loads = largest(settled.problem.state([0.0] * len(contacts)).normals)
         for place, multiple in zip(places, _alone(settled.problem, masks, most), strict=True):
             multiple = np.where(np.isfinite(loads), multiple, np.nan)
             multiples[system.places[number][place].joint] = np.broadcast_to(multiple, positions)
     return {joint: multiples[joint] for joint in system.joints if joint in multiples}
+
+
+def multiple(rows: Array) -> Array:
+    """A multiple of friction, which is 0 at least: polynomials through its values pass that by their tolerance."""
+    return np.maximum(rows[0], 0.0)
 
 
 def _alone(problem: FrictionProblem, masks: NDArray[np.bool_], most: float) -> Array:
@@ -416,7 +422,7 @@ class LockingCourse:
         cut = replace(self.margins, courses=self.margins.courses.parted(np.array([low, high])))
         middles = cut.courses.edges[:-1] + cut.courses.half
         inside = (middles > low) & (middles < high) & cut.valid
-        least = cut.extreme("locking_margin", sign=-1.0, panels=inside)
+        least = cut.extreme("locking_margin", of=multiple, sign=-1.0, panels=inside)
         if least is not None:
             return least.value, cut.told(least).removeprefix("at ")
         return (np.inf if np.any(inside & (cut.status < Status.LOAD_UNDEFINED)) else np.nan), ""
@@ -456,7 +462,7 @@ class LockingCourse:
         name, margins = "locking_margin", self.margins
         if margins is None:
             return None
-        least = margins.extreme(name, sign=-1.0, panels=margins.valid)
+        least = margins.extreme(name, of=multiple, sign=-1.0, panels=margins.valid)
         if least is not None:
             return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=note)
         if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
@@ -470,7 +476,9 @@ class LockingCourse:
         Of a mechanism that runs, the first to lock it; of one that is locked, the one that need be lowered the least.
         """
         margins = self.margins
-        least = None if margins is None else margins.extreme("locking_margin", sign=-1.0, panels=margins.valid)
+        least = (
+            None if margins is None else margins.extreme("locking_margin", of=multiple, sign=-1.0, panels=margins.valid)
+        )
         if margins is None or least is None:
             return None
         time = np.array([margins.side(least, "locking_margin", -1.0)])
@@ -506,7 +514,7 @@ class LockingCourse:
         every = np.ones(len(course.status), bool)
         for i, joint in enumerate(joints):
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
-            least = course.extreme("multiple", i, sign=-1.0, panels=every)
+            least = course.extreme("multiple", i, of=multiple, sign=-1.0, panels=every)
             if least is None:
                 bounded = np.any(np.isinf(tables[joint]))
                 yield Figure(name, subject, MARGIN if bounded else None, aspect=MORE_THAN * bool(bounded))

@@ -18,9 +18,8 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import moment_at
 from trunnion.errors import Finding, MechanismError
-from trunnion.solve.forward import Forward
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.run import Run
-from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["Chain", "chain_of_joint", "hanging_chain"]
 

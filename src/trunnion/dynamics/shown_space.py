@@ -17,8 +17,8 @@ from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.joints.pairs import PAIRS
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
-from trunnion.solve.space.contacts import bearing_middle
-from trunnion.solve.space.motion import SpatialWalk
+from trunnion.solve.contacts import bearing_middle
+from trunnion.solve.forward import SpatialWalk
 
 __all__ = ["JointsInSpace"]
 

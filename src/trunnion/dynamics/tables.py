@@ -32,6 +32,7 @@ from trunnion.dynamics.start import Places
 from trunnion.dynamics.state import FreeMotion
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.backward import Sense, body_loads, stated_actions, under
+from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.system import Values, freed, law_of, rubbing
 
@@ -213,7 +214,7 @@ def rubs_of(motion: FreeMotion) -> tuple[Rub, ...]:
         law = law_of(motion.system, joint)
         parameters = {key: float(motion.values[f"joints.{joint}.friction.{key}"]) for key in law.parameters}
         bristle = motion.bristles.index(joint) if joint in motion.bristles else -1
-        for one in motion.system.geometry.contacts(walk, joint):
+        for one in contacts_of(walk, joint):
             size = len(_components(one.load, zero[joint]))
             rows = slice(row, row + size)
             found.append(
@@ -230,7 +231,7 @@ def numbers(motion: FreeMotion, rubs: Sequence[Rub], q: Array, values: Values) -
     """
     at_rest, moving = _lanes(motion, values, q, 0.0, 0.0, True), _lanes(motion, values, q, 1.0, 0.0, False)
     joints = dict.fromkeys(rub.joint for rub in rubs)
-    contacts = [(joint, one) for joint in joints for one in motion.system.geometry.contacts(moving, joint)]
+    contacts = [(joint, one) for joint in joints for one in contacts_of(moving, joint)]
     loads = [body_loads(_lanes(motion, values, q, 0.0, 1.0, False)), body_loads(moving)]
     static, powers = [], []
     for sense in (1.0, -1.0):

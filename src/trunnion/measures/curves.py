@@ -18,11 +18,10 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.measures.motion import MOTIONS, MotionRequest, component
 from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import SpringState, has_useful_work, springs, useful_powers
 from trunnion.solve.margin import locking_margin as multiple_that_locks
-from trunnion.solve.space.motion import SpatialWalk
 
 __all__ = ["CURVES", "Course"]
 

@@ -27,9 +27,8 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
-from trunnion.solve.space.motion import SpatialWalk
 from trunnion.solve.system import System, Values
 
 __all__ = ["Measure", "coordinate_unit", "named", "outputs"]

@@ -16,8 +16,7 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Vector3, cross, dot
-from trunnion.solve.forward import Forward
-from trunnion.solve.space.motion import SpatialWalk
+from trunnion.solve.forward import Forward, SpatialWalk
 
 __all__ = ["MOTIONS", "MotionKind", "MotionRequest", "component", "direction"]
 

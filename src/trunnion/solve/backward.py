@@ -15,12 +15,12 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
 from trunnion.groups.spatial import SpatialGroup
-from trunnion.joints.friction import FrictionLaw, LawFunction
+from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
-from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, on_links, power_of, teeth
+from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, power_of, teeth
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
@@ -31,7 +31,6 @@ __all__ = [
     "Slip",
     "backward",
     "body_loads",
-    "held",
     "pass_on",
     "sense_of",
     "solve",
@@ -71,43 +70,6 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
     return sense[contact] if isinstance(sense, tuple) else sense
 
 
-def held(
-    law: FrictionLaw, parameters: dict[str, Number], speed: Number, zero: Number, sense: Share, sliding: bool = False
-) -> tuple[FrictionLaw, dict[str, Number], Number]:
-    """Law, parameters and slip speed of a contact, of whose friction a share acts where it rests. sliding: see Given"""
-    if not np.any(zero):
-        return law, parameters, speed
-    forced = np.sign(sense) * np.maximum(np.abs(primal(speed)), 1e-300)
-    speed = namespace(speed).where(zero, forced, speed)
-    if law.at_rest is not None and not sliding:
-        law = replace(law, function=functools.partial(_resting, law.function, law.at_rest))
-        parameters = {**parameters, "resting": np.where(zero, 1.0, 0.0)}
-    if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
-        share = np.where(zero, np.abs(sense), 1.0)
-        return replace(law, function=functools.partial(_shared, law.function)), {**parameters, "share": share}, speed
-    return law, parameters, speed
-
-
-def _slip_known(slip: Number, sense: Share, rests: bool) -> tuple[Number, Number]:
-    """Slip and where it is zero, of a contact of which it is known whether it rests or slides in a sense."""
-    if rests:
-        return slip, np.True_
-    return namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense), np.False_
-
-
-def _shared(function: LawFunction, normal: Number, slip: Number, *, share: Number, **parameters: Number) -> Number:
-    """A share of what the law says."""
-    return share * function(normal, slip, **parameters)
-
-
-def _resting(
-    function: LawFunction, at_rest: LawFunction, normal: Number, slip: Number, *, resting: Number, **parameters: Number
-) -> Number:
-    """What the law says at rest, where it rests."""
-    moving = function(normal, slip, **parameters)
-    return namespace(moving).where(resting > 0, at_rest(normal, slip, **parameters), moving)
-
-
 @dataclass(frozen=True)
 class Slip:
     """Relative speed of a joint, second link against first (rad/s, m/s), and where what resists it sees it at rest."""
@@ -131,7 +93,7 @@ class Backward:
     N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
     that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart;
     module_reactions: reactions as their modules see them, of `under` alone. stated: loads before any joint was passed;
-    rubbed: contacts per module, those of gear pairs last, as `settled`; margin_up_to: as in the method; margin: that of
+    rubbed: contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
     `locking_margin`, once it was asked for.
     """
 
@@ -158,7 +120,7 @@ class Backward:
     gear_power: Number = 0.0
     module_reactions: dict[str, Any] = field(default_factory=dict)
     stated: dict[str, Any] = field(default_factory=dict)
-    rubbed: list[tuple[list[Contact], list[Rubbing]]] = field(default_factory=list)
+    rubbed: list[list[tuple[Contact, Rubbing | None]]] = field(default_factory=list)
     margin_up_to: float = 0.0
     margin: Number | None = None
 
@@ -180,6 +142,13 @@ class Backward:
         """Add a load to those of a link; the ground bears any."""
         if link != self.walk.system.mechanism.fixed_link:
             self.loads[link] = self.walk.algebra.added(self.loads[link], load)
+
+    def act(self, action: LoadAction, path: str = "") -> None:
+        """Add what a load or spring does to the links; one with a path may have no value."""
+        if path:
+            self.undefined[path] = action.undefined
+        for link, wrench in action.on:
+            self.add(link, wrench)
 
 
 def solve(
@@ -205,13 +174,13 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     """Reactions and friction of every module, last module first."""
     system = walk.system
     back = Backward(walk, unloaded(walk), travels=bool(given.travel), margin_up_to=method.margin_up_to)
-    back.contacts.update((joint, list(system.geometry.contacts(walk, joint))) for joint in rubbing(system))
-    back.slips.update((joint, _slip(back, joint)) for joint in system.joints)
+    back.contacts = {joint: list(contacts_of(walk, joint)) for joint in rubbing(system)}
+    back.slips = {joint: _slip(back, joint) for joint in system.joints}
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip, given.rests)
     for name, action in given.acting(walk) if given.acting else ():
         back.load_powers[name] = action.power
-        _act(back, name, action)
+        back.act(action, name)
     back.stated = dict(back.loads)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, given)
@@ -230,11 +199,11 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
         if gears := gears_of(group):
             group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears))
         reactions = walk.reacting(group).reactions(walk.poses[number], [back.loads[link] for link in module.links])
-        for place, reaction in zip(places, reactions, strict=False):  # then come those of gear pairs
-            if not place.witness:
-                back.module_reactions[place.joint] = reaction
-                _record(back, place, walk.wrench(place, reaction), [], place.joint in module.driven)
-        for i, (*_, torque) in enumerate(reactions[len(places) :]):
+        _pass_joints(back, number, reactions, [])
+        back.module_reactions.update(
+            (place.joint, reaction) for place, reaction in zip(places, reactions, strict=False) if not place.witness
+        )
+        for i, (*_, torque) in enumerate(reactions[len(places) :]):  # those of gear pairs
             _push(back, number, acting(walk, number, i, torque, parting=False))
     return back
 
@@ -263,7 +232,7 @@ def _slip(back: Backward, joint: str) -> Slip:
     walk = back.walk
     if not walk.pair(joint).count:
         return Slip(0.0, False)
-    zeros = [one.zero for one in back.contacts.get(joint, [])]
+    zeros = [rub.zero for rub in back.contacts.get(joint, [])]
     zeros += [walk.still(joint, turns) for turns in walk.system.resisted.get(joint, ())]
     return Slip(walk.speed(joint), functools.reduce(operator.or_, zeros) if zeros else False)
 
@@ -288,25 +257,18 @@ def _add_body_loads(back: Backward) -> None:
         back.add(link, load)
 
 
-def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], known: Container[str]) -> None:
+def _add_stated_loads(back: Backward, zero_slip: Mapping[str, Sense], sensed: Container[str]) -> None:
     """The loads and springs of the model, with the power each gives the mechanism."""
     senses = {joint: sense_of(zero_slip, joint) for joint in zero_slip}
-    for name, action in stated_loads(back.walk, senses, known):
+    for name, action in stated_loads(back.walk, senses, sensed):
         back.load_powers[name] = action.power
-        _act(back, f"loads.{name}", action)
-    for name, action, effort in losses(back.walk, senses, known):
+        back.act(action, f"loads.{name}")
+    for name, action, effort in losses(back.walk, senses, sensed):
         back.drags[name] = effort, -action.power
-        for link, wrench in action.on:
-            back.add(link, wrench)
+        back.act(action)
     for name, action, state in springs(back.walk):
         back.springs[name] = state
-        _act(back, f"springs.{name}", action)
-
-
-def _act(back: Backward, path: str, action: LoadAction) -> None:
-    back.undefined[path] = action.undefined
-    for link, wrench in action.on:
-        back.add(link, wrench)
+        back.act(action, f"springs.{name}")
 
 
 # ---- one module -----------------------------------------------------------------------------------------------
@@ -316,109 +278,120 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     walk, system = back.walk, back.walk.system
     module, group, places = system.plan.modules[number], system.groups[number], system.places[number]
     pose, loads = walk.poses[number], [back.loads[link] for link in module.links]
-    contacts: list[Contact] = []
-    rubbed: list[Rubbing] = []
+    rubbed: list[tuple[Contact, Rubbing | None]] = []
     for k, place in enumerate(places):
-        for i, one in enumerate(() if place.witness else back.contacts.get(place.joint, ())):
-            contacts.append(_contact(back, module.links, k, place.joint, one, given, i))
+        joint = place.joint
+        for i, rub in enumerate(() if place.witness else back.contacts.get(joint, ())):
+            contact = _contact(back, module.links, k, joint, rub, given, i)
             # power goes by the speed itself where the law is told on which side of rest it is
-            rubbed.append(one if place.joint in given.rests else one._replace(slip=contacts[-1].slip))
-            if one.turning is not None:
-                back.turning[place.joint] = contacts[-1], one.turning
-    contacts += teeth(walk, number)
-    settled = settle(walk.reacting(group), pose, loads, contacts, method)
+            rubbed.append((contact, rub if joint in given.rests else rub._replace(slip=contact.slip)))
+            if rub.turning is not None:
+                back.turning[joint] = contact, rub.turning
+    rubbed += [(contact, None) for contact in teeth(walk, number)]
+    settled = settle(walk.reacting(group), pose, loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
+    back.rubbed.append(rubbed)
     if module.spinning:
         torques = cast(SpatialGroup, group).spin_torques(pose, loads)
         back.spins.update((link, torque) for (link, _, _), torque in zip(module.spinning, torques, strict=True))
-    back.rubbed.append((contacts, rubbed))
-    pass_on(back, number, settled.reactions, contacts, rubbed, settled.forces)
+    pass_on(back, number, settled.reactions, rubbed, settled.forces)
 
 
 def pass_on(
     back: Backward,
     number: int,
     reactions: Sequence[Any],
-    contacts: Sequence[Contact],
-    rubbed: Sequence[Rubbing],
+    rubbed: Sequence[tuple[Contact, Rubbing | None]],
     forces: Sequence[Number],
 ) -> None:
     """Keep the reactions of a module and the friction of its contacts, and load the links it hangs on with both."""
-    walk, module, places = back.walk, back.walk.system.plan.modules[number], back.walk.system.places[number]
-    parts = list(zip(contacts, rubbed, forces, strict=False))
-    for k, place in enumerate(places):
-        if not place.witness:
-            own = [part for part in parts if part[0].joint == k]
-            _record(back, place, walk.wrench(place, reactions[k]), own, place.joint in module.driven)
-    apart = {contact.joint: force for contact, force in zip(contacts, forces, strict=True)}
-    for i, name in enumerate(module.gears):
-        k = len(places) + i
-        back.gears[name], done = gear_load(walk, number, i, reactions[k][-1], apart.get(k, 0.0))
+    parts = [(*both, force) for both, force in zip(rubbed, forces, strict=True)]
+    _pass_joints(back, number, reactions, parts)
+    parting, count = {contact.joint: force for contact, _, force in parts}, len(back.walk.system.places[number])
+    for i, name in enumerate(back.walk.system.plan.modules[number].gears):
+        k = count + i
+        back.gears[name], done = gear_load(back.walk, number, i, reactions[k][-1], parting.get(k, 0.0))
         if back.travels:
-            back.gear_power = back.gear_power + power_of(walk, number, done)
+            back.gear_power = back.gear_power + power_of(back.walk, number, done)
         _push(back, number, done)
 
 
-def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, one: Rubbing, given: Given, i: int) -> Contact:
+def _pass_joints(
+    back: Backward, number: int, reactions: Sequence[Any], parts: Sequence[tuple[Contact, Rubbing | None, Number]]
+) -> None:
+    """The same of the joints of a module. parts: its contacts with their friction forces."""
+    system = back.walk.system
+    for k, place in enumerate(system.places[number]):
+        if not place.witness:
+            own = [part for part in parts if part[0].joint == k]
+            wrench, driven = back.walk.wrench(place, reactions[k]), place.joint in system.plan.modules[number].driven
+            _record(back, place, wrench, own, driven)
+
+
+def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, given: Given, i: int) -> Contact:
     """One contact of a joint, its i-th, as `friction` sees it."""
     walk, law = back.walk, law_of(back.walk.system, joint)
     parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
-    sense = sense_of(given.zero_slip, joint, i)
-    slip, zero, known = one.slip, one.zero, joint in given.rests
-    if known:
-        slip, zero = _slip_known(slip, sense, given.rests[joint])
-    law, parameters, speed = held(law, parameters, slip, zero, sense, given.sliding and not known)
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
+    sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), rub.slip, rub.zero, given.sliding
+    if joint in given.rests:  # it is known whether it rests or slides in a sense
+        zero, sliding = np.bool_(given.rests[joint]), False
+        if not zero:
+            slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
+    resting: Number = 0.0
+    share: Number = 1.0
+    if np.any(zero):
+        slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
+        if not sliding:
+            resting = np.where(zero, 1.0, 0.0)
+        if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
+            share = np.where(zero, np.abs(sense), 1.0)
     first, second = walk.system.joints[joint][1]
-    units = []
-    for link in links:
-        if link in (first, second):
-            unit = walk.on_link(link, one.unit, joint)
-            units.append(unit if link == second else walk.algebra.times(-1.0, unit))
-        else:
-            units.append(walk.algebra.ZERO_LOAD)
-    return Contact(k, units, one.load, law, parameters, speed, own=tuple(flat(one.unit)) if one.felt else None)
+    unit = walk.on_link(second, rub.unit, joint)
+    on = {first: walk.algebra.times(-1.0, unit), second: unit}
+    felt = tuple(flat(rub.unit)) if rub.felt else None
+    units = [on.get(link, walk.algebra.ZERO_LOAD) for link in links]
+    return Contact(k, units, rub.load, law, parameters, slip, own=felt, resting=resting, share=share)
 
 
 def _record(
-    back: Backward, place: Place, wrench: Any, rubbed: Sequence[tuple[Contact, Rubbing, Number]], driven: bool
+    back: Backward, place: Place, wrench: Any, parts: Sequence[tuple[Contact, Rubbing | None, Number]], driven: bool
 ) -> None:
     """Keep a joint's reaction, friction and drive effort; load its known link with all three."""
     walk, algebra, joint = back.walk, back.walk.algebra, place.joint
+    turns, second = walk.system.turns(joint), walk.system.joints[joint][1][1]
     friction, amount, loss = algebra.ZERO_LOAD, 0.0, 0.0
-    for contact, one, force in rubbed:
-        part = algebra.times(force, one.unit)
-        friction, amount = algebra.added(friction, part), literal.plus(amount, literal.times(force, one.amount))
-        loss = literal.less(loss, force * one.slip)
-        if contact.own is not None:
-            wrench = algebra.minus(wrench, part)
-    back.friction_wrenches[joint], back.friction[joint], back.losses[joint] = friction, amount, loss
-    if joint in back.drags:
-        _drag(back, joint)
-    whole, back.reactions[joint] = algebra.added(wrench, friction), wrench if driven else walk.bare(joint, wrench)
+    for contact, rub, force in parts:
+        if rub is not None:
+            part = algebra.times(force, rub.unit)
+            friction, amount = algebra.added(friction, part), literal.plus(amount, literal.times(force, rub.amount))
+            loss = literal.less(loss, force * rub.slip)
+            if contact.own is not None:
+                wrench = algebra.minus(wrench, part)
+    total = algebra.added(wrench, friction)
     if driven:
-        motion, unit = walk.freedom(joint, walk.system.turns(joint))
-        effort = back.efforts[joint] = algebra.power(wrench, motion)
-        back.reactions[joint] = algebra.minus(wrench, algebra.times(effort, unit))
-    second = walk.system.joints[joint][1][1]
+        motion, unit = walk.freedom(joint, turns)
+        back.efforts[joint] = algebra.power(wrench, motion)
+        reaction = algebra.minus(wrench, algebra.times(back.efforts[joint], unit))
+    else:
+        reaction = walk.bare(joint, wrench)
+    if joint in back.drags:  # what it loses whatever its load: the links bear it already
+        effort, drag = back.drags[joint]
+        friction = algebra.added(friction, algebra.times(effort, walk.axis(joint, turns)[1]))
+        amount, loss = amount + effort, loss + drag
+    back.reactions[joint], back.friction_wrenches[joint] = reaction, friction
+    back.friction[joint], back.losses[joint] = amount, loss
     if back.travels:
-        back.passed[joint] = algebra.power(walk.on_link(second, whole, joint), walk.against(joint))
+        back.passed[joint] = algebra.power(walk.on_link(second, total, joint), walk.against(joint))
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
-            back.add(link, walk.on_link(link, whole if link == second else algebra.times(-1.0, whole), joint))
-
-
-def _drag(back: Backward, joint: str) -> None:
-    """Add what a joint loses whatever its load to its friction; the links bear it already."""
-    walk, algebra, (effort, loss) = back.walk, back.walk.algebra, back.drags[joint]
-    wrench = algebra.times(effort, walk.axis(joint, walk.system.turns(joint))[1])
-    back.friction_wrenches[joint] = algebra.added(back.friction_wrenches[joint], wrench)
-    back.friction[joint] = back.friction[joint] + effort
-    back.losses[joint] = back.losses[joint] + loss
+            back.add(link, walk.on_link(link, total if link == second else algebra.times(-1.0, total), joint))
 
 
 def _push(back: Backward, number: int, done: Sequence[Any]) -> None:
     """Load the known links of a module with what its gear pairs do."""
-    for link, wrench in on_links(back.walk, number, done):
-        back.add(link, wrench)
+    for joint, side, wrench in done:
+        place = back.walk.system.places[number][joint]
+        if place.outer[side]:
+            back.add(place.links[side], wrench)

@@ -13,6 +13,8 @@ solved without error, and stiff bristles follow the steady deflection.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -32,7 +34,7 @@ INTERVALS = 720  # of one turn of the fastest driver
 GROWN = np.linspace(0.0, 1.0, 13) ** 2  # steps on either side of a reversal, by the distance from it
 SLOWEST = 1e-30  # m/s, so that d/|v| has a value at rest
 REFINEMENTS = 6  # of the place of a reversal
-Array = NDArray[np.float64]
+PerWay = Callable[[Number], Number]  # d/|v|, 1/m, of a slip speed
 
 
 class _Slip(NamedTuple):
@@ -43,6 +45,12 @@ class _Slip(NamedTuple):
     a0: Number
     a1: Number
     length: Number
+
+    @classmethod
+    def between(cls, speeds: Number, rates: Number, first: NDArray[np.intp], length: Number) -> _Slip:
+        """Of the intervals that begin at the first of the ends given."""
+        ends = _picked(speeds, first), _picked(speeds, first + 1)
+        return cls(*ends, _picked(rates, first) * length, _picked(rates, first + 1) * length, length)
 
     def speed(self, s: Number) -> Number:
         """Cubic at the share s."""
@@ -78,8 +86,7 @@ class _Slip(NamedTuple):
 class History:
     """Deflections of one joint's bristles at the ends of the intervals of a cycle, and how to get between them."""
 
-    law: FrictionLaw
-    parameters: dict[str, Number]
+    per_way: PerWay
     speeds: Number  # (…, interval + 1), m/s
     rates: Number  # likewise, m/s²
     length: Number  # of an interval, s
@@ -93,10 +100,8 @@ class History:
         if self.periodic:
             place = place - count * np.floor(primal(place) / count)
         index = np.clip(np.floor(primal(place)).astype(int), 0, count - 1)
-        v0, v1 = _picked(self.speeds, index), _picked(self.speeds, index + 1)
-        a0, a1 = _picked(self.rates, index), _picked(self.rates, index + 1)
-        slip = _Slip(v0, v1, a0 * self.length, a1 * self.length, self.length)
-        keep, gain = _mapped(self.law, self.parameters, slip, place - index)
+        slip = _Slip.between(self.speeds, self.rates, index, self.length)
+        keep, gain = _mapped(self.per_way, slip, place - index)
         return keep * _picked(self.deflections, index) + gain
 
 
@@ -122,23 +127,19 @@ def _stretch(system: System, values: Values) -> Number:
 
 
 def _history(walk: Forward, joint: str, length: Number, periodic: bool, reverse: bool) -> History:
-    law = law_of(walk.system, joint)
-    path = f"joints.{joint}.friction"
-    parameters = {name: walk.values[f"{path}.{name}"] for name in law.parameters}
+    per_way = functools.partial(_per_way, law_of(walk.system, joint), walk.values, f"joints.{joint}.friction")
     speed, rate = walk.slip_motion(joint)
     count = np.shape(primal(walk.time))[-1]
-    speed, rate = (_full(number, count) for number in (speed, rate))
+    speed, rate = speed + np.zeros(count), rate + np.zeros(count)  # with all their lanes along the last axis
     if reverse:
         speed, rate = -_picked(speed, np.arange(count)[::-1]), _picked(rate, np.arange(count)[::-1])
-    lower, upper = np.arange(count - 1), np.arange(1, count)
-    ends = _picked(speed, lower), _picked(speed, upper)
-    slip = _Slip(*ends, _picked(rate, lower) * length, _picked(rate, upper) * length, length)
-    keep, gain = _mapped(law, parameters, slip, np.ones(count - 1))
+    slip = _Slip.between(speed, rate, np.arange(count - 1), length)
+    keep, gain = _mapped(per_way, slip, np.ones(count - 1))
     deflections = _chained(keep, gain, periodic)
-    return History(law, parameters, speed, rate, length, deflections, periodic)
+    return History(per_way, speed, rate, length, deflections, periodic)
 
 
-def _mapped(law: FrictionLaw, parameters: dict[str, Number], slip: _Slip, until: Number) -> tuple[Number, Number]:
+def _mapped(per_way: PerWay, slip: _Slip, until: Number) -> tuple[Number, Number]:
     """A and B of z ↦ A z + B from the start of intervals to the share `until` of them."""
     cut = slip.reversal()
     cut = namespace(cut, until).minimum(cut, until)
@@ -146,51 +147,41 @@ def _mapped(law: FrictionLaw, parameters: dict[str, Number], slip: _Slip, until:
     gain: Number = 0.0
     for low, high, shares in ((0.0, cut, 1 - GROWN[::-1]), (cut, until, GROWN)):
         for left, right in pairwise(shares):
-            step = low + left * (high - low), low + right * (high - low)
-            keep, gain = _stepped(law, parameters, slip, step, (keep, gain))
+            left_over, change = _stepped(per_way, slip, low + left * (high - low), low + right * (high - low))
+            keep, gain = left_over * keep, left_over * gain + change
     return keep, gain
 
 
-def _stepped(
-    law: FrictionLaw,
-    parameters: dict[str, Number],
-    slip: _Slip,
-    step: tuple[Number, Number],
-    known: tuple[Number, Number],
-) -> tuple[Number, Number]:
+def _stepped(per_way: PerWay, slip: _Slip, left: Number, right: Number) -> tuple[Number, Number]:
     """One step of z′ = z_s − z by x = ∫ d dt, where z_s = v/d changes evenly from z₀ to z₁:
     z ↦ e z + z₁ − e z₀ − (z₁ − z₀) (1 − e)/x, e = exp(−x). d/|v| is that of the middle."""
-    if law.relaxation is None:
-        raise ValueError("the law has no bristles")
-    (left, right), (keep, gain) = step, known
     v0, middle, v1 = slip.speed(left), slip.speed((left + right) / 2), slip.speed(right)
-    way = slip.length * (right - left) * (v0 + 4 * middle + v1) / 6
-    xp = namespace(way)
-    sense = xp.sign(way)
-    x = _per_way(law, parameters, middle) * xp.abs(way)
-    z0, z1 = (sense / _per_way(law, parameters, speed) for speed in (v0, v1))
+    travel = slip.length * (right - left) * (v0 + 4 * middle + v1) / 6
+    xp = namespace(travel)
+    sense = xp.sign(travel)
+    x = per_way(middle) * xp.abs(travel)
+    z0, z1 = (sense / per_way(speed) for speed in (v0, v1))
     xp = namespace(x)
     left_over = xp.exp(-x)
     tiny = primal(x) < 1e-12
     share = xp.where(tiny, 1.0, (1 - left_over) / xp.where(tiny, 1.0, x))
-    return left_over * keep, left_over * gain + z1 - left_over * z0 - (z1 - z0) * share
+    return left_over, z1 - left_over * z0 - (z1 - z0) * share
 
 
-def _per_way(law: FrictionLaw, parameters: dict[str, Number], speed: Number) -> Number:
-    """d/|v|, 1/m, also where v is 0."""
-    if law.relaxation is None:
-        raise ValueError("the law has no bristles")
+def _per_way(law: FrictionLaw, values: Values, path: str, speed: Number) -> Number:
+    """d/|v|, 1/m, also where v is 0, of the friction whose parameters stand under a path."""
+    assert law.relaxation is not None  # it has bristles
     xp = namespace(speed)
     size = xp.maximum(xp.abs(speed), SLOWEST)
-    return law.relaxation(size, **parameters) / size
+    return law.relaxation(size, **{name: values[f"{path}.{name}"] for name in law.parameters}) / size
 
 
 def _chained(keep: Number, gain: Number, periodic: bool) -> Number:
     """Deflections at all ends of intervals from their maps, periodic or from rest: by doubling the span of the maps."""
     xp = namespace(keep, gain)
     count = np.shape(primal(gain))[-1]
-    known = np.isfinite(primal(keep) + primal(gain))  # where there is no motion the bristles come to rest
-    keep, gain = xp.where(known, keep, 0.0), xp.where(known, gain, 0.0)
+    finite = np.isfinite(primal(keep) + primal(gain))  # where there is no motion the bristles come to rest
+    keep, gain = xp.where(finite, keep, 0.0), xp.where(finite, gain, 0.0)
     whole_keep, whole_gain = keep, gain
     index = np.arange(count)
     reach = 1
@@ -210,11 +201,6 @@ def _chained(keep: Number, gain: Number, periodic: bool) -> Number:
     ends = whole_keep * start + whole_gain
     first = np.arange(count + 1) == 0
     return xp.where(first, start, _picked(ends, np.maximum(np.arange(count + 1) - 1, 0)))
-
-
-def _full(number: Number, count: int) -> Number:
-    """The number with all its lanes along the last axis."""
-    return number + np.zeros(count)
 
 
 def _picked(number: Number, index: NDArray[np.intp]) -> Number:

@@ -274,8 +274,7 @@ def _sensed(run: Run) -> list[str]:
     """Joints whose sense of motion decides a friction or a load, each contact of them that of one freedom."""
     system, joints = run.system, []
     for joint in dict.fromkeys([*rubbing(system), *system.resisted]):
-        pair, friction = PAIRS[system.joints[joint][0]], system.mechanism.effective_joints[joint].friction
-        summed = friction is not None and friction.model == "pezzuti" and joint not in system.resisted
+        pair, summed = PAIRS[system.joints[joint][0]], system.summed(joint) and joint not in system.resisted
         if pair.one_axis and (len(pair.freedoms) == 1 or summed):
             joints.append(joint)
     return joints

@@ -1,36 +1,39 @@
-"""Motion, forward through the row of modules: poses, velocities, accelerations of all links."""
+"""Motion, forward through the row of modules: poses, velocities, accelerations of all links.
+
+Twists and wrenches of a link are about the origin of the global frame; so are those of a joint in space. A joint of the
+plane has its wrench about its point on its second link, where a pin carries no moment.
+"""
 
 from __future__ import annotations
 
 import operator
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from trunnion.algebra import plane, space
 from trunnion.algebra.dual import Dual, primal
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import zipped
+from trunnion.algebra.literal import is_zero
+from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.nested import each, zipped
+from trunnion.algebra.plane import Twist, Wrench
+from trunnion.algebra.space import Screw
+from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, minus, plus, scaled, transpose
+from trunnion.groups.spatial import SpatialGroup
+from trunnion.groups.tree import Element
 from trunnion.joints.pairs import PAIRS, Pair, Reaction
+from trunnion.joints.spatial_load import halves
+from trunnion.model.parts import InertiaTensor
+from trunnion.solve import shifts
 from trunnion.solve.system import Place, System, Values, driven_coordinates
 
 __all__ = [
-    "Assembly",
-    "Forward",
-    "Motion",
-    "PointMotion",
-    "Travel",
-    "Vector",
-    "forward",
-    "pose_of",
-    "posed",
-    "quiet",
-    "rate_of",
-    "start",
-]
+    "Assembly", "Forward", "Motion", "PointMotion", "SpatialWalk", "Travel", "Vector", "forward", "pose_of", "posed",
+    "quiet", "start",
+]  # fmt: skip
 
 ZERO_SLIP = 1e-10  # of the speeds about a joint: below it the sign of a relative speed is rounding noise
 Assembly = Sequence[Any]  # per module: ±1 for a closed form, a `branches.Track` for a general group, None for a driver
@@ -64,11 +67,10 @@ class PointMotion(NamedTuple):
 
 
 @dataclass
-class Forward(ABC):
+class Forward:
     """What one walk forward found at the times (s) it was asked for; element frames are worked out once and kept.
 
-    `solve.plane` and `solve.space.motion` say what a joint does there; all else is here. algebra: of the frames, twists
-    and wrenches.
+    The joints are those of the plane; `SpatialWalk` has what they do in space. algebra: of frames, twists and wrenches.
     """
 
     system: System
@@ -80,7 +82,7 @@ class Forward(ABC):
     poses: list[Any] = field(default_factory=list)
     assembly: list[Any] = field(default_factory=list)
     _elements: dict[tuple[str, str], Any] = field(default_factory=dict)
-    algebra: ClassVar[Any]
+    algebra: ClassVar[Any] = plane
 
     # ---- what is typical --------------------------------------------------------------------------------------
 
@@ -159,8 +161,8 @@ class Forward(ABC):
 
     def placed(self, frame: Any, link: str, name: str) -> Vector:
         """Place of a named point of a link that lies in a frame."""
-        found: Vector = self.algebra.point_of(frame, self.local_place(link, name))
-        return found
+        place: Vector = self.algebra.point_of(frame, self.local_place(link, name))
+        return place
 
     def local_place(self, link: str, name: str) -> Vector:
         """A named point of a link in its own frame, m."""
@@ -188,10 +190,7 @@ class Forward(ABC):
 
     def pairs(self, places: Sequence[Place]) -> list[Any]:
         """Elements of a module's joints: global on known links, local on its own."""
-        return [self._pair(place) for place in places]
-
-    def _pair(self, place: Place) -> Any:
-        return self._side(place, 0), self._side(place, 1)
+        return [(self._side(place, 0), self._side(place, 1)) for place in places]
 
     def _side(self, place: Place, i: int) -> Any:
         link = place.links[i]
@@ -199,14 +198,14 @@ class Forward(ABC):
 
     def carried(self, travel: Mapping[str, Travel]) -> None:
         """Let the links also move as the seats of their pins travel."""
-        for link, own in travel.items():
+        for link, added in travel.items():
             motion = self.motions[link]
-            twist, acceleration = (zipped(operator.add, *both) for both in zip(motion[1:], own, strict=True))
+            twist, acceleration = (zipped(operator.add, *both) for both in zip(motion[1:], added, strict=True))
             self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
 
     def outside(self, place: Place) -> tuple[Any, Any]:
         """Motion of the known link of a module's joint; of a witness that of its second link against its first."""
-        outer = [self.motions[link] for link, known in zip(place.links, place.outer, strict=True) if known]
+        outer = [self.motions[link] for link, is_outer in zip(place.links, place.outer, strict=True) if is_outer]
         if len(outer) < 2:
             return (outer[0].twist, outer[0].acceleration) if outer else (None, None)
         first, second = outer
@@ -223,8 +222,8 @@ class Forward(ABC):
         module, places = system.plan.modules[number], system.places[number]
         _, rates, seconds = driven_coordinates(system, module, places, self.values, time)
         outer = [self.outside(place) for place in places]
-        known = [twist for twist, _ in outer], [second for _, second in outer]
-        twists, accelerations = system.groups[number].moved(pose, *known, rates, seconds)
+        carried = [twist for twist, _ in outer], [second for _, second in outer]
+        twists, accelerations = system.groups[number].moved(pose, *carried, rates, seconds)
         for link, frame, twist, second in zip(module.links, pose.frames, twists, accelerations, strict=True):
             self.motions[link] = Motion(frame, twist, second)
         self.poses.append(pose)
@@ -236,76 +235,303 @@ class Forward(ABC):
             self.motions[link] = ground._replace(frame=frame)
         self.poses.append(pose)
 
-    # ---- what the plane and space say of a joint, a module, a link ---------------------------------------------
+    # ---- joints of the plane -----------------------------------------------------------------------------------
 
-    @abstractmethod
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis, as far as it has them."""
+        first, second = self.ends(joint)
+        if self.system.turns(joint):
+            c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
+            return namespace(s, c).arctan2(s, c), 0.0
+        return 0.0, first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
-    @abstractmethod
-    def rates(self, joint: str) -> tuple[Number, Number]:
-        """Their rates, rad/s and m/s."""
-
-    @abstractmethod
-    def second_rates(self, joint: str) -> tuple[Number, Number]:
-        """Their second derivatives, rad/s² and m/s²."""
-
-    @abstractmethod
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
         """Turn or slide of a joint, whichever a driver moves, from its elements."""
+        if self.system.turns(joint):
+            return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
+        return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
-    @abstractmethod
+    def rates(self, joint: str) -> tuple[Number, Number]:
+        """Rates of the coordinates, rad/s and m/s."""
+        if self.system.turns(joint):
+            first, second = self.system.joints[joint][1]
+            return self.motions[second].twist.w - self.motions[first].twist.w, 0.0
+        axis, at = self.ends(joint)
+        x, y = plane.velocity_at(self.against(joint), plane.place_of(at))
+        return 0.0, axis.c * x + axis.s * y
+
+    def second_rates(self, joint: str) -> tuple[Number, Number]:
+        """Their derivatives, rad/s² and m/s²; the Coriolis part 2 ω × ṡ lies across the slide."""
+        first, second = (self.motions[link] for link in self.system.joints[joint][1])
+        if self.system.turns(joint):
+            return second.acceleration.w - first.acceleration.w, 0.0
+        axis, at = self.ends(joint)
+        (x, y), (to_x, to_y) = (
+            plane.acceleration_at(link.twist, link.acceleration, plane.place_of(at)) for link in (first, second)
+        )
+        return 0.0, axis.c * (to_x - x) + axis.s * (to_y - y)
+
     def slip_motion(self, joint: str) -> tuple[Number, Number]:
-        """Slip of the contact of a joint that moves one way only, and its rate; m/s, m/s²."""
+        """Slip of the contact of a joint that moves one way only, along its thread if it has one; m/s, m/s²."""
+        turns = self.system.turns(joint)
+        rate, second = (both[0 if turns else 1] for both in (self.rates(joint), self.second_rates(joint)))
+        if not turns:
+            return rate, second
+        lever, lead = self.values[f"joints.{joint}.pin.radius"], self.system.lead(self.values, joint)
+        if not is_zero(lead):
+            lever = namespace(lever, lead).sqrt(lever * lever + lead * lead)
+        return lever * rate, lever * second
 
-    @abstractmethod
     def hole(self, joint: str) -> Any:
-        """Global frame of the hole of a joint: in its second link."""
+        """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide; in
+        space z along the axis, in the middle of the bearing."""
+        second = self.system.joints[joint][1][1]
+        return self.algebra.compose(self.motions[second].frame, self.holes[second, joint])
 
-    @abstractmethod
     def hole_spin(self, joint: str) -> Vector:
         """Angular velocity of the hole of a joint against its pin, in the hole's frame, rad/s."""
+        return (self.against(joint).w,)
 
-    @abstractmethod
     def in_hole(self, joint: str, wrench: Any) -> tuple[Vector, Vector]:
         """Force, N, and moment about its middle, N m, of a joint's wrench, in the frame of its hole."""
+        hole, at = self.hole(joint), self.ends(joint)[1]
+        x, y, _ = wrench
+        moment = plane.moment_at(wrench, (hole.x - at.x, hole.y - at.y))
+        return (x * hole.c + y * hole.s, y * hole.c - x * hole.s), (moment,)
 
-    @abstractmethod
     def frame_rate(self, frame: Any) -> Any:
         """Twist of a link whose frame has the rates of its numbers as ε parts."""
+        spin = primal(frame.c) * _rate(frame.s) - primal(frame.s) * _rate(frame.c)
+        x, y = primal(frame.x), primal(frame.y)
+        return Twist(_rate(frame.x) + spin * y, _rate(frame.y) - spin * x, spin)
 
-    @abstractmethod
     def axis(self, joint: str, turns: bool) -> tuple[Any, Any]:
         """A joint's motion at unit rate of its turn or slide, and the wrench of a unit effort in it."""
+        if turns:
+            return Twist(0.0, 0.0, 1.0), Wrench(0.0, 0.0, 1.0)
+        along = self.ends(joint)[0]
+        return Twist(along.c, along.s, 0.0), Wrench(along.c, along.s, 0.0)
 
     def freedom(self, joint: str, turns: bool) -> tuple[Any, Any]:
-        """The same of the freedom that a driver moves."""
+        """The same of what a driver moves, with the slide along its thread."""
         return self.axis(joint, turns)
 
-    @abstractmethod
     def on_link(self, link: str, wrench: Any, joint: str) -> Any:
-        """A joint's wrench, about what the loads of a link are about."""
+        """A joint's wrench about the origin."""
+        return plane.about(wrench[:2], wrench.m, plane.place_of(self.ends(joint)[1]))
 
-    @abstractmethod
     def reacting(self, group: Any) -> Any:
-        """A module whose reactions are flat tuples."""
+        """A module whose reactions are flat tuples, as `friction` has them."""
+        return group
 
-    @abstractmethod
     def wrench(self, place: Place, reaction: Reaction) -> Any:
-        """The reaction of a joint on its second link as the file names it, from what its module found."""
+        """The reaction on a joint's second link as the file names it; a module may see it from the other."""
+        force = Wrench(*reaction)
+        if not place.reversed_:
+            return force
+        force = plane.times(-1.0, force)
+        if self.system.turns(place.joint):
+            return force
+        first, second = self.ends(place.joint)  # the module's second point is the file's first
+        return Wrench(force.x, force.y, plane.moment_at(force, (second.x - first.x, second.y - first.y)))
 
     def bare(self, joint: str, wrench: Any) -> Any:
-        """The reaction of a joint without a driver, without what is only rounding."""
+        """A reaction without what acts along the freedom of its joint: rounding, and of a pin exactly nothing."""
+        motion, unit = self.freedom(joint, self.system.turns(joint))
+        return plane.minus(wrench, plane.times(plane.power(wrench, motion), unit))
+
+    def inertia_moment(self, link: str) -> Any:
+        """−J α about the mass centre, N m; None of a link without inertia.  [D 2-5]"""
+        about_origin = self.system.mechanism.links[link].inertia_about == "origin"
+        mass, inertia = self.values[f"links.{link}.mass"], self.values[f"links.{link}.inertia"]
+        if is_zero(inertia) and (not about_origin or is_zero(mass)):
+            return None
+        if about_origin:
+            x, y = self.system.centre(self.values, link)
+            inertia = inertia - mass * (x * x + y * y)
+        return -inertia * self.motions[link].acceleration.w
+
+
+class SpatialWalk(Forward):
+    """What one walk forward found in space.
+
+    The load of a link's own inertia is minus the derivative of its dual momentum [P 20, 21], taken at the mass centre
+    and carried to the origin: −m a_C and −(J ω̇ + ω × J ω), gyroscopic terms included.
+    """
+
+    algebra: ClassVar[Any] = space
+
+    @cached_property
+    def size(self) -> Number:
+        """Length typical of the mechanism, m."""
+        return self.system.size(self.values, self.local)
+
+    @cached_property
+    def _stated(self) -> dict[tuple[str, str], Any]:
+        """Elements without errors: the points of a loop's links do not move with what lies in them."""
+        return self.system.stated_elements(self.values)
+
+    def local_place(self, link: str, name: str) -> Vector:
+        """A named point of a link, or its element of a joint, in its own frame, m."""
+        if f"links.{link}.points.{name}.z" in self.values:
+            return super().local_place(link, name)
+        place: Vector3 = self._stated[link, name].place
+        return place
+
+    def pairs(self, places: Sequence[Place]) -> list[Any]:
+        """Elements of a module's joints with their leads: global on known links, local on its own."""
+        leads = (self.system.lead(self.values, place.joint) for place in places)
+        return [
+            Element(first, second, lead) for (first, second), lead in zip(super().pairs(places), leads, strict=True)
+        ]
+
+    def unspun(self, number: int, pose: Any, twists: Mapping[str, Any]) -> dict[str, Any]:
+        """Twists of a module's links with a free spin, without what they spin about the line of their joints."""
+        group, found = self.system.groups[number], {}
+        for (link, _, _), (_, a, b) in zip(self.system.plan.modules[number].spinning, group.spinning, strict=True):
+            elements = each(pose.elements, primal)
+            axis = group.spin_axis(elements, a, b)
+            line = Screw(axis, cross(elements[a].second.place, axis))
+            found[link] = space.minus(twists[link], space.times(dot(axis, twists[link].u), line))
+        return found
+
+    # ---- joints -----------------------------------------------------------------------------------------------
+
+    def coordinate(self, joint: str, first: Any, second: Any) -> Number:
+        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
+        if self.pair(joint).crossed:  # its second pin lies at (sin θ₁, −cos θ₁, 0)
+            sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
+            return namespace(sine, cosine).arctan2(sine, cosine)
+        return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]
+
+    def coordinates(self, joint: str) -> tuple[Number, Number]:
+        """Turn in (−π, π] rad and slide, m, of a joint on one axis: θ and s of its dual angle."""
+        turn, slide = _dual_angle(*self.ends(joint))
+        path = f"loop.{joint}"  # the constant slide of a revolute row, the constant rotation of a prismatic one
+        return turn + self.values.get(f"{path}.rotation", 0.0), slide + self.values.get(f"{path}.slide", 0.0)
+
+    def rates(self, joint: str) -> tuple[Number, Number]:
+        """θ̇ and ṡ of a joint on one axis, rad/s and m/s."""
+        second, twist = self.ends(joint)[1], self.against(joint)
+        return dot(twist.u, second.z), dot(space.moment_at(twist, second.place), second.z)
+
+    def speed(self, joint: str) -> Number:
+        """Relative speed of a joint along its first freedom, of one that is not on one axis |ω|; rad/s, m/s."""
+        return super().speed(joint) if self.pair(joint).one_axis else space.spin(self.against(joint))
+
+    def second_rates(self, joint: str) -> tuple[Number, Number]:
+        """θ̈ and s̈ of a joint on one axis: with ẑ carried by the first link, (ẑ · V)˙ = ẑ · V̇ + (Ω × ẑ) · V."""
+        first, second = (self.motions[link] for link in self.system.joints[joint][1])
+        *_, axis, place = self.ends(joint)[1]
+        relative, rate = self.against(joint), space.minus(second.acceleration, first.acceleration)
+        carried = cross(first.twist.u, axis)
+        at = space.moment_at(relative, place)
+        speed = space.moment_at(first.twist, place)  # the point of the axis moves along with the first link
+        change = plus(space.moment_at(rate, place), cross(relative.u, speed))
+        return dot(rate.u, axis) + dot(relative.u, carried), dot(change, axis) + dot(at, carried)
+
+    def pin_rates(self, joint: str) -> tuple[Number, Number]:
+        """Rates about the two pins of a cross, at right angles, rad/s."""
+        turn, (first, second) = self.against(joint).u, self.ends(joint)
+        return dot(turn, first.z), dot(turn, second.z)
+
+    def signed_rates(self, joint: str) -> Iterator[Number]:
+        """Rates of a joint, of a cross of its two pins, that turn round, 0 where they are noise."""
+        if self.pair(joint).crossed:
+            return (quiet(rate, self.noise(joint, turns=True)) for rate in self.pin_rates(joint))
+        return super().signed_rates(joint)
+
+    def hole(self, joint: str) -> Any:
+        """See `Forward.hole`."""
+        return shifts.hole(super().hole(joint), self.values, joint)
+
+    def hole_spin(self, joint: str) -> Vector:
+        """See `Forward.hole_spin`."""
+        return apply(self.hole(joint)[:3], self.against(joint).u)
+
+    def in_hole(self, joint: str, wrench: Any) -> tuple[Vector, Vector]:
+        """See `Forward.in_hole`."""
+        *axes, middle = self.hole(joint)
+        return apply(tuple(axes), wrench.u), apply(tuple(axes), space.moment_at(wrench, middle))
+
+    def frame_rate(self, frame: Any) -> Any:
+        """Twist of a link whose frame has rates as ε parts: ω = ½ Σ e × ė, and the velocity of its origin p."""
+        (x, dx), (y, dy), (z, dz), (place, rate) = ((each(part, primal), each(part, _rate)) for part in frame)
+        spin = scaled(0.5, plus(plus(cross(x, dx), cross(y, dy)), cross(z, dz)))
+        return Screw(spin, minus(rate, cross(spin, place)))
+
+    def axis(self, joint: str, turns: bool) -> tuple[Any, Any]:
+        """A joint's motion at unit rate of its turn or slide, and the wrench of a unit effort in it."""
+        line = space.line_of(self.ends(joint)[1])
+        along = Screw(space.NULL, line.u)
+        return (line, along) if turns else (along, line)
+
+    def freedom(self, joint: str, turns: bool) -> tuple[Any, Any]:
+        """The same of what a driver moves, with the slide along its thread."""
+        twist, effort = self.axis(joint, turns)
+        return Screw(twist.u, plus(twist.m, scaled(self.system.lead(self.values, joint), twist.u))), effort
+
+    # ---- forces -----------------------------------------------------------------------------------------------
+
+    def on_link(self, link: str, wrench: Any, joint: str) -> Any:
+        """A joint's wrench about the origin: the same."""
         return wrench
 
-    @abstractmethod
+    def reacting(self, group: Any) -> Any:
+        """A module whose reactions are flat tuples, as `friction` has them."""
+        return _Flat(group)
+
+    def wrench(self, place: Place, reaction: Reaction) -> Any:
+        """The reaction of a joint."""
+        return Screw(*halves(reaction))
+
+    def bare(self, joint: str, wrench: Any) -> Any:
+        """The reaction of a joint without a driver: as it is."""
+        return wrench
+
     def inertia_moment(self, link: str) -> Any:
-        """What a link's own inertia does about its mass centre, N m; None of a link without."""
+        """−(J ω̇ + ω × J ω) about the mass centre, N m; None of a link without inertia.  [P 21]"""
+        tensor = self._tensor(link)
+        if tensor is None:
+            return None
+        frame, twist, second = self.motions[link]
+        back = space.Frame(*transpose(frame[:3]), space.NULL)
+        w, change = space.rotated(back, twist.u), space.rotated(back, second.u)
+        return scaled(-1.0, space.rotated(frame, plus(apply(tensor, change), cross(w, apply(tensor, w)))))
+
+    def _tensor(self, link: str) -> Matrix3 | None:
+        """Inertia of a link about its mass centre in its own axes, kg m²; None if it has none."""
+        stated, values = self.system.mechanism.effective_links[link], self.values
+        if not isinstance(stated.inertia, InertiaTensor):
+            return None
+        xx, yy, zz, xy, xz, yz = (values[f"links.{link}.inertia.{key}"] for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        if stated.inertia_about == "origin":  # Steiner: J_C = J_O − m (c² 1 − c cᵀ)
+            mass, (x, y, z) = values[f"links.{link}.mass"], self.system.centre(values, link)
+            xx, yy, zz = xx - mass * (y * y + z * z), yy - mass * (x * x + z * z), zz - mass * (x * x + y * y)
+            xy, xz, yz = xy + mass * x * y, xz + mass * x * z, yz + mass * y * z
+        return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+
+
+@dataclass(frozen=True)
+class _Flat:
+    """A module whose reactions are flat tuples."""
+
+    group: SpatialGroup
+
+    def reactions(self, pose: Any, loads: Sequence[Screw]) -> list[Reaction]:
+        return [(*wrench.u, *wrench.m) for wrench in self.group.reactions(pose, loads)]
+
+
+def _dual_angle(first: space.Frame, second: space.Frame) -> tuple[Number, Number]:
+    """θ and s from one element of a joint on one axis to the other, rad and m."""
+    sine, cosine = dot(second.x, first.y), dot(second.x, first.x)
+    slide = dot(minus(second.place, first.place), first.z)
+    return namespace(sine, cosine).arctan2(sine, cosine), slide
 
 
 def start(system: System, values: Values) -> Forward:
     """A walk before its first module: only the ground is known."""
-    made: type[Forward] = system.geometry.walk
+    made = SpatialWalk if system.spatial else Forward
     ground = Motion(made.algebra.ORIGIN, *made.algebra.STILL)
     return made(system, values, system.elements(values), {system.mechanism.fixed_link: ground})
 
@@ -328,23 +554,25 @@ def forward(
     NaN from the first module that cannot be assembled onward, lane by lane. travel: how the links also move, since the
     seats of pins travel.
     """
-    walk = start(system, values)
-    walk.time = time
-    with np.errstate(all="ignore"):
-        for number in range(len(system.plan.modules)):
-            walk.take(number, pose_of(walk, number, assembly[number], time), time)
-        if travel:
-            walk.carried(travel)
+    walk = _walked(system, values, assembly, time, lambda walk, number, pose: walk.take(number, pose, time))
+    if travel:
+        walk.carried(travel)
     return walk
 
 
 def posed(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
     """The walk of `forward` for what the places alone decide: every link is left at rest."""
+    return _walked(system, values, assembly, time, lambda walk, number, pose: walk.stand(number, pose))
+
+
+def _walked(
+    system: System, values: Values, assembly: Assembly, time: Number, add: Callable[[Forward, int, Any], None]
+) -> Forward:
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
         for number in range(len(system.plan.modules)):
-            walk.stand(number, pose_of(walk, number, assembly[number], time))
+            add(walk, number, pose_of(walk, number, assembly[number], time))
     return walk
 
 
@@ -353,6 +581,6 @@ def quiet(rate: Number, noise: Number) -> Number:
     return np.where(np.abs(primal(rate)) <= noise, 0.0, primal(rate))
 
 
-def rate_of(number: Number) -> Number:
+def _rate(number: Number) -> Number:
     """The ε part of a number, 0 of a plain one."""
     return number.dual if isinstance(number, Dual) else 0.0

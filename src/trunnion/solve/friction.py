@@ -12,23 +12,17 @@ happens is reported.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion.algebra import linalg
-from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, apart, looped
-from trunnion.algebra.nested import replaced
-from trunnion.joints.friction import LawFunction
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
-from trunnion.solve.friction_method import FrictionMethod, peak
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Contact, FrictionProblem, added, largest, total
 
 __all__ = [
@@ -36,10 +30,7 @@ __all__ = [
     "FrictionMethod",
     "FrictionProblem",
     "Settled",
-    "balance",
     "frictionless",
-    "identity_minus",
-    "primal_of",
     "scaled",
     "settle",
     "with_own",
@@ -87,25 +78,15 @@ def settle(
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
     if method.multiple is not None:
-        contacts = [_times(method.multiple, contact) if contact.rubs else contact for contact in contacts]
+        contacts = [
+            contact._replace(share=method.multiple * contact.share) if contact.rubs else contact for contact in contacts
+        ]
     influence = [with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)
-    if method.name == "successive-approximation":
-        return _successive(problem, method)
-    if problem.one_way:
-        return _at_once(problem)
-    return _newton(problem, method)
-
-
-def _times(multiple: Number, contact: Contact) -> Contact:
-    """The contact with a multiple of its friction."""
-    law = replace(contact.law, function=functools.partial(_multiplied, contact.law.function))
-    return contact._replace(law=law, parameters={**contact.parameters, "multiple": multiple})
-
-
-def _multiplied(function: LawFunction, normal: Number, slip: Number, *, multiple: Number, **own: Number) -> Number:
-    """A multiple of what the law says."""
-    return multiple * function(normal, slip, **own)
+    if problem.one_way and method.name == "newton":  # no law looks at what friction changes
+        forces = problem.target(problem.state([0.0] * len(contacts)).normals)
+        return Settled(problem.reactions(forces), forces, 1, 0.0, 0.0, True, problem=problem.real)
+    return _iterated(problem, method)
 
 
 def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
@@ -115,49 +96,51 @@ def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     return column
 
 
-def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
-    """Newton from no friction; lanes without the certificate of `bound` are followed by continuation.
+def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
+    """From no friction by rounds of the method; Newton's follows lanes without the certificate of `bound` afterwards.
 
-    So are certain lanes that kinks keep from settling: their continuation leads to the same, only solution. The rounds
-    counted are Newton's. A followed lane gets as many as it needs to obey its laws, as the others do. Lanes that cannot
-    be treated apart stay as they are, for whoever compiles to compute again.
+    So it does certain lanes that kinks keep from settling: their continuation leads to the same, only solution. A
+    followed lane gets as many rounds, not counted, as it needs to obey its laws. Lanes that cannot be treated apart
+    stay as they are, for whoever compiles to compute again.
     """
-    real = primal_of(problem)
+    real, newton = problem.real, method.name == "newton"
     none: list[Number] = [0.0] * len(real.contacts)
-    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
     state = real.state(none)
-    bound = np.where(np.isfinite(peak(state.normals)), real.bound(), 0.0)
-    certain = ~(bound >= 1.0)
-    rounds = min(method.limit, STUBBORN)
-    at = _round(real, _Iterate(none, state.normals, real.gaps(state, none)), method)
-    # one without the certificate goes no further by itself
-    at = at._replace(done=np.where(certain, at.done, 1.0), rounds=np.where(certain, 1.0, 0.0))
-    at = _iterated(real, at, rounds - 1, method)
+    # a lane whose loads are no numbers, because another module locked or opened, is not this module's affair
+    certain = ~(np.where(np.isfinite(largest(state.normals)), real.bound(), 0.0) >= 1.0)
+    at = _Iterate(none, state.normals, real.gaps(state, none))
     shares: Number = 1.0
-    left = ~certain
-    if method.limit >= STUBBORN:
-        left = left | ~((at.done > 0) | _obeyed(real, at))
-    if apart(left):
-        forces, shares = _follow(real, at.forces, left)
-        state = real.state(forces)
-        again, gaps = np.where(left, 1.0, 0.0), real.gaps(state, forces)
-        at = at._replace(forces=forces, normals=state.normals, gaps=gaps, excess=np.inf, slow=again, done=1.0 - again)
-        at = _iterated(real, at, rounds, method)
-    forces = at.forces
-    state = real.state(forces, at.normals)
-    depth = _depth(problem)
-    inverse = linalg.quick_inverse(identity_minus(real.map_derivative(state))) if depth else []  # at the solution
-    for _ in range(depth):
-        forces = _corrected(forces, problem.gaps(problem.state(forces), forces), inverse)
-        state = problem.state(forces)
+    if newton:
+        rounds = min(method.limit, STUBBORN)
+        at = _round(real, at, method)
+        # one without the certificate goes no further by itself
+        at = at._replace(done=np.where(certain, at.done, 1.0), rounds=np.where(certain, 1.0, 0.0))
+        at = _rounds(real, at, rounds - 1, method)
+        left = ~certain
+        if method.limit >= STUBBORN:
+            left = left | ~((at.done > 0) | _obeyed(real, at))
+        if apart(left):
+            *forces, shares = real.in_lanes(_followed, left, [*at.forces, 1.0])
+            state = real.state(forces)
+            again, gaps = np.where(left, 1.0, 0.0), real.gaps(state, forces)
+            at = at._replace(forces=forces, normals=state.normals, gaps=gaps, excess=np.inf, slow=again, done=1 - again)
+            at = _rounds(real, at, rounds, method)
+    else:
+        at = _rounds(real, at, method.limit, method)
     converged = (at.done > 0) if method.criterion is not None else _obeyed(real, at)
+    forces = at.forces
+    if problem.depth:  # Newton's method at the solution gives the derivatives, one level of ε a round
+        derivative = real.map_derivative(real.state(forces, at.normals))
+        inverse = linalg.quick_inverse(_identity_minus(derivative))
+        for _ in range(problem.depth):
+            forces = _corrected(forces, problem.gaps(problem.state(forces), forces), inverse)
     return Settled(
-        reactions=problem.reactions(forces, state),
+        reactions=problem.reactions(forces),
         forces=forces,
         iterations=at.rounds,
         change=at.change,
         contraction=at.contraction,
-        converged=converged & (shares >= 1.0),
+        converged=converged & (shares >= 1.0 if newton else np.isfinite(at.change)),  # not so where it ran off
         residual=real.misfit(at.gaps),
         share=shares,
         certain=certain,
@@ -166,11 +149,11 @@ def _newton(problem: FrictionProblem, method: FrictionMethod) -> Settled:
 
 
 class _Iterate(NamedTuple):
-    """Where Newton's method is: forces, and normal loads and law − force under them.
+    """Where an iteration is: forces, and normal loads and law − force under them.
 
-    inverse: (1 − A)⁻¹ as last needed; excess: miss of the worst law; change: of a normal load in the last round, N;
-    contraction: ∞-norm of that A; slow: 1 where the next round has another A; done: 1 where there is none; rounds: so
-    many were made.
+    inverse: (1 − A)⁻¹ as Newton's method last needed it; excess: miss of the worst law; change: of a normal load in the
+    last round, N; contraction: ∞-norm of that A, or the ratio of the last two changes; slow: 1 where the next round has
+    another A; done: 1 where there is none; rounds: so many were made.
     """
 
     forces: list[Number]
@@ -181,7 +164,7 @@ class _Iterate(NamedTuple):
     change: Number = np.inf
     contraction: Number = 0.0
     slow: Number = 1.0
-    done: Number = 0.0
+    done: Number = np.float64(0.0)
     rounds: Number = 0.0
 
     def in_row(self) -> list[Number]:
@@ -201,8 +184,8 @@ def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
     return ~(real.excess(at.gaps, at.forces) > OBEYED)
 
 
-def _iterated(real: FrictionProblem, start: _Iterate, rounds: int, method: FrictionMethod) -> _Iterate:
-    """At most so many rounds of Newton's method, in the lanes that are not done; those that are stay as they are."""
+def _rounds(real: FrictionProblem, start: _Iterate, rounds: int, method: FrictionMethod) -> _Iterate:
+    """At most so many rounds in the lanes that are not done; those that are stay as they are."""
 
     def step(row: list[Number]) -> list[Number]:
         return _round(real, start.of_row(row), method).in_row()
@@ -211,25 +194,34 @@ def _iterated(real: FrictionProblem, start: _Iterate, rounds: int, method: Frict
 
 
 def _round(real: FrictionProblem, at: _Iterate, method: FrictionMethod) -> _Iterate:
-    """One round of Newton's method.
+    """One round: [D] steps 2-5, friction from the last loads, or a step of Newton's method.
 
-    A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
+    Its A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
     hundredth of the residual, which in all but the worst cases is always; a lane that crosses a kink leaves more and
     gets the A of its new side. So what a lane comes to does not depend on the lanes beside it. It is done when every
     friction is what its law says for the load, whatever the last round changed.
     """
-    inverse, contraction, slow = at.inverse, at.contraction, at.slow > 0
-    if np.any(slow):
-        rows = real.map_derivative(real.state(at.forces, at.normals))
-        fresh = linalg.quick_inverse(identity_minus(rows))
-        inverse = [_chosen(slow, *both) for both in zip(fresh, inverse, strict=True)] if inverse else fresh
-        norm = largest([total([np.abs(entry) for entry in row]) for row in rows])
-        (contraction,) = _chosen(slow, [norm], [contraction])
-    stays = at.done > 0
-    forces = _chosen(~stays, _corrected(at.forces, at.gaps, inverse), at.forces)
+    inverse, contraction, stays = at.inverse, at.contraction, at.done > 0
+    if method.name == "newton":
+        slow = at.slow > 0
+        if np.any(slow):
+            rows = real.map_derivative(real.state(at.forces, at.normals))
+            fresh = linalg.quick_inverse(_identity_minus(rows))
+            inverse = [_chosen(slow, *both) for both in zip(fresh, inverse, strict=True)] if inverse else fresh
+            norm = largest([total([np.abs(entry) for entry in row]) for row in rows])
+            (contraction,) = _chosen(slow, [norm], [contraction])
+        forces = _corrected(at.forces, at.gaps, inverse)
+    else:
+        forces = real.target(at.normals)
+    forces = _chosen(~stays, forces, at.forces)
     state = real.state(forces)
     gaps = real.gaps(state, forces)
-    excess, change = real.excess(gaps, forces), _changed(state.normals, at.normals)
+    excess = real.excess(gaps, forces)
+    change = largest([a - b for a, b in zip(state.normals, at.normals, strict=True)])
+    if method.name != "newton":
+        measurable = np.isfinite(at.change) & (at.change > 0)
+        ratio = np.where(measurable, change / np.where(measurable, at.change, 1.0), 0.0)
+        (contraction,) = _chosen(~stays, [ratio], [contraction])
     # a lane of NaN has nothing to wait for
     done = stays | ~(excess > SETTLED if method.criterion is None else change > method.criterion)
     slow = (excess > SLOW * at.excess) & ~done
@@ -243,70 +235,16 @@ def _chosen(lanes: Number, row: Sequence[Number], others: Sequence[Number]) -> l
     return list(row) if np.all(lanes) else [np.where(lanes, a, b) for a, b in zip(row, others, strict=True)]
 
 
-def _at_once(problem: FrictionProblem) -> Settled:
-    """Friction from the frictionless reactions, which it does not change but in what no law looks at."""
-    forces = problem.target(problem.state([0.0] * len(problem.contacts)).normals)
-    reactions = problem.reactions(forces, problem.state(forces))
-    return Settled(reactions, forces, 1, 0.0, 0.0, True, problem=primal_of(problem))
-
-
 def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequence[Sequence[Number]]) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
     moves = [total([entry * part for entry, part in zip(row, gaps, strict=True)]) for row in inverse]
     return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
 
 
-def _changed(normals: Sequence[Number], before: Sequence[Number]) -> Number:
-    """Largest change of a normal load, N."""
-    return largest([a - b for a, b in zip(normals, before, strict=True)])
-
-
-def _successive(problem: FrictionProblem, method: FrictionMethod) -> Settled:
-    """[D] steps 1-5: friction from the last reactions, reactions from the last friction, until they rest."""
-    forces: list[Number] = [0.0] * len(problem.contacts)
-    state = problem.state(forces)
-    change: Number = np.inf
-    previous: Number = np.inf
-    done: Number = np.False_
-    rounds: Number = 0
-    for _ in range(method.limit):
-        rounds = rounds + ~done
-        forces = problem.target(state.normals)
-        before, state = state, problem.state(forces)
-        gaps = problem.gaps(state, forces)
-        previous, change = change, _changed(state.normals, before.normals)
-        done = ~(problem.excess(gaps, forces) > SETTLED) if method.criterion is None else ~(change > method.criterion)
-        if np.all(done):
-            break
-    done = ~(problem.excess(gaps, forces) > OBEYED) if method.criterion is None else change <= method.criterion
-    measurable = np.isfinite(previous) & (previous > 0)
-    ratio = np.where(measurable, change / np.where(measurable, previous, 1.0), 0.0)
-    real = primal_of(problem)
-    bound = np.where(np.isfinite(peak(real.state([0.0] * len(real.contacts)).normals)), real.bound(), 0.0)
-    return Settled(
-        reactions=problem.reactions(forces, state),
-        forces=forces,
-        iterations=rounds,
-        change=change,
-        contraction=ratio,
-        converged=done & np.isfinite(change),  # not so where it ran off to infinity
-        residual=problem.misfit(gaps),
-        certain=~(bound >= 1.0),
-        problem=real,
-    )
-
-
-def _follow(
-    problem: FrictionProblem, forces: Sequence[Number], lanes: Number
-) -> tuple[list[Number], NDArray[np.float64]]:
-    """Forces with the chosen lanes followed from no friction; NaN where they lock, and the share reached."""
-    part, chosen = problem.picked(lanes)
-    shape = chosen.shape
-    found, reached = continuation.follow(scaled(part), frictionless(part))
-    result = [replaced(force, chosen, value) for force, value in zip(forces, found, strict=True)]
-    shares = np.ones(shape)
-    shares[chosen] = reached
-    return result, shares
+def _followed(part: FrictionProblem, lanes: Number) -> list[Number]:
+    """Forces followed from no friction, NaN where they lock, and the share of the friction reached."""
+    forces, share = continuation.follow(scaled(part), frictionless(part), 1.0, lanes)
+    return [*forces, share]
 
 
 def scaled(
@@ -316,24 +254,13 @@ def scaled(
 
     def system(forces: Sequence[Number], share: Number) -> tuple[list[Number], list[list[Number]]]:
         multiples = [share] * len(problem.contacts) if weights is None else weights(share)
+        shares = [s if contact.rubs else 1.0 for s, contact in zip(multiples, problem.contacts, strict=True)]
         state = problem.state(forces)
-        return balance(problem, forces, problem.target(state.normals), problem.map_derivative(state), multiples)
+        residual = [f - s * t for f, s, t in zip(forces, shares, problem.target(state.normals), strict=True)]
+        slopes = problem.map_derivative(state)
+        return residual, _identity_minus([[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)])
 
     return system
-
-
-def balance(
-    problem: FrictionProblem,
-    forces: Sequence[Number],
-    target: Sequence[Number],
-    slopes: Sequence[Sequence[Number]],
-    multiples: Sequence[Number],
-) -> tuple[list[Number], list[list[Number]]]:
-    """Residual and Jacobian with multiples of the contacts' friction. target, slopes: of the laws, and derivatives."""
-    shares = [multiple if contact.rubs else 1.0 for multiple, contact in zip(multiples, problem.contacts, strict=True)]
-    residual = [f - s * t for f, s, t in zip(forces, shares, target, strict=True)]
-    rows = [[s * entry for entry in row] for s, row in zip(shares, slopes, strict=True)]
-    return residual, identity_minus(rows)
 
 
 def frictionless(problem: FrictionProblem) -> list[Number]:
@@ -342,15 +269,5 @@ def frictionless(problem: FrictionProblem) -> list[Number]:
     return [0.0 if contact.rubs else load for contact, load in zip(problem.contacts, target, strict=True)]
 
 
-def identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
+def _identity_minus(rows: Sequence[Sequence[Number]]) -> list[list[Number]]:
     return [[(1.0 if k == j else 0.0) - entry for j, entry in enumerate(row)] for k, row in enumerate(rows)]
-
-
-def _depth(problem: FrictionProblem) -> int:
-    """Levels of ε among the inputs: each costs one Newton step at the solution."""
-    return max((n.depth for n in problem.numbers if isinstance(n, Dual)), default=0)
-
-
-def primal_of(problem: FrictionProblem) -> FrictionProblem:
-    """The problem without derivatives."""
-    return problem.mapped(primal) if _depth(problem) else problem

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
-import numpy as np
-
-from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import strict_keywords
 
-if TYPE_CHECKING:
-    pass
-__all__ = ["MARGIN", "FrictionMethod", "peak"]
+__all__ = ["MARGIN", "FrictionMethod"]
 
 Method = Literal["newton", "successive-approximation"]
 
@@ -50,11 +43,6 @@ class FrictionMethod:
             raise MechanismError(Finding(f"a criterion of {self.criterion:g} N is never met", "criterion", "above 0"))
         if self.limit < 1:
             raise MechanismError(Finding(f"{self.limit} iterations are too few", "iterations", "give 1 or more"))
-
-
-def peak(normals: Sequence[Number]) -> Number:
-    """Largest of numbers that are not negative; NaN if one is NaN."""
-    return functools.reduce(np.maximum, [primal(normal) for normal in normals])
 
 
 MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for

@@ -14,17 +14,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
-from trunnion.algebra.literal import is_zero, less, plus
-from trunnion.algebra.namespace import Number, apart
+from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.literal import is_zero, less, plus, times
+from trunnion.algebra.namespace import Number, apart, namespace
 from trunnion.algebra.nested import replaced
 from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
 __all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "added", "largest", "total"]
-
-
-Part = tuple[int, Number]  # an entry with its place
 
 
 class Contact(NamedTuple):
@@ -34,7 +31,8 @@ class Contact(NamedTuple):
     links; load: normal load and its gradient from the joint's reaction; law with parameters; slip: m/s.
     rubs: False for the separating force of a gear pair, which follows the tooth force as friction follows the
     normal load, but is there in full whatever the friction. own: what the unit load adds to what the joint itself
-    carries, where its load depends on that.
+    carries, where its load depends on that. resting: above 0 where the law takes its value at rest; share: of what the
+    law says.
     """
 
     joint: int
@@ -45,12 +43,23 @@ class Contact(NamedTuple):
     slip: Number
     rubs: bool = True
     own: Reaction | None = None
+    resting: Number = 0.0
+    share: Number = 1.0
+
+    @property
+    def slope(self) -> Number:
+        """Friction force for each newton of normal load: every law is proportional to it."""
+        slope = self.law.function(1.0, self.slip, **self.parameters)
+        if self.law.at_rest is not None and not is_zero(self.resting):
+            slope = namespace(slope).where(self.resting > 0, self.law.at_rest(1.0, self.slip, **self.parameters), slope)
+        return times(self.share, slope)
 
     def mapped(self, change: Callable[[Number], Number]) -> Contact:
         """The same with `change` applied to every number that the laws see."""
         parameters = {name: change(value) for name, value in self.parameters.items()}
         load: ContactLoad = self.load.mapped(change)
-        return self._replace(load=load, parameters=parameters, slip=change(self.slip))
+        slip, resting, share = change(self.slip), change(self.resting), change(self.share)
+        return self._replace(load=load, parameters=parameters, slip=slip, resting=resting, share=share)
 
 
 class Rubbing(NamedTuple):
@@ -72,10 +81,25 @@ class Rubbing(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """What one contact feels of the frictionless reactions, and of each friction force of 1 N."""
+    """What one contact feels of the frictionless reactions, and of each friction force of 1 N.
+
+    parts: of each number, what 1 N of a friction force adds to it, with that force's number; literal zeros left out.
+    """
 
     start: Reaction
     columns: list[Reaction]
+    parts: list[list[tuple[int, Number]]]
+
+    @classmethod
+    def of(cls, start: Reaction, columns: list[Reaction]) -> Felt:
+        """With the parts of the columns."""
+        rows = zip(*columns, strict=True)
+        return cls(start, columns, [[(k, entry) for k, entry in enumerate(row) if not is_zero(entry)] for row in rows])
+
+    def under(self, forces: Sequence[Number]) -> Reaction:
+        """What it is under friction forces."""
+        changes = [total([entry * forces[k] for k, entry in parts]) for parts in self.parts]
+        return added(self.start, tuple(changes))
 
 
 class State(NamedTuple):
@@ -113,8 +137,18 @@ class FrictionProblem:
 
         for contact in self.contacts:
             contact.load.mapped(note)
-            found += [contact.slip, *contact.parameters.values()]
+            found += [contact.slip, contact.resting, contact.share, *contact.parameters.values()]
         return [*found, *(n for wrenches in (self.start, *self.influence) for wrench in wrenches for n in wrench)]
+
+    @cached_property
+    def depth(self) -> int:
+        """Levels of ε among its numbers: each costs one Newton step at the solution."""
+        return max((number.depth for number in self.numbers if isinstance(number, Dual)), default=0)
+
+    @property
+    def real(self) -> FrictionProblem:
+        """The problem without derivatives."""
+        return self.mapped(primal) if self.depth else self
 
     def picked(self, lanes: Number) -> tuple[FrictionProblem, NDArray[np.bool_]]:
         """The problem of the chosen lanes alone, each number a flat array, and the choice in full shape."""
@@ -122,25 +156,25 @@ class FrictionProblem:
         chosen = np.broadcast_to(lanes, shape)
         return self.mapped(lambda number: np.broadcast_to(np.asarray(number, float), shape)[chosen]), chosen
 
-    def in_lanes(self, function: Callable[[FrictionProblem, Number], Number], lanes: Number, others: Number) -> Number:
+    def in_lanes(
+        self,
+        function: Callable[[FrictionProblem, Number], Sequence[Number]],
+        lanes: Number,
+        others: Sequence[Number],
+    ) -> list[Number]:
         """function(problem, lanes that count) in some lanes, computed apart where that can be; `others` elsewhere."""
         if not np.any(lanes):
-            return others
+            return list(others)
         if not apart(lanes):
-            return np.where(lanes, function(self, lanes), others)
+            return [np.where(lanes, *both) for both in zip(function(self, lanes), others, strict=True)]
         part, chosen = self.picked(lanes)
-        return replaced(others, chosen, function(part, True))
+        return [replaced(old, chosen, new) for old, new in zip(others, function(part, True), strict=True)]
 
     @cached_property
     def felt(self) -> list[Felt]:
         """What the load of each contact makes of the reactions of its joint: only that is followed in the iteration."""
-        return [
-            Felt(
-                contact.load.felt(self.start[contact.joint]),
-                [contact.load.felt(column[contact.joint]) for column in self.influence],
-            )
-            for contact in self.contacts
-        ]
+        joints = [(contact.load.felt, contact.joint) for contact in self.contacts]
+        return [Felt.of(felt(self.start[k]), [felt(column[k]) for column in self.influence]) for felt, k in joints]
 
     @cached_property
     def one_way(self) -> bool:
@@ -151,44 +185,25 @@ class FrictionProblem:
             for column in felt.columns
         )
 
-    @cached_property
-    def _alike(self) -> list[int]:
-        """For each contact the first one whose reaction every friction force changes just as much."""
-        found: list[int] = []
-        numbers = [[n for column in one.columns for n in column] for one in self.felt]
-        for k, own in enumerate(numbers):
-            same = (i for i in range(k) if all(a is b for a, b in zip(own, numbers[i], strict=False)))
-            found.append(next(same, k))
-        return found
-
-    def reactions(self, forces: Sequence[Number], known: State) -> list[Reaction]:
-        """Reactions of all joints; where a contact feels the whole of it, it is in the state of the forces."""
-        found = {
-            contact.joint: reaction
-            for contact, felt, reaction in zip(self.contacts, self.felt, known.reactions, strict=True)
-            if felt.start is self.start[contact.joint]
-        }
-        still = all(is_zero(force) for force in forces)
-        for joint, start in enumerate(self.start):
-            if joint not in found:
-                found[joint] = start if still else added(start, _changes([c[joint] for c in self.influence], forces))
-        return [found[joint] for joint in range(len(self.start))]
+    def reactions(self, forces: Sequence[Number]) -> list[Reaction]:
+        """Reactions of all joints under friction forces."""
+        if all(is_zero(force) for force in forces):
+            return list(self.start)
+        joints = enumerate(self.start)
+        return [Felt.of(start, [column[k] for column in self.influence]).under(forces) for k, start in joints]
 
     def state(self, forces: Sequence[Number], normals: list[Number] | None = None) -> State:
         """Reactions and normal loads at the contacts under friction forces. normals: where they are known."""
-        if all(is_zero(force) for force in forces):
-            at = [one.start for one in self.felt]
-        else:
-            changes = {k: _combined(self._crossed[k], forces) for k in set(self._alike)}
-            at = [added(one.start, changes[k]) for one, k in zip(self.felt, self._alike, strict=True)]
+        frictionless = all(is_zero(force) for force in forces)
+        reactions = [felt.start if frictionless else felt.under(forces) for felt in self.felt]
         if normals is None:
-            normals = [c.load.normal(reaction) for c, reaction in zip(self.contacts, at, strict=True)]
-        return State(at, normals)
+            normals = [c.load.normal(reaction) for c, reaction in zip(self.contacts, reactions, strict=True)]
+        return State(reactions, normals)
 
     @cached_property
     def slopes(self) -> list[Number]:
         """Friction force for each newton of normal load: every law is proportional to it."""
-        return [contact.law.function(1.0, contact.slip, **contact.parameters) for contact in self.contacts]
+        return [contact.slope for contact in self.contacts]
 
     def target(self, normals: Sequence[Number]) -> list[Number]:
         """What the laws say for these normal loads."""
@@ -203,13 +218,11 @@ class FrictionProblem:
 
         What pushes gears apart is held against the largest force of all, as it does not get small with friction.
         """
+        miss = largest(gaps) / largest(forces)
         rubbing = [k for k, contact in enumerate(self.contacts) if contact.rubs]
-        if len(rubbing) == len(gaps):
-            return largest(gaps) / largest(forces)
-        whole = largest(gaps) / largest(forces)
-        if not rubbing:
-            return whole
-        return np.fmax(whole, largest([gaps[k] for k in rubbing]) / largest([forces[k] for k in rubbing]))
+        if len(rubbing) in (0, len(gaps)):
+            return miss
+        return np.fmax(miss, largest([gaps[k] for k in rubbing]) / largest([forces[k] for k in rubbing]))
 
     def misfit(self, gaps: Sequence[Number]) -> Number:
         """Largest difference between a friction and what its law says, N."""
@@ -218,32 +231,15 @@ class FrictionProblem:
     def map_derivative(self, state: State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        each = zip(self.contacts, *state, self.slopes, self._filled, strict=True)
-        for contact, reaction, normal, slope, filled in each:
-            gradient = contact.load.gradient(reaction, normal)
-            scaled = [entry if is_zero(entry) else slope * entry for entry in gradient]
-            there = None if all(type(entry) is np.ndarray for entry in scaled) else [not is_zero(g) for g in scaled]
-            rows.append([_along(scaled, column, there) for column in filled])
+        for contact, felt, slope, *at in zip(self.contacts, self.felt, self.slopes, *state, strict=True):
+            row: list[list[Number]] = [[] for _ in self.contacts]
+            for entry, parts in zip(contact.load.gradient(*at), felt.parts, strict=True):
+                if not is_zero(entry):
+                    rate = slope * entry
+                    for k, part in parts:
+                        row[k].append(rate * part)
+            rows.append([total(summands) for summands in row])
         return rows
-
-    @cached_property
-    def _filled(self) -> list[list[list[Part]]]:
-        """Of each contact, for each friction force: what 1 N of it changes, by its place; literal zeros left out."""
-        return [
-            [[(i, entry) for i, entry in enumerate(column) if not is_zero(entry)] for column in felt.columns]
-            for felt in self.felt
-        ]
-
-    @cached_property
-    def _crossed(self) -> list[list[list[Part]]]:
-        """The same for each place, by the number of the friction force."""
-        return [
-            [
-                [(k, entry) for k, entry in enumerate(entries) if not is_zero(entry)]
-                for entries in zip(*felt.columns, strict=True)
-            ]
-            for felt in self.felt
-        ]
 
     def bound(self, multiples: Sequence[float] | None = None) -> Number:
         """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction.
@@ -256,26 +252,6 @@ class FrictionProblem:
             for contact, slope, factor, felt in zip(self.contacts, self.slopes, factors, self.felt, strict=True)
         ]
         return largest(rows)
-
-
-def _changes(columns: Sequence[Reaction], forces: Sequence[Number]) -> Reaction:
-    """What friction forces change in a reaction. columns: what 1 N of each does."""
-    return tuple(
-        total([entry * force for entry, force in zip(entries, forces, strict=True) if not is_zero(entry)])
-        for entries in zip(*columns, strict=True)
-    )
-
-
-def _combined(crossed: Sequence[Sequence[Part]], forces: Sequence[Number]) -> Reaction:
-    """`_changes` of columns whose literal zeros are left out."""
-    return tuple(total([entry * forces[k] for k, entry in parts]) for parts in crossed)
-
-
-def _along(gradient: Sequence[Number], column: Sequence[Part], there: Sequence[bool] | None) -> Number:
-    """Derivative of a normal load along a change of the reaction; there: where the gradient is no literal zero."""
-    if there is None:
-        return total([gradient[i] * entry for i, entry in column])
-    return total([gradient[i] * entry for i, entry in column if there[i]])
 
 
 def added(a: Reaction, b: Reaction) -> Reaction:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import ZERO_LOAD, Wrench, added, power
+from trunnion.algebra.plane import ZERO_LOAD, added, power
 from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh
 from trunnion.groups.general import General
 from trunnion.joints.friction import FrictionLaw
@@ -14,7 +14,7 @@ from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_problem import Contact
 
-__all__ = ["GearLoad", "acting", "gear_load", "gears_of", "on_links", "power_of", "teeth"]
+__all__ = ["GearLoad", "acting", "gear_load", "gears_of", "power_of", "teeth"]
 
 
 class GearLoad(NamedTuple):
@@ -93,11 +93,3 @@ def power_of(walk: Forward, number: int, done: Sequence[ToothForce]) -> Number:
     for joint, side, wrench in done:
         total = total + power(wrench, walk.motions[walk.system.places[number][joint].links[side]].twist)
     return total
-
-
-def on_links(walk: Forward, number: int, done: Sequence[ToothForce]) -> Iterator[tuple[str, Wrench]]:
-    """What gear pairs do to the known links of a module."""
-    for joint, side, wrench in done:
-        place = walk.system.places[number][joint]
-        if place.outer[side]:
-            yield place.links[side], wrench

@@ -57,11 +57,8 @@ class LoadAction(NamedTuple):
     @property
     def undefined(self) -> Number:
         """Where it has no value."""
-        size: Number = 0.0
-        for _, wrench in self.on:
-            for number in flat(wrench):
-                size = size + primal(number)
-        return ~np.isfinite(size)
+        numbers = (primal(number) for _, wrench in self.on for number in flat(wrench))
+        return ~np.isfinite(functools.reduce(operator.add, numbers, 0.0))
 
 
 class SpringState(NamedTuple):
@@ -115,13 +112,15 @@ class Stated:
                 tables.update(dict.fromkeys(named.keys() & self.walk.system.mechanism.tables.keys()))
         for name in tables:
             table, (knots, _, place) = self.walk.system.mechanism.tables[name], self._of_table(name)
-            known = knots if table.interpolation == "linear" else [*knots[:-1:SPLINED], knots[-1]]
-            yield Switch(place, known, knots[-1] - knots[0] if table.repeats else None)
+            bends = knots if table.interpolation == "linear" else [*knots[:-1:SPLINED], knots[-1]]
+            yield Switch(place, bends, knots[-1] - knots[0] if table.repeats else None)
 
     def _named(self, name: str) -> Number:
         """What a name in an expression stands for: a dimension, the drive, time, or a table."""
-        if name in self.walk.system.mechanism.tables:
-            return self._table(name)
+        table = self.walk.system.mechanism.tables.get(name)
+        if table is not None:
+            knots, values, place = self._of_table(name)
+            return look_up(knots, values, place, table.interpolation == "spline", table.repeats)
         if name == "time":
             return self.walk.time
         if name in ("drive", "speed"):
@@ -133,9 +132,9 @@ class Stated:
         walk, (of, _, rest) = self.walk, name.partition(PLACED)
         if PLACED in rest:
             point, _, component = rest.partition(PLACED)
-            motion, axis = walk.point(of, point), walk.system.axes.index(component[-1])
+            motion = walk.point(of, point)
             vector = motion.velocity if component.startswith("velocity_") else motion.place
-            coordinate: Number = vector[axis]
+            coordinate: Number = vector[walk.system.axes.index(component[-1])]
             return coordinate
         which = 1 if rest.startswith("slide") else 0
         if rest.endswith("_velocity"):
@@ -158,24 +157,15 @@ class Stated:
 
     def _of_table(self, name: str) -> tuple[list[Number], list[Number], Number]:
         """Knots and values of a table, and the place in it."""
-        table, path = self.walk.system.mechanism.tables[name], f"tables.{name}.points"
-        knots, values = (
-            [self.walk.values[f"{path}.{k}.{key}"] for k in range(len(table.points))] for key in ("at", "value")
-        )
-        if table.period is not None and self._open(name):
-            knots, values = [*knots, knots[0] + self.walk.values[f"tables.{name}.period"]], [*values, values[0]]
+        mechanism, given, path = self.walk.system.mechanism, self.walk.values, f"tables.{name}.points"
+        table, last = mechanism.tables[name], len(mechanism.tables[name].points) - 1
+        knots, values = ([given[f"{path}.{k}.{key}"] for k in range(last + 1)] for key in ("at", "value"))
+        if table.period is not None:
+            paths = (f"{path}.0.at", f"{path}.{last}.at", f"tables.{name}.period")
+            first, end, period = (mechanism.parameter_set.nominal[path] for path in paths)
+            if end - first < period * (1 - 1e-9):  # the first point comes again as the last
+                knots, values = [*knots, knots[0] + given[f"tables.{name}.period"]], [*values, values[0]]
         return knots, values, self.walk.time if table.over == "time" else self._drive[0]
-
-    def _table(self, name: str) -> Number:
-        table, (knots, values, place) = self.walk.system.mechanism.tables[name], self._of_table(name)
-        return look_up(knots, values, place, table.interpolation == "spline", table.repeats)
-
-    def _open(self, name: str) -> bool:
-        """Whether the points of a table end before its period does: the first then comes again as the last."""
-        nominal = self.walk.system.mechanism.parameter_set.nominal
-        last = len(self.walk.system.mechanism.tables[name].points) - 1
-        first, end, period = (nominal[f"tables.{name}.{key}"] for key in ("points.0.at", f"points.{last}.at", "period"))
-        return bool(end - first < period * (1 - 1e-9))
 
 
 def placed(mechanism: Mechanism) -> bool:
@@ -197,19 +187,16 @@ def stated_walk(system: System, values: Values, assembly: Assembly, time: Number
 
 
 def stated_loads(
-    walk: Forward, zero_slip: Mapping[str, Share], known: Container[str] = ()
+    walk: Forward, zero_slip: Mapping[str, Share], sensed: Container[str] = ()
 ) -> Iterator[tuple[str, LoadAction]]:
-    """The loads of the model, by name. zero_slip: see `backward.Given`; known: joints of which it tells all."""
+    """The loads of the model, by name. zero_slip: see `backward.Given`; sensed: joints of which it tells all."""
     stated = Stated(walk)
     for name, load in walk.system.mechanism.loads.items():
-        path = f"loads.{name}"
-        if load.joint is None:
+        path, joint = f"loads.{name}", load.joint
+        if joint is None:
             yield name, _push(stated, load, path)
         else:
-            torque, force = stated.get(f"{path}.resisting_torque"), stated.get(f"{path}.resisting_force")
-            size = force if torque is None else torque
-            at_rest = zero_slip.get(load.joint, 0.0)
-            yield name, _resist(walk, load, size, torque is not None, at_rest, load.joint in known)
+            yield name, _resist(stated, load, path, zero_slip.get(joint, 0.0), joint in sensed)
 
 
 def _push(stated: Stated, load: Load, path: str) -> LoadAction:
@@ -226,23 +213,25 @@ def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
-def _resist(walk: Forward, load: Load, size: Number, turns: bool, at_rest: Share, known: bool) -> LoadAction:
-    """A torque or force that opposes the motion of a joint, whichever way it goes or one way only.
-
-    at_rest: the share of the load where there is no motion, with the sign of that which is about to begin; known:
-    whatever the speed says.
-    """
-    joint = load.joint or ""
+def _resist(stated: Stated, load: Load, path: str, at_rest: Share, sensed: bool) -> LoadAction:
+    """A torque or force that opposes the motion of a joint, whichever way it goes or one way only."""
+    walk, joint = stated.walk, load.joint or ""
+    torque, force = stated.get(f"{path}.resisting_torque"), stated.get(f"{path}.resisting_force")
+    size, turns = (force, False) if torque is None else (torque, True)
     speed = walk.rates(joint)[0 if turns else 1]
-    sign = at_rest if known else _sense(walk, joint, turns, speed, at_rest)
+    sign = _sense(walk, joint, turns, speed, at_rest, sensed)
     if load.only is not None:
         sign = np.where(sign * (1.0 if load.only == "positive" else -1.0) > 0.0, sign, 0.0)
     return _in_joint(walk, joint, -sign * size, turns, speed)
 
 
-def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share) -> Number:
-    """Sign of the speed of a joint; where there is no motion the share that acts there."""
-    return np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
+def _sense(walk: Forward, joint: str, turns: bool, speed: Number, at_rest: Share, sensed: bool) -> Number:
+    """Sign of the speed of a joint.
+
+    at_rest: the share of what resists where there is no motion, with the sign of that which is about to begin; sensed:
+    whatever the speed says.
+    """
+    return at_rest if sensed else np.where(walk.still(joint, turns), at_rest, np.sign(primal(speed)))
 
 
 def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Number) -> LoadAction:
@@ -257,15 +246,14 @@ def _in_joint(walk: Forward, joint: str, effort: Number, turns: bool, speed: Num
 
 
 def losses(
-    walk: Forward, zero_slip: Mapping[str, Share], known: Container[str] = ()
+    walk: Forward, zero_slip: Mapping[str, Share], sensed: Container[str] = ()
 ) -> Iterator[tuple[str, LoadAction, Number]]:
     """What resists the joints whatever their load: −sgn(v) constant − viscous v, its power, and the effort itself."""
     for joint in walk.system.lossy:
         turns, path = walk.system.turns(joint), f"joints.{joint}.losses"
         speed = walk.rates(joint)[0 if turns else 1]
         constant, viscous = (walk.values.get(f"{path}.{key}", 0.0) for key in ("constant", "viscous"))
-        at_rest = zero_slip.get(joint, 0.0)
-        sign = at_rest if joint in known else _sense(walk, joint, turns, speed, at_rest)
+        sign = _sense(walk, joint, turns, speed, zero_slip.get(joint, 0.0), joint in sensed)
         effort = -sign * constant - viscous * speed
         yield joint, _in_joint(walk, joint, effort, turns, speed), effort
 
@@ -304,33 +292,29 @@ def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> 
 
     One without free length, preload or damping pulls by its stiffness times the way between them, there too.
     """
-    one, other = (end.partition(".")[0] for end in ends)
-    a, b = (walk.point(link, point) for link, _, point in (end.partition(".") for end in ends))
-    apart = _difference(b.place, a.place)
+    (link, _, _), (other, _, _) = parts = [end.partition(".") for end in ends]
+    a, b = (walk.point(on, point) for on, _, point in parts)
+    apart = [q - p for p, q in zip(a.place, b.place, strict=True)]
     square = _dot(apart, apart)
     xp = namespace(square)
     free, preload, damping, stiffness = (
         walk.values.get(f"{path}.{key}", 0.0) for key in ("free_length", "preload", "damping", "stiffness")
     )
     directed = abs(primal(free)) + abs(primal(preload)) + abs(primal(damping))
-    there, needs = primal(square) > 0, 0.0 if only == "pull" else directed  # a slack rope needs no direction
-    length = xp.sqrt(xp.where(there, square, namespace(needs).where(needs > 0, np.nan, 1.0)))
-    rate = _dot(_difference(b.velocity, a.velocity), apart) / length
-    elongation = xp.where(there, length, 0.0 * length) - free
+    stretched, needs = primal(square) > 0, 0.0 if only == "pull" else directed  # a slack rope needs no direction
+    length = xp.sqrt(xp.where(stretched, square, namespace(needs).where(needs > 0, np.nan, 1.0)))
+    rate = _dot([q - p for p, q in zip(a.velocity, b.velocity, strict=True)], apart) / length
+    elongation = xp.where(stretched, length, 0.0 * length) - free
     state = spring_state(walk, path, elongation, rate, only)
     along = namespace(state.force, stiffness).where(primal(square) + directed > 0, state.force / length, stiffness)
     on = []
-    for link, end, sign in ((one, a, 1.0), (other, b, -1.0)):
+    for body, end, sign in ((link, a, 1.0), (other, b, -1.0)):
         pull = tuple(sign * along * part for part in apart)
-        on.append((link, walk.algebra.load(walk.motions[link].frame, pull, walk.algebra.NO_MOMENT, end.place)))
+        on.append((body, walk.algebra.load(walk.motions[body].frame, pull, walk.algebra.NO_MOMENT, end.place)))
     return LoadAction(on, state.power), state
 
 
-def _difference(a: Vector, b: Vector) -> Vector:
-    return tuple(p - q for p, q in zip(a, b, strict=True))
-
-
-def _dot(a: Vector, b: Vector) -> Number:
+def _dot(a: Sequence[Number], b: Sequence[Number]) -> Number:
     return functools.reduce(operator.add, (p * q for p, q in zip(a, b, strict=True)))
 
 

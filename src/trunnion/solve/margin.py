@@ -17,11 +17,10 @@ from trunnion.solve.friction import (
     Contact,
     FrictionProblem,
     frictionless,
-    primal_of,
     scaled,
     with_own,
 )
-from trunnion.solve.friction_method import peak
+from trunnion.solve.friction_problem import largest
 
 __all__ = ["locking_margin"]
 
@@ -32,33 +31,26 @@ def locking_margin(back: Backward) -> Number:
     Below 1 where the position is locked; NaN of numbers that are compiled where the search does not come to an end.
     """
     if back.margin is None:
-        back.margin = _found(back)
+        back.margin = _margin(back, back.margin_up_to)
     return back.margin
 
 
-def _found(back: Backward) -> Number:
-    most = back.margin_up_to
-    known = [(k, one.problem) for k, one in enumerate(back.settled) if one.problem is not None]
-    iterated = [(k, problem) for k, problem in known if not problem.one_way]
-    if most <= 0 or not iterated:
-        return np.inf
+def _margin(back: Backward, most: float) -> Number:
     margin: Number = np.inf
     left: Number = np.True_
-    for k, own in reversed(iterated):  # a module without a certificate is followed with those that load it
-        doubtful = left & (own.bound() * most >= 1.0)
+    for k in reversed(range(len(back.settled) if most > 0 else 0)):
+        problem, share = back.settled[k].problem, back.settled[k].share
+        if problem is None or problem.one_way:
+            continue
+        # a module without a certificate is followed with those that load it
+        doubtful = left & (problem.bound() * most >= 1.0)
         left = left & ~doubtful
-        if np.any(doubtful):
-            alone = _alone(back, k)
-            problem = own if alone else _together(back, k + 1)
-            margin = np.where(
-                doubtful, _followed(problem, doubtful, most, back.settled[k].share if alone else 1.0), margin
-            )
+        if not np.any(doubtful):
+            continue
+        if any(back.rubbed[:k]):
+            problem, share = _together(back, k + 1), 1.0
+        margin = np.where(doubtful, _followed(problem, doubtful, most, share), margin)
     return margin
-
-
-def _alone(back: Backward, k: int) -> bool:
-    """Whether nothing rubs in the modules that were settled before one."""
-    return not any(contacts for contacts, _ in back.rubbed[:k])
 
 
 def _together(back: Backward, count: int) -> FrictionProblem:
@@ -66,33 +58,29 @@ def _together(back: Backward, count: int) -> FrictionProblem:
     walk = back.walk
     bare, flows = Backward(walk, dict(back.stated)), list[Backward]()  # without friction, and 1 N of each friction
     contacts, start, influence = list[Contact](), list[Reaction](), list[list[Reaction]]()
-    for number, (own, rubbed) in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
+    for number, rubbed in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
         group, links = walk.reacting(walk.system.groups[number]), walk.system.plan.modules[number].links
         before = len(start)
-        for found, flow in [(start, bare), *zip(influence, flows, strict=True)]:
+        for total, flow in [(start, bare), *zip(influence, flows, strict=True)]:
             reactions = group.reactions(walk.poses[number], [flow.loads[link] for link in links])
-            found += reactions
-            pass_on(flow, number, reactions, (), (), ())
-        for i, contact in enumerate(own):
+            total += reactions
+            pass_on(flow, number, reactions, (), ())
+        for contact, rub in rubbed:
             column = with_own(contact, list(group.reactions(walk.poses[number], contact.unit_loads)))
             flows.append(Backward(walk, unloaded(walk)))
-            pass_on(flows[-1], number, column, [contact], rubbed[i : i + 1], [1.0])
+            pass_on(flows[-1], number, column, [(contact, rub)], [1.0])
             influence.append([(0.0,) * len(reaction) for reaction in start[:before]] + column)
             contacts.append(contact._replace(joint=before + contact.joint))
-    return primal_of(FrictionProblem(contacts, start, influence))
+    return FrictionProblem(contacts, start, influence).real
 
 
 def _followed(problem: FrictionProblem, doubtful: Number, most: float, shares: Number) -> Number:
     """The multiple for each lane. shares: those at which lanes are known to lock, 1 of the others."""
-    known = np.asarray(shares) < 1.0
+    locked = np.asarray(shares) < 1.0
 
-    def reached(part: FrictionProblem, wanted: Number) -> Number:
-        _, share = continuation.follow(scaled(part), frictionless(part), most, wanted)
-        return np.where(share >= most, np.inf, share)
+    def reached(part: FrictionProblem, lanes: Number) -> list[Number]:
+        _, share = continuation.follow(scaled(part), frictionless(part), most, lanes)
+        return [np.where(share >= most, np.inf, share)]
 
-    return problem.in_lanes(reached, doubtful & ~known & _loaded(problem), np.where(known, shares, np.inf))
-
-
-def _loaded(problem: FrictionProblem) -> Number:
-    """Where its loads are numbers."""
-    return np.isfinite(peak(problem.state([0.0] * len(problem.contacts)).normals))
+    loaded = np.isfinite(largest(problem.state([0.0] * len(problem.contacts)).normals))
+    return problem.in_lanes(reached, doubtful & ~locked & loaded, [np.where(locked, shares, np.inf)])[0]

@@ -21,8 +21,8 @@ BLOCK = 30 * 2**20  # bytes; glibc learns from blocks of up to 32 MiB
 
 def blocks(count: int, joints: int) -> Iterator[slice]:
     """Parts of some positions that are solved at a time, so that memory does not grow with how many there are."""
-    some = max(1, min(CHUNK, JOINTS // max(1, joints)))
-    yield from (slice(low, min(low + some, count)) for low in range(0, count, some))
+    size = max(1, min(CHUNK, JOINTS // max(1, joints)))
+    yield from (slice(low, min(low + size, count)) for low in range(0, count, size))
 
 
 def in_blocks(look: Callable[[Array], Looked], joints: int) -> Callable[[Array], Looked]:

@@ -21,12 +21,11 @@ from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.geometry import build
 from trunnion.solve.memory import in_blocks, keep_pages
 from trunnion.solve.seats import GivenSeat, seats
-from trunnion.solve.space.determinacy import Determinacy
+from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, parted, stated_bends
-from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values
+from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
 __all__ = ["Run", "prepare"]
 
@@ -51,31 +50,16 @@ class Run:
         method: FrictionMethod | None = None,
         zero_slip: Mapping[str, Sense] | None = None,
     ) -> Backward:
-        """Motion and forces at the given times (s), nominal or with other values; see `kinetostatics.solve`.
+        """Motion and forces at the given times (s), nominal or with other values; see `backward.solve`.
 
-        zero_slip: see `kinetostatics.Given`.
+        zero_slip: see `backward.Given`.
         """
         values = self.values if values is None else values
-        past = self._past if values is self.values else self._histories(values)
-        return self._solve(time, values, past, method, zero_slip)
+        return self._solve(time, values, method, Given(zero_slip or {}), self._bristles(values))
 
     def walk(self, time: Number) -> Forward:
         """Motion alone at the given times (s)."""
         return forward(self.system, self.values, self.chosen.assembly, time)
-
-    def _solve(
-        self,
-        time: Number,
-        values: Values,
-        past: Mapping[str, History],
-        method: FrictionMethod | None,
-        zero_slip: Mapping[str, Sense] | None = None,
-        travel: Mapping[str, Travel] | None = None,
-        rests: Mapping[str, bool] | None = None,
-    ) -> Backward:
-        deflections = {joint: history.at(time) for joint, history in past.items()}
-        given = Given(zero_slip or {}, deflections, travel or {}, rests=rests or {})
-        return solve(self.system, values, self.chosen.assembly, time, method, given)
 
     def at(
         self,
@@ -87,11 +71,31 @@ class Run:
         rests: Mapping[str, bool] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
-        return self._solve(time, {**self.values, **offsets}, self._past, method, zero_slip, travel, rests)
+        given = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
+        return self._solve(time, {**self.values, **offsets}, method, given, self._past)
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
-        return self._solve(time, self.ideal_values, self._ideal_past, method)
+        past = self.once("bristles without errors", lambda: self._bristles(self.ideal_values))
+        return self._solve(time, self.ideal_values, method, Given(), past)
+
+    def _solve(
+        self, time: Number, values: Values, method: FrictionMethod | None, given: Given, past: Mapping[str, History]
+    ) -> Backward:
+        deflections = {joint: history.at(time) for joint, history in past.items()}
+        return solve(self.system, values, self.chosen.assembly, time, method, replace(given, deflections=deflections))
+
+    def _bristles(self, values: Values) -> dict[str, History]:
+        """Histories of the bristles; those of the nominal values are found once."""
+        return self._past if values is self.values else self._histories(values)
+
+    @functools.cached_property
+    def _past(self) -> dict[str, History]:
+        return self._histories(self.values)
+
+    @np.errstate(all="ignore")
+    def _histories(self, values: Values) -> dict[str, History]:
+        return histories(self.system, values, self.chosen.assembly, self.cycle)
 
     @functools.cached_property
     def _found(self) -> dict[Hashable, Any]:
@@ -172,23 +176,9 @@ class Run:
         return bool(self.seats) or self._ideal_values is not None
 
     @functools.cached_property
-    def _ideal_past(self) -> dict[str, History]:
-        return self._past if self._ideal_values is None else self._histories(self._ideal_values)
-
-    def _histories(self, values: Values) -> dict[str, History]:
-        with np.errstate(all="ignore"):
-            return histories(self.system, values, self.chosen.assembly, self.cycle)
-
-    @functools.cached_property
     def determinacy(self) -> Determinacy | None:
         """What of motion and reactions the joints leave open; None in the plane, where the structure decides it."""
-        found: Determinacy | None = self.system.geometry.determinacy(self.system, self.values, self.chosen, self.cycle)
-        return found
-
-    @functools.cached_property
-    def _past(self) -> dict[str, History]:
-        """Histories of the bristles at the nominal values."""
-        return self._histories(self.values)
+        return look(self.system, self.values, self.chosen, self.cycle) if self.system.spatial else None
 
 
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
@@ -200,10 +190,10 @@ def prepare(mechanism: Mechanism, free: bool = False) -> Run:
     """
     free = free and len(mechanism.drivers) > 1  # else it is all the same
     key = "run of free drivers" if free else "run"
-    known: Run | None = mechanism.worked_out.get(key)
-    if known is None or known.system.mechanism is not mechanism:  # of one that this is a copy of
-        known = mechanism.worked_out[key] = _prepared(mechanism, free)
-    return known
+    run: Run | None = mechanism.worked_out.get(key)
+    if run is None or run.system.mechanism is not mechanism:  # of one that this is a copy of
+        run = mechanism.worked_out[key] = _prepared(mechanism, free)
+    return run
 
 
 def _prepared(mechanism: Mechanism, free: bool) -> Run:
@@ -236,13 +226,13 @@ def _comes_back(run: Run) -> bool:
 def _unknown_turns(run: Run) -> dict[str, float]:
     """Turns in the cycle of a joint of every chain of gear pairs that no driver turns, from a first walk."""
     mechanism = run.system.mechanism
-    found: dict[str, float] = {}
+    turns_of: dict[str, float] = {}
     if not mechanism.gears or not run.cycle.periodic:
-        return found
+        return turns_of
     duration = run.cycle.duration
     for gear in mechanism.gears.values():
         joint = gear.joints[0]
-        if joint in run.system.geared_turns(run.values, duration, found):
+        if joint in run.system.geared_turns(run.values, duration, turns_of):
             continue
         # up to just before the end: there a track begins again
         time = np.linspace(0.0, duration * (1 - 1e-9), TURN_STEPS)
@@ -250,6 +240,6 @@ def _unknown_turns(run: Run) -> dict[str, float]:
         first, second = (walk.motions[link].frame for link in run.system.joints[joint][1])
         angle = np.unwrap(np.ravel(rotation((first, second))))
         turns = (angle[-1] - angle[0]) / (2 * np.pi)
-        whole = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
-        found[joint] = float(whole if abs(whole - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
-    return found
+        fraction = np.rint(COMMON_TURNS * turns) / COMMON_TURNS
+        turns_of[joint] = float(fraction if abs(fraction - turns) < 1e-6 else turns) if np.isfinite(turns) else 0.0
+    return turns_of

@@ -116,7 +116,7 @@ class Seating:
     def at(self, time: Array, method: FrictionMethod | None = None) -> Seated:
         """Motion and forces at times, s, with every pin in its seat; method: that of the seats if not given."""
         time = self._within(time)
-        rows, states, still = self._rows(time), self.states(time), self.run.system.geometry.walk.algebra.STILL
+        rows, states, still = self._rows(time), self.states(time), self.run.system.algebra.STILL
         added = iter(np.where(states == SETTLED, rows[len(self.paths) :], 0.0))
         travel = {link: Travel(*each(still, lambda _: next(added))) for link in self.links}
         back = self.run.at(time, self._placed(rows), method or self.method, travel=travel)
@@ -402,7 +402,7 @@ def _share(back: Backward, joint: str) -> Number | None:
     if joint not in back.turning:
         return None
     contact, turning = back.turning[joint]
-    slope = contact.law.function(1.0, contact.slip, **contact.parameters)
+    slope = contact.slope
     return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
 
 

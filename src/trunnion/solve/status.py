@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,6 @@ from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward
 from trunnion.solve.system import sticking
 
-if TYPE_CHECKING:
-    pass
-
 __all__ = ["pose_status", "pose_status_number", "status_number", "status_of", "worst_condition"]
 
 
@@ -30,34 +26,27 @@ NEAR_SINGULAR = 100.0  # a transmission angle of about a degree
 
 def status_of(back: Backward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """The gravest status of every position."""
-    return _of_shape(status_number(back), shape)
+    return np.array(np.broadcast_to(status_number(back), shape), np.int8)
 
 
 def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """The gravest status of every position that its motion alone decides."""
-    return _of_shape(pose_status_number(walk), shape)
-
-
-def _of_shape(status: Number, shape: tuple[int, ...]) -> NDArray[np.int8]:
-    return np.array(np.broadcast_to(status, shape), np.int8)
+    return np.array(np.broadcast_to(pose_status_number(walk), shape), np.int8)
 
 
 def status_number(back: Backward) -> Number:
     """The gravest status in whatever shape the numbers of the walk have."""
-    walk = back.walk
-    status = pose_status_number(walk)
-
-    def raised(code: Status, where: Number) -> Number:
-        return np.maximum(status, np.where(where, np.int8(code), np.int8(0)))
-
-    for name in sticking(walk.system):
-        status = raised(Status.ZERO_SLIP, back.slips[name].zero)
+    status = pose_status_number(back.walk)
+    reasons = [(Status.ZERO_SLIP, back.slips[name].zero) for name in sticking(back.walk.system)]
     for settled in back.settled:
-        status = raised(Status.NOT_CONVERGED, np.logical_not(settled.converged))
-        status = raised(Status.LOCKED, np.less(settled.share, 1.0))
-    status = raised(Status.NOT_CONVERGED, ~np.isfinite(_sum_of_forces(back)))
-    for undefined in back.undefined.values():
-        status = raised(Status.LOAD_UNDEFINED, undefined)
+        reasons.append((Status.NOT_CONVERGED, np.logical_not(settled.converged)))
+        reasons.append((Status.LOCKED, np.less(settled.share, 1.0)))
+    reactions = (number for reaction in back.reactions.values() for number in flat(tuple(reaction)[:2]))
+    forces = (*back.efforts.values(), *back.friction.values(), *reactions)
+    reasons.append((Status.NOT_CONVERGED, ~np.isfinite(_sum(forces))))
+    reasons += [(Status.LOAD_UNDEFINED, undefined) for undefined in back.undefined.values()]
+    for code, where in reasons:
+        status = np.maximum(status, np.where(where, np.int8(code), np.int8(0)))
     return status
 
 
@@ -77,12 +66,6 @@ def worst_condition(walk: Forward) -> Number:
     """Largest condition of a module."""
     parts = (primal(group.condition(pose)) for group, pose in zip(walk.system.groups, walk.poses, strict=True))
     return functools.reduce(np.maximum, parts, 1.0)
-
-
-def _sum_of_forces(back: Backward) -> Number:
-    """Finite where every reaction and effort is."""
-    reactions = (number for reaction in back.reactions.values() for number in flat(tuple(reaction)[:2]))
-    return _sum((*back.efforts.values(), *back.friction.values(), *reactions))
 
 
 def _sum(numbers: Iterable[Number]) -> Number:

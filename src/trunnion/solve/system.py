@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.plane import Frame
+from trunnion.algebra.vector import dot
 from trunnion.errors import Finding, MechanismError
 from trunnion.groups import GROUPS
+from trunnion.groups.cylindrical_dyad import CylindricalDyad
 from trunnion.groups.gear import GearPair
 from trunnion.groups.general import General
+from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import OUTER, GroupJoint
 from trunnion.joints.friction import FRICTION_LAWS, FrictionLaw
 from trunnion.joints.motion import Span
@@ -27,9 +30,9 @@ from trunnion.model.joint_parts import Losses
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.quantities import readable
 from trunnion.solve import shifts
-from trunnion.structure.decompose import Module, Plan
+from trunnion.structure.decompose import Module, Plan, decompose
 
-__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "freed"]
+__all__ = ["Cycle", "Dial", "Place", "Positions", "System", "Values", "build", "freed"]
 
 STATE, FREED = "state.", ("coordinate", "rate", "second")  # paths of what a free driver does
 COMMON_TURNS = 60  # of the slowest driver, within which the others must come back too
@@ -56,13 +59,13 @@ class Dial(NamedTuple):
 
     def intervals(self, positions: Positions) -> str:
         """Positions as intervals: 'at 0° and 12°, between 132° and 228° of A'."""
-        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
         if len(positions) == len(self.values):
             return "at every position" if len(self.values) > 1 else "in its one position"
+        runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
         texts: list[str] = []
-        for alone, some in itertools.groupby(runs[:MOST_INTERVALS], lambda run: len(run) == 1):
-            ends = [(self.at(run[0]), self.at(run[-1])) for run in some]
-            if alone:
+        for single, group in itertools.groupby(runs[:MOST_INTERVALS], lambda run: len(run) == 1):
+            ends = [(self.at(run[0]), self.at(run[-1])) for run in group]
+            if single:
                 *others, last = (first for first, _ in ends)
                 texts.append(f"at {', '.join(others)} and {last}" if others else f"at {last}")
             else:
@@ -113,15 +116,25 @@ class Cycle:
 
 @dataclass(frozen=True)
 class System:
-    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`.
-
-    geometry: what is done differently in the plane and in space.
-    """
+    """A mechanism, its plan and its modules. Numbers stay outside: every walk is given its `Values`."""
 
     mechanism: Mechanism
     plan: Plan
-    geometry: Any = None
-    axes: ClassVar[str] = "xy"
+
+    @cached_property
+    def spatial(self) -> bool:
+        """Whether it is one in space."""
+        return self.mechanism.space == "spatial"
+
+    @property
+    def algebra(self) -> Any:
+        """Of its frames, twists and wrenches."""
+        return space if self.spatial else plane
+
+    @property
+    def axes(self) -> str:
+        """The global axes."""
+        return "xyz" if self.spatial else "xy"
 
     @cached_property
     def groups(self) -> tuple[Any, ...]:
@@ -147,8 +160,14 @@ class System:
         return {name: place for place, name in enumerate(self.joints)}
 
     def resting(self, joint: str) -> int:
-        """How many contacts of a joint rest or slip each by itself, for `kinetostatics.Given`."""
-        return 1
+        """How many contacts of a joint rest or slip each by itself: a cross has two pins, a sleeve turns and slides."""
+        pair = PAIRS[self.joints[joint][0]]
+        return 2 if pair.crossed or (len(pair.freedoms) == 2 and self.summed(joint)) else 1
+
+    def summed(self, joint: str) -> bool:
+        """Whether the parts of a joint's load or slip count one by one, not as a vector.  [P 15-19]"""
+        friction = self.mechanism.effective_joints[joint].friction
+        return friction is not None and friction.model == "pezzuti"
 
     def turns(self, joint: str) -> bool:
         """Whether a joint's coordinate, as drivers and loads see it, is an angle."""
@@ -156,12 +175,16 @@ class System:
 
     @cached_property
     def points(self) -> tuple[tuple[str, str], ...]:
-        """(link, point) of every named point."""
-        return tuple((name, point) for name, link in self.mechanism.effective_links.items() for point in link.points)
+        """(link, point) of every named point; the joints of a loop are points of its links."""
+        points = [(name, point) for name, link in self.mechanism.effective_links.items() for point in link.points]
+        if self.mechanism.loop:
+            points += [(link, joint) for joint, (_, links) in self.joints.items() for link in links]
+        return tuple(dict.fromkeys(points))
 
     def _place(self, module: Module, name: str) -> Place:
         kind, (first, second) = self.joints[name]
-        reversed_ = name in module.joints and module.reversed_[module.joints.index(name)]
+        # in space a module takes its joints as they are
+        reversed_ = not self.spatial and name in module.joints and module.reversed_[module.joints.index(name)]
         links = (second, first) if reversed_ else (first, second)
         outer = (links[0] not in module.links, links[1] not in module.links)
         return Place(name, kind, links, outer, reversed_)
@@ -169,10 +192,26 @@ class System:
     def _group(self, module: Module, places: Sequence[Place]) -> Any:
         if module.kind in GROUPS:
             return GROUPS[module.kind]
-        names = [place.joint for place in places]
+        number, names = {link: i for i, link in enumerate(module.links)}, [place.joint for place in places]
+        sides = ([number.get(link, OUTER) for link in place.links] for place in places)
+        joints = tuple(GroupJoint(place.kind, (a, b)) for place, (a, b) in zip(places, sides, strict=True))
         driven = tuple(names.index(name) for name in module.driven)
-        gears = tuple(self._gear(name, names) for name in module.gears)
-        return General(len(module.links), group_joints(module, places), driven, gears=gears)
+        if not self.spatial:
+            gears = tuple(self._gear(name, names) for name in module.gears)
+            return General(len(module.links), joints, driven, gears=gears)
+        if module.kind == "CCC" and not self._parallel(module):
+            return CylindricalDyad(2, joints)
+        spins = tuple((number[link], names.index(a), names.index(b)) for link, a, b in module.spinning)
+        return SpatialGroup(len(module.links), joints, driven, spins, module.redundant)
+
+    def _parallel(self, module: Module) -> bool:
+        """Whether the two axes of a link of a cylindrical dyad are parallel: it has no closed form then."""
+        elements = self.elements(self.mechanism.parameters())
+        for link in module.links:
+            first, second = (elements[link, joint].z for joint in module.joints if link in self.joints[joint][1])
+            if abs(float(dot(first, second))) > 1 - 1e-12:
+                return True
+        return False
 
     def _gear(self, name: str, names: Sequence[str]) -> GearPair:
         first, second = (names.index(joint) for joint in self.gear_joints(name))
@@ -187,15 +226,15 @@ class System:
 
         φ₁ = (φ₂ − φ₀)/i then says what φ₂ = i φ₁ + φ₀ leaves open by whole turns of φ₂.
         """
-        known, found = set(self.mechanism.drivers), set()
+        turned, reversed_ = set(self.mechanism.drivers), set()
         for _ in self.mechanism.gears:
             for name, gear in self.mechanism.gears.items():
                 first, second = gear.joints
-                if second in known and first not in known:
-                    found.add(name)
-                if first in known or second in known:
-                    known |= {first, second}
-        return frozenset(found)
+                if second in turned and first not in turned:
+                    reversed_.add(name)
+                if first in turned or second in turned:
+                    turned |= {first, second}
+        return frozenset(reversed_)
 
     def gear_joints(self, name: str) -> tuple[str, str]:
         """Joints of a gear pair, that whose turns are known first."""
@@ -212,11 +251,11 @@ class System:
 
         Seats are in the elements of the links that carry them.
         """
-        found = self.holes(values)
+        elements = self.holes(values)
         for name, (kind, (first, second)) in self.joints.items():
-            found[first, name] = shifts.journaled(self.mechanism.space, found[first, name], kind, values, name)
-            found[second, name] = shifts.seated(self.mechanism.space, found[second, name], kind, values, name)
-        return found
+            elements[first, name] = shifts.journaled(self.mechanism.space, elements[first, name], kind, values, name)
+            elements[second, name] = shifts.seated(self.mechanism.space, elements[second, name], kind, values, name)
+        return elements
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:
         """The same where every pin lies in the middle of its hole."""
@@ -226,19 +265,55 @@ class System:
         return found
 
     def stated_elements(self, values: Values) -> dict[tuple[str, str], Any]:
-        """The same without errors of joints; c, s is the direction of a slide."""
-        found: dict[tuple[str, str], Frame] = {}
-        for name, (kind, links) in self.joints.items():
-            for link in links:
-                path = f"links.{link}.points.{name}"
-                x, y = values[f"{path}.x"], values[f"{path}.y"]
-                if "planar" in PAIRS[kind].needs_axis:
-                    ax, ay = values[f"{path}.axis.x"], values[f"{path}.axis.y"]
-                    length = namespace(ax, ay).hypot(ax, ay)
-                    found[link, name] = Frame(x, y, ax / length, ay / length)
-                else:
-                    found[link, name] = Frame(x, y)
-        return found
+        """The same without errors of joints; c, s in the plane and z in space is the direction of the joint."""
+        if self.mechanism.loop:
+            return self._loop_elements(values)
+        stated = self._element_in_space if self.spatial else self._element_in_plane
+        return {(link, name): stated(values, link, name) for name, (_, links) in self.joints.items() for link in links}
+
+    def _element_in_plane(self, values: Values, link: str, joint: str) -> plane.Frame:
+        path = f"links.{link}.points.{joint}"
+        x, y = values[f"{path}.x"], values[f"{path}.y"]
+        if "planar" not in PAIRS[self.joints[joint][0]].needs_axis:
+            return plane.Frame(x, y)
+        ax, ay = values[f"{path}.axis.x"], values[f"{path}.axis.y"]
+        length = namespace(ax, ay).hypot(ax, ay)
+        return plane.Frame(x, y, ax / length, ay / length)
+
+    def _element_in_space(self, values: Values, link: str, joint: str) -> space.Frame:
+        stated, path = self.mechanism.links[link].points[joint], f"links.{link}.points.{joint}"
+        axis: Any = self.vector(values, f"{path}.axis") if stated.axis is not None else (0.0, 0.0, 1.0)
+        x: Any = self.vector(values, f"{path}.x") if stated.x is not None else None
+        place: Any = self.vector(values, path)
+        return space.element(place, axis, x)
+
+    def _loop_elements(self, values: Values) -> dict[tuple[str, str], space.Frame]:
+        """Elements from the dual Denavit–Hartenberg table: joint k is Z(θ̂), the link after it X(α̂) to joint k + 1."""
+        rows = self.mechanism.loop
+        elements: dict[tuple[str, str], space.Frame] = {}
+        for row, after in zip(rows, (*rows[1:], rows[0]), strict=True):
+            path = f"loop.{row.joint}"
+            twist, distance = values[f"{path}.twist"], values[f"{path}.distance"]
+            c, s = namespace(twist).cos(twist), namespace(twist).sin(twist)
+            first = space.ORIGIN
+            following = space.Frame((1.0, 0.0, 0.0), (0.0, c, s), (0.0, -s, c), (distance, 0.0, 0.0))
+            stated = self.mechanism.links.get(row.link)
+            home = stated.frame if stated and stated.frame else None
+            if home is None and row.link == self.mechanism.fixed_link:
+                home = after.joint
+            if home == after.joint and home != row.joint:
+                first, following = space.relative(space.ORIGIN, following), space.ORIGIN
+            path = f"loop.{after.joint}"  # the first element of a joint is moved by its constant slide or rotation
+            if f"{path}.slide" in values:
+                following = space.slid(following, values[f"{path}.slide"])
+            if f"{path}.rotation" in values:
+                following = space.turned(following, values[f"{path}.rotation"])
+            elements[row.link, row.joint], elements[row.link, after.joint] = first, following
+        return elements
+
+    def lead(self, values: Values, joint: str) -> Number:
+        """Slide for one radian of a helical pair, m; 0 of others."""
+        return values[f"joints.{joint}.pitch"] / (2 * np.pi) if PAIRS[self.joints[joint][0]].threaded else 0.0
 
     def vector(self, values: Values, path: str) -> tuple[Number, ...]:
         """The components with a path."""
@@ -258,14 +333,14 @@ class System:
     @cached_property
     def resisted(self) -> dict[str, set[bool]]:
         """Of every joint that loads or a constant loss resist, whether its turn (True) or its slide is."""
-        found: dict[str, set[bool]] = {}
+        resisted: dict[str, set[bool]] = {}
         for name, joint in self.lossy.items():
             if joint.constant is not None:
-                found.setdefault(name, set()).add(self.turns(name))
+                resisted.setdefault(name, set()).add(self.turns(name))
         for load in self.mechanism.loads.values():
             if load.joint is not None:
-                found.setdefault(load.joint, set()).add(load.resisting_torque is not None)
-        return found
+                resisted.setdefault(load.joint, set()).add(load.resisting_torque is not None)
+        return resisted
 
     def centre(self, values: Values, link: str) -> tuple[Number, ...]:
         """Local place of a link's mass centre, m."""
@@ -300,20 +375,19 @@ class System:
 
     def motion_of(self, values: Values, name: str) -> dict[str, Number]:
         """What the motion law of a driver is given."""
-        found: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
-        found.update(self.mechanism.drivers[name].options)
-        return found
+        numbers: dict[str, Number] = {key: values[path] for key, path in self._driver_paths[name] if path in values}
+        numbers.update(self.mechanism.drivers[name].options)
+        return numbers
 
     @cached_property
     def _driver_paths(self) -> dict[str, list[tuple[str, str]]]:
         """(key, path) of the numbers of each driver."""
-        found: dict[str, list[tuple[str, str]]] = {name: [] for name in self.mechanism.drivers}
-        for path in self.mechanism.parameter_set.entries:
-            section, _, rest = path.partition(".")
-            if section == "drivers":
-                name, _, key = rest.partition(".")
-                found[name].append((key, path))
-        return found
+        paths = list(self.mechanism.parameter_set.entries)
+        starts = {name: f"drivers.{name}." for name in self.mechanism.drivers}
+        return {
+            name: [(path.removeprefix(start), path) for path in paths if path.startswith(start)]
+            for name, start in starts.items()
+        }
 
     def dial(self, values: Values, time: NDArray[np.float64]) -> Dial:
         """Positions by the coordinate of the only driver if it runs one way, else by time (s)."""
@@ -326,29 +400,28 @@ class System:
 
     def pace(self, values: Values) -> Number:
         """Angular speed typical of the mechanism, rad/s: the peak of its fastest driver, a slide's per size."""
-        rates: list[Number] = [0.0]
-        for name in self.mechanism.drivers:
-            speed = self.span(values, name).peak
-            rates.append(speed if self.turns(name) else speed / self.size(values))
-        return functools.reduce(np.maximum, rates)
+        peaks = ((self.span(values, name).peak, self.turns(name)) for name in self.mechanism.drivers)
+        return functools.reduce(np.maximum, (peak if turns else peak / self.size(values) for peak, turns in peaks), 0.0)
 
-    def size(self, values: Values) -> Number:
-        """Length typical of the mechanism, m: the widest spread of two joints on one link, else of any two points."""
-        links = {name: list(link.points) for name, link in self.mechanism.links.items()}
-        jointed = {name: [point for point in points if point in self.joints] for name, points in links.items()}
-        between_joints, between_points = self._spread(values, jointed), self._spread(values, links)
-        widest: Number = np.where(between_joints > 0, between_joints, between_points)
-        return np.where(widest > 0, widest, 1.0)
+    def size(self, values: Values, elements: Mapping[tuple[str, str], Any] | None = None) -> Number:
+        """Length typical of the mechanism, m: the widest spread of two joints on one link.
 
-    @staticmethod
-    def _spread(values: Values, links: Mapping[str, Sequence[str]]) -> Number:
-        """The largest distance of the points of a link from its first one, m."""
-        widest: Number = 0.0
-        for name, points in links.items():
-            places = [tuple(primal(values[f"links.{name}.points.{point}.{axis}"]) for axis in "xy") for point in points]
-            for x, y in places[1:]:
-                widest = np.maximum(widest, np.hypot(x - places[0][0], y - places[0][1]))
-        return widest
+        Where all meet in one point it is that of any two points, in space the largest length of a pin; else 1 m.
+        elements: of joints in space, if known.
+        """
+        if self.spatial:
+            elements = self.elements(values) if elements is None else elements
+            links = self.mechanism.effective_links
+            joints = [[frame.place for (link, _), frame in elements.items() if link == name] for name in links]
+            pins = [primal(value) for path, value in values.items() if path.endswith((".pin.bearing", ".pin.radius"))]
+            smallest = functools.reduce(np.maximum, pins, 0.0)
+        else:
+            points = [[(name, self.vector(values, f"links.{link}.points.{name}")) for name in stated.points]
+                      for link, stated in self.mechanism.links.items()]  # fmt: skip
+            joints = [[place for name, place in places if name in self.joints] for places in points]
+            smallest = _widest([[place for _, place in places] for places in points])
+        widest = _widest(joints)
+        return np.where(widest > 0, widest, np.where(smallest > 0, smallest, 1.0))
 
     def cycle(self, values: Values, turns: Mapping[str, float] | None = None, free: bool = False) -> Cycle:
         """How long the drivers take: the longest that ends, or the least time in which all make whole periods.
@@ -364,42 +437,43 @@ class System:
             return Cycle(0.0, periodic=False)
         nominal = {path: float(np.ravel(primal(value))[0]) for path, value in values.items() if "drivers." in path}
         spans = {name: self.span(nominal, name) for name in drivers}
-        findings: list[Finding] = []
-        for name, span in spans.items():
-            if span.duration < 0:
-                speed = nominal[f"drivers.{name}.speed"]
-                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
-                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
-                findings.append(Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign"))
-        found = {name for name, driver in drivers.items() if free and driver.found}
-        longest = float(
-            max(span.duration for name, span in spans.items() if name not in found or len(found) == len(spans))
-        )
+        free_drivers = {name for name, driver in drivers.items() if free and driver.found}
+        counted = spans.keys() - free_drivers or spans.keys()  # of free ones only where all are free
+        longest = float(max(spans[name].duration for name in counted))
+        findings = list(self._backward_ranges(nominal, spans))
         ending = [name for name, span in spans.items() if not span.periodic]
-        for name in ending:
-            if (
-                not findings
-                and name not in found
-                and not spans[name].rests
-                and abs(spans[name].duration - longest) > 1e-9 * longest
-            ):
-                what = f"its range lasts {spans[name].duration:g} s, the whole cycle lasts {longest:g} s"
+        for name in ending if not findings else ():
+            span = spans[name]
+            if name not in free_drivers and not span.rests and abs(span.duration - longest) > 1e-9 * longest:
+                what = f"its range lasts {span.duration:g} s, the whole cycle lasts {longest:g} s"
                 findings.append(Finding(what, f"drivers.{name}", "use the same duration for all drivers with a range"))
+                break
         if findings:
             raise MechanismError(findings)
         periods = [longest / span.duration for span in spans.values()]
         if self.mechanism.gears:
             periods += self.geared_turns(values, longest, turns).values()
-        whole = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
-        periodic = bool(whole and not ending)
-        duration = whole * longest if periodic else longest
-        return Cycle(duration, periodic, max(self._turns(name, span, duration) for name, span in spans.items()))
+        count = next((n for n in range(1, COMMON_TURNS + 1) if all(_is_whole(n * period) for period in periods)), 0)
+        periodic = bool(count and not ending)
+        duration = count * longest if periodic else longest
+        # turns that a driver would make at its largest rate; of a slide, how often it would travel
+        ways = {name: 2 * np.pi if self.turns(name) else span.travel for name, span in spans.items()}
+        return Cycle(duration, periodic, max(float(spans[name].peak * duration / way) for name, way in ways.items()))
+
+    def _backward_ranges(self, nominal: Values, spans: Mapping[str, Span]) -> Iterator[Finding]:
+        """Drivers whose range runs against their speed."""
+        for name, span in spans.items():
+            if span.duration < 0:
+                speed = nominal[f"drivers.{name}.speed"]
+                size = readable(speed, "rad/s" if self.turns(name) else "m/s")
+                what = f"the range runs {'down' if speed > 0 else 'up'}, the speed is {size}"
+                yield Finding(what, f"drivers.{name}.range", "swap the ends of the range, or the sign")
 
     def geared_turns(
-        self, values: Values, duration: float, known: Mapping[str, float] | None = None
+        self, values: Values, duration: float, others: Mapping[str, float] | None = None
     ) -> dict[str, float]:
-        """Turns that driven joints and those geared to them make in a time; known: of others, to start from."""
-        turns = dict(known or {})
+        """Turns that driven joints and those geared to them make in a time; others: of more joints, to start from."""
+        turns = dict(others or {})
         for name in self.mechanism.drivers:
             if self.turns(name):
                 ends = [float(np.ravel(primal(self.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
@@ -414,25 +488,39 @@ class System:
                     turns[first] = turns[second] / ratio
         return turns
 
-    def _turns(self, driver: str, span: Span, duration: float) -> float:
-        """Turns that a driver would make in a time at its largest rate; of a slide, how often it would travel."""
-        revolute = self.turns(driver)
-        return float(span.peak * duration / (2 * np.pi if revolute else span.travel))
+
+def _widest(links: Sequence[Sequence[Sequence[Number]]]) -> Number:
+    """The largest distance of the points of a link from its first one, m."""
+    widest: Number = 0.0
+    for places in links:
+        for place in places[1:]:
+            apart = [primal(a) - primal(b) for a, b in zip(place, places[0], strict=True)]
+            widest = np.maximum(widest, functools.reduce(np.hypot, apart))
+    return widest
 
 
-def group_joints(module: Module, places: Sequence[Place]) -> tuple[GroupJoint, ...]:
-    """The joints of a module by the numbers of its links."""
-    number = {link: i for i, link in enumerate(module.links)}
-    sides = ((number.get(first, OUTER), number.get(second, OUTER)) for first, second in (p.links for p in places))
-    return tuple(GroupJoint(place.kind, pair) for place, pair in zip(places, sides, strict=True))
+def build(mechanism: Mechanism) -> System:
+    """Decompose a mechanism and prepare its modules. Raises MechanismError if its structure does not determine it."""
+    if mechanism.space == "spatial" and (findings := list(_bristles(mechanism))):
+        raise MechanismError(findings)
+    return System(mechanism, decompose(mechanism))
+
+
+def _bristles(mechanism: Mechanism) -> Iterator[Finding]:
+    """Laws with bristles in pairs whose slip has no one direction: a deflection is followed along one way only."""
+    for name, joint in mechanism.effective_joints.items():
+        law = joint.friction.law if joint.friction else None
+        if law and FRICTION_LAWS[law].relaxation is not None and PAIRS[joint.type].count > 1:
+            what = f"the bristles of the law {law} bend in one direction, the slip of a {joint.type} joint has several"
+            yield Finding(what, f"joints.{name}.friction", "use coulomb, viscous, stribeck or brown-mcphee here")
 
 
 def freed(values: Values, motions: Mapping[str, tuple[Number, Number, Number]]) -> dict[str, Number]:
     """The values with coordinates, rates and second derivatives of free drivers, which go before their motion laws."""
-    found = dict(values)
+    numbers = dict(values)
     for name, motion in motions.items():
-        found.update(zip((f"{STATE}{name}.{key}" for key in FREED), motion, strict=True))
-    return found
+        numbers.update(zip((f"{STATE}{name}.{key}" for key in FREED), motion, strict=True))
+    return numbers
 
 
 def driven_coordinates(
@@ -472,12 +560,12 @@ def rubbing(system: System) -> list[str]:
 
 def felt(system: System, values: Values) -> list[str]:
     """Joints with friction whose coefficient is not 0, as far as their law is proportional to one."""
-    found = []
+    joints = []
     for joint in rubbing(system):
         path = f"joints.{joint}.friction.{law_of(system, joint).scale}"
         if path not in values or np.any(np.asarray(primal(values[path])) != 0):
-            found.append(joint)
-    return found
+            joints.append(joint)
+    return joints
 
 
 def law_of(system: System, joint: str) -> FrictionLaw:

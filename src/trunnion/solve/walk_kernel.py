@@ -61,9 +61,9 @@ class WalkKernel(Kernel):
         _check(run, self.method)
         asked = described, list(figures), forces, self.method, gravest, sorted(undefined)
         laws = (law_of(run.system, joint).function.__module__ for joint in rubbing(run.system))
-        own = described is not None and all(name.startswith("trunnion.") for name in laws)
-        model = (run.system.mechanism.model_dump_json(), repr(run.chosen.assembly), repr(asked)) if own else ()
-        super().__init__(list(figures), threads, undefined, "\0".join(model) if own else None)
+        keyed = described is not None and all(name.startswith("trunnion.") for name in laws)
+        model = (run.system.mechanism.model_dump_json(), repr(run.chosen.assembly), repr(asked)) if keyed else ()
+        super().__init__(list(figures), threads, undefined, "\0".join(model) if keyed else None)
 
     def walked(self, values: Values, time: Number) -> Lanes:
         """See `Kernel.walked`."""

@@ -96,9 +96,9 @@ def least_play(loops: Loops, q: Array, c: Array, ask: Ask) -> LeastPlay:
             before[lane], least[lane], bound[lane] = least[lane], answer.least, answer.bound
             weights[lane] = answer.weights
             largest = float(np.max(np.abs(answer.steps), initial=0.0))
-            whole = (0.5 if grew[place] else 1.0) * min(1.0, LARGEST / max(largest, 1e-300))
-            steps[place] = whole * answer.steps
-            c[lane] += whole * (answer.offsets - c[lane])
+            length = (0.5 if grew[place] else 1.0) * min(1.0, LARGEST / max(largest, 1e-300))
+            steps[place] = length * answer.steps
+            c[lane] += length * (answer.offsets - c[lane])
         moving = ~done
         q[active[moving]] = part.at(np.flatnonzero(moving)).moved(q[active[moving]], steps[moving])
         active = active[moving]
@@ -128,19 +128,19 @@ def _solve(linear: LinearLoops, c: Array, ask: Ask, size: float) -> ConeAnswer |
     aim = np.zeros(table.shape[1])
     aim[-1] = 1.0
     cones = [clarabel.ZeroConeT(len(gap)), *(clarabel.SecondOrderConeT(width + 1) for width in ask.widths)]
-    whole = sparse.csc_matrix(np.vstack([table, rows]))
+    matrix = sparse.csc_matrix(np.vstack([table, rows]))
     none = sparse.csc_matrix((len(aim), len(aim)))
     b = np.concatenate([side / unit, right])
-    found = clarabel.DefaultSolver(none, aim, whole, b, cones, _settings()).solve()
-    if str(found.status) not in SOUND:
+    solution = clarabel.DefaultSolver(none, aim, matrix, b, cones, _settings()).solve()
+    if str(solution.status) not in SOUND:
         return None
-    x, z = np.asarray(found.x), np.asarray(found.z)
+    x, z = np.asarray(solution.x), np.asarray(solution.z)
     firsts = len(gap) + np.cumsum([0, *(width + 1 for width in ask.widths[:-1])])
     return ConeAnswer(
         unit * x[:columns],
         length * x[columns:-1],
         length / share * float(x[-1]),
-        length / share * float(found.obj_val_dual),
+        length / share * float(solution.obj_val_dual),
         z[firsts] * ask.share / share,
     )
 

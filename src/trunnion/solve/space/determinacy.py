@@ -8,7 +8,8 @@ are not determined. What the joints carry in excess are the self-stresses, Jᵀ 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
@@ -27,6 +28,7 @@ from trunnion.groups.tree import Pose
 from trunnion.results.sentences import finding_for
 from trunnion.solve.assembly import Chosen
 from trunnion.solve.backward import Given, backward
+from trunnion.solve.contacts import contacts_of
 from trunnion.solve.forward import Forward, forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.system import Cycle, System, Values, driven_coordinates, felt
@@ -48,7 +50,6 @@ class ModuleDeterminacy(NamedTuple):
     rubbing: joints whose friction follows what the redundant constraints leave open.
     """
 
-    module: int
     redundant: int
     undetermined: int
     joints: tuple[str, ...]
@@ -65,88 +66,89 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
     walked = forward if system.plan.passive or rubbing else posed
     time = cycle.times(LOOKED) if cycle.duration else np.zeros(1)
     walk = walked(system, values, chosen.assembly, time)
-    found = []
-    for number, module in enumerate(system.plan.modules):
-        group = cast(SpatialGroup, system.groups[number])
-        if not group.chords:
-            continue
-        pose = walk.poses[number]
-        if not np.any(np.isfinite(np.asarray(pose.gap))):
-            pose = _by_least_squares(system, walk, number, group)
+    modules = (_of_module(walk, number, rubbing, len(time)) for number in range(len(system.plan.modules)))
+    return Determinacy(system, tuple(itertools.chain.from_iterable(modules)), *_spins(walk))
+
+
+def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -> Iterator[ModuleDeterminacy]:
+    """Of one module, nothing if it closes no loop or could not be assembled."""
+    module, group = walk.system.plan.modules[number], cast(SpatialGroup, walk.system.groups[number])
+    pose: Pose | None = walk.poses[number]
+    if pose is None or not group.chords:
+        return
+    if not np.any(np.isfinite(np.asarray(pose.gap))):
+        pose = _by_least_squares(walk, number, group)
         if pose is None and module.redundant:
-            found += _too_many(system, walk, number, group)
-        if pose is None or not pose.jacobian:
-            continue
-        table = stacked(pose.jacobian)
-        rows, columns = table.shape[1:]
-        table = np.broadcast_to(table, (len(time), rows, columns))
-        finite = np.asarray(np.isfinite(table).all(axis=(-2, -1)))
-        if not np.any(finite):
-            continue
-        left, sizes, right = np.linalg.svd(np.where(finite[:, None, None], table, 0.0))
-        ranks = np.where(finite, np.sum(sizes > RANK * sizes[:, :1], axis=-1), -1)
-        rank = int(np.max(ranks))
-        regular = ranks == rank
-        stresses = [_stress(group, pose, null) for null in np.moveaxis(left, -1, 0)[rank:]]
-        motions = [_motion(group, pose, null) for null in np.moveaxis(right, -2, 0)[rank:]]
-        normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
-        found.append(
-            ModuleDeterminacy(
-                number,
-                rows - rank,
-                columns - rank,
-                _present(module.joints, stresses, stresses, regular),
-                _present(module.links, motions, motions, regular),
-                rubbing=_present(module.joints, normals, stresses, regular),
-            )
-        )
-    return Determinacy(system, tuple(found), *_spins(walk))
+            yield from _too_many(walk, number, group)
+    if pose is None or not pose.jacobian:
+        return
+    table = stacked(pose.jacobian)
+    rows, columns = table.shape[1:]
+    table = np.broadcast_to(table, (lanes, rows, columns))
+    finite = np.asarray(np.isfinite(table).all(axis=(-2, -1)))
+    if not np.any(finite):
+        return
+    left, sizes, right = np.linalg.svd(np.where(finite[:, None, None], table, 0.0))
+    ranks = np.where(finite, np.sum(sizes > RANK * sizes[:, :1], axis=-1), -1)
+    rank = int(np.max(ranks))
+    regular = ranks == rank
+    stresses = [_stress(group, pose, null) for null in np.moveaxis(left, -1, 0)[rank:]]
+    motions = [_motion(group, pose, null) for null in np.moveaxis(right, -2, 0)[rank:]]
+    normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
+    yield ModuleDeterminacy(
+        rows - rank,
+        columns - rank,
+        _present(module.joints, stresses, stresses, regular),
+        _present(module.links, motions, motions, regular),
+        rubbing=_present(module.joints, normals, stresses, regular),
+    )
 
 
-def _spins(walk: Any) -> tuple[dict[str, float], dict[str, float]]:
+def _spins(walk: Forward) -> tuple[dict[str, float], dict[str, float]]:
     """Largest torques about the line of each link with a free spin, N m, where they are more than rounding: what keeps
     it from spinning, and what friction in its joints adds."""
     if not walk.system.plan.passive:
         return {}, {}
     with np.errstate(all="ignore"):
         back = backward(walk, FrictionMethod(), Given())
-    found, dragged = {}, {}
+    torques, dragged = {}, {}
     for link, torque in back.spins.items():
         joints = [name for name, (_, links) in walk.system.joints.items() if link in links]
         force = max(_largest(np.sqrt(dot(back.reactions[name].u, back.reactions[name].u))) for name in joints)
         size = _largest(walk.system.size(walk.values))
         if _largest(torque) > PRESENT * force * size:
-            found[link] = _largest(torque)
-        one, two = (walk.element(link, name).place for name in joints)
-        line = minus(two, one)
+            torques[link] = _largest(torque)
+        start, end = (walk.element(link, name).place for name in joints)
+        line = minus(end, start)
         drag: Any = 0.0
         for name in joints:
             sign = 1.0 if walk.system.joints[name][1][1] == link else -1.0
-            drag = drag + sign * dot(moment_at(back.friction_wrenches[name], one), line)
+            drag = drag + sign * dot(moment_at(back.friction_wrenches[name], start), line)
         length = np.sqrt(primal(dot(line, line)))
         drag = primal(drag) / np.where(length > 0, length, np.nan)
         if _largest(drag) > PRESENT * force * size:
             dragged[link] = _largest(drag)
-    return found, dragged
+    return torques, dragged
 
 
 def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(primal(values)), initial=0.0))
 
 
-def _too_many(system: System, walk: Any, number: int, group: SpatialGroup) -> list[ModuleDeterminacy]:
+def _too_many(walk: Forward, number: int, group: SpatialGroup) -> list[ModuleDeterminacy]:
     """Whether a module does not close because it has more drivers than freedoms: it is solved without any."""
-    pose = _by_least_squares(system, walk, number, replace(group, driven=()))
+    pose = _by_least_squares(walk, number, replace(group, driven=()))
     if pose is None:
         return []
     table = stacked(pose.jacobian)[0]
     freedoms = table.shape[1] - int(np.linalg.matrix_rank(table, rtol=RANK))
     surplus = len(group.driven) - freedoms  # without any freedom it is its dimensions that do not let it move
-    return [ModuleDeterminacy(number, 0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
+    return [ModuleDeterminacy(0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
 
 
-def _by_least_squares(system: System, walk: Any, number: int, group: SpatialGroup) -> Pose | None:
+def _by_least_squares(walk: Forward, number: int, group: SpatialGroup) -> Pose | None:
     """A module that Newton's method does not close because J is singular, at the start, solved all the same."""
+    system = walk.system
     module, places = system.plan.modules[number], system.places[number]
     free = SpatialGroup(group.links, group.joints, group.driven, group.spinning, redundant=True)
     drive = driven_coordinates(system, module, places, walk.values, walk.time)[0] if group.driven else []
@@ -181,11 +183,11 @@ def _normals(walk: Forward, names: Sequence[str], rubbing: Sequence[str], size: 
 
     A normal load is a seminorm: |N(R + S) − N(R)| ≤ N(S). Where it is zero, so is what S changes of the friction.
     """
-    found = np.zeros((len(names), CONTACTS, stress.shape[-1]))
+    normals = np.zeros((len(names), CONTACTS, stress.shape[-1]))
     for k, joint in enumerate(names):
-        for i, contact in enumerate(walk.system.geometry.contacts(walk, joint) if joint in rubbing else ()):
-            found[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
-    return found
+        for i, contact in enumerate(contacts_of(walk, joint) if joint in rubbing else ()):
+            normals[k, i] = size * contact.load.normal(contact.load.felt(tuple(stress[k])))
+    return normals
 
 
 def _table(screws: Sequence[Screw], lanes: int) -> Array:
@@ -193,13 +195,13 @@ def _table(screws: Sequence[Screw], lanes: int) -> Array:
     return np.array([[np.broadcast_to(entry, lanes) for entry in flat(screw)] for screw in screws])
 
 
-def _present(names: Sequence[str], parts: Sequence[Array], wholes: Sequence[Array], lanes: Array) -> tuple[str, ...]:
+def _present(names: Sequence[str], parts: Sequence[Array], vectors: Sequence[Array], lanes: Array) -> tuple[str, ...]:
     """Names whose part in any null vector is, at any of the lanes, more than rounding of the whole.
 
     parts, wholes: (name, entry, lane) of each null vector.
     """
     present = np.zeros(len(names), bool)
-    for part, whole in zip(parts, wholes, strict=True):
+    for part, whole in zip(parts, vectors, strict=True):
         largest = np.max(np.linalg.norm(whole, axis=1), axis=0)
         present |= np.any((np.linalg.norm(part, axis=1) > PRESENT * largest) & lanes, axis=-1)
     return tuple(name for name, is_present in zip(names, present, strict=True) if is_present)
@@ -221,7 +223,7 @@ class Determinacy:
     @property
     def mobility(self) -> int:
         """Mobility by rank: what the drivers prescribe, spins that move nothing else, and what is not determined."""
-        undetermined = sum(one.undetermined - one.surplus for one in self.parts)
+        undetermined = sum(part.undetermined - part.surplus for part in self.parts)
         return len(self.system.mechanism.drivers) + len(self.system.plan.passive) + undetermined
 
     def refuse(self) -> None:
@@ -232,41 +234,27 @@ class Determinacy:
 
     def findings(self) -> list[Finding]:
         """What there is to say of redundant constraints, undetermined freedoms and free spins."""
-        found: list[Finding] = []
-        for one in self.parts:
-            found += [self._overdriven()] if one.surplus else []
-            found += [self._undetermined(one)] if one.undetermined else []
-            found += [self._redundant(one)] if one.redundant else []
-            found += (
-                [finding_for("mobility.friction_open", "joints", joints=list(one.rubbing), constraints=one.redundant)]
-                if one.rubbing
-                else []
-            )
+        spins, drivers = len(self.system.plan.passive), len(self.system.mechanism.drivers)
+        counts: dict[str, Any] = {"formula": self.system.plan.mobility, "rank": self.mobility}
+        code = "redundant" if self.system.mechanism.over_constraint == "refuse" else "redundant_least"
+        findings: list[Finding] = []
+        for part in self.parts:
+            joints, links = list(part.joints), list(part.links)
+            if part.surplus:
+                findings.append(finding_for("mobility.overdriven", "drivers", **counts, spins=spins, drivers=drivers))
+            if part.undetermined:
+                counted = {**counts, "freedoms": part.undetermined}
+                findings.append(finding_for("mobility.undetermined", "drivers", **counted, links=links))
+            if part.redundant:
+                counted = {**counts, "constraints": part.redundant}
+                findings.append(finding_for(f"mobility.{code}", "joints", **counted, joints=joints))
+            if part.rubbing:
+                joints, constraints = list(part.rubbing), part.redundant
+                findings.append(finding_for("mobility.friction_open", "joints", joints=joints, constraints=constraints))
         for module in self.system.plan.modules:
             for link, *points in module.spinning:
-                where, drag = f"links.{link}", self.dragged.get(link)
-                found.append(finding_for("mobility.spin", where, link=link, points=points, torque=drag))
+                spin: dict[str, Any] = {"where": f"links.{link}", "link": link, "points": points}
+                findings.append(finding_for("mobility.spin", **spin, torque=self.dragged.get(link)))
                 if link in self.spins:
-                    found.append(
-                        finding_for("mobility.spin_loaded", where, link=link, points=points, torque=self.spins[link])
-                    )
-        return found
-
-    @property
-    def _counts(self) -> dict[str, Any]:
-        return {"formula": self.system.plan.mobility, "rank": self.mobility}
-
-    def _overdriven(self) -> Finding:
-        spins, drivers = len(self.system.plan.passive), len(self.system.mechanism.drivers)
-        return finding_for("mobility.overdriven", "drivers", **self._counts, spins=spins, drivers=drivers)
-
-    def _undetermined(self, one: ModuleDeterminacy) -> Finding:
-        return finding_for(
-            "mobility.undetermined", "drivers", **self._counts, freedoms=one.undetermined, links=list(one.links)
-        )
-
-    def _redundant(self, one: ModuleDeterminacy) -> Finding:
-        code = "redundant" if self.system.mechanism.over_constraint == "refuse" else "redundant_least"
-        return finding_for(
-            f"mobility.{code}", "joints", **self._counts, constraints=one.redundant, joints=list(one.joints)
-        )
+                    findings.append(finding_for("mobility.spin_loaded", **spin, torque=self.spins[link]))
+        return findings

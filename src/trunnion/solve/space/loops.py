@@ -28,8 +28,7 @@ from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.joints.pairs import PAIRS
 from trunnion.joints.spatial import MOTIONS
 from trunnion.solve import shifts
-from trunnion.solve.space.system import SpatialSystem
-from trunnion.solve.system import Values, driven_coordinates
+from trunnion.solve.system import System, Values, driven_coordinates
 
 __all__ = ["End", "LinearLoops", "Loops", "ends_of"]
 
@@ -59,9 +58,9 @@ class LinearLoops(NamedTuple):
     effect: Array
 
 
-def ends_of(system: SpatialSystem, values: Values, every_pin: bool) -> list[End]:
+def ends_of(system: System, values: Values, every_pin: bool) -> list[End]:
     """The ends of all plays that are stated, and of pins that state none if `every_pin`; NaN lengths are left in."""
-    found: list[End] = []
+    ends: list[End] = []
     for name, (kind, _) in system.joints.items():
         model = CLEARANCE_MODELS["spatial"].get(kind)
         if model is None:
@@ -73,8 +72,8 @@ def ends_of(system: SpatialSystem, values: Values, every_pin: bool) -> list[End]
             radial = pin and k not in model.axial
             if radius > 0 or (radial and every_pin):
                 axes = tuple(key.partition(".")[2] for key in keys)
-                found.append(End(name, k, axes, radius, radial))
-    return found
+                ends.append(End(name, k, axes, radius, radial))
+    return ends
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class Loops:
     or (lane,).
     """
 
-    system: SpatialSystem
+    system: System
     values: Values
     ends: tuple[End, ...]
     holes: Mapping[tuple[str, str], Any]
@@ -93,7 +92,7 @@ class Loops:
     size: float
 
     @classmethod
-    def of(cls, system: SpatialSystem, values: Values, ends: Sequence[End], time: Array) -> Loops:
+    def of(cls, system: System, values: Values, ends: Sequence[End], time: Array) -> Loops:
         """The loops at the given times, s."""
         holes, module = system.holes(values), system.plan.modules[0]
         drive = driven_coordinates(system, module, system.places[0], values, time)[0]
@@ -109,12 +108,12 @@ class Loops:
     def components(self) -> list[str]:
         """Path of every offset among the values."""
         models = {name: CLEARANCE_MODELS["spatial"].get(kind) for name, (kind, _) in self.system.joints.items()}
-        found = []
+        paths = []
         for end in self.ends:
             model = models[end.joint]
             assert model is not None  # it has an end
-            found += [f"seats.{end.joint}.{key}" for key in model.ends[end.number]]
-        return found
+            paths += [f"seats.{end.joint}.{key}" for key in model.ends[end.number]]
+        return paths
 
     def at(self, lanes: NDArray[np.intp]) -> Loops:
         """The same at some of the lanes."""
@@ -124,33 +123,33 @@ class Loops:
 
     def _elements(self, offsets: Sequence[Number]) -> list[Element]:
         values = ChainMap(dict(zip(self.components, offsets, strict=True)), dict(self.values))
-        found = []
+        elements = []
         for place in self.system.places[0]:
             (first, second), name = place.links, place.joint
             lain = shifts.seated("spatial", self.holes[second, name], place.kind, values, name)
-            found.append(Element(self.holes[first, name], lain, self.system.lead(self.values, name)))
-        return found
+            elements.append(Element(self.holes[first, name], lain, self.system.lead(self.values, name)))
+        return elements
 
     def _coordinates(self, q: Array, deep: bool = False) -> list[list[Number]]:
         """Coordinates (lane, kept) joint by joint, each (lane,), or (lane, 1) if `deep`."""
 
-        def column(number: Number) -> Number:
-            return np.asarray(number, float)[:, None] if deep and np.ndim(number) else number
+        def column(value: Number) -> Number:
+            return np.asarray(value, float)[:, None] if deep and np.ndim(value) else value
 
-        return self.group.coordinates([column(one) for one in q.T], [column(one) for one in self.drive])
+        return self.group.coordinates([column(row) for row in q.T], [column(value) for value in self.drive])
 
     def linear(self, q: Array, c: Array) -> LinearLoops:
         """Gap and its derivatives at coordinates (lane, kept) and offsets (lane, component), m."""
         group, count = self.group, c.shape[1]
         joints = self._coordinates(q)
-        _, placed, screws = group.place(self._elements(list(c.T)), joints)
+        _, placed, screws = self._place(q, c)
         gap = _full(group.gaps(placed, joints, self.size), (len(q),))
         jacobian = np.broadcast_to(
             stacked(group.jacobian(placed, screws, self.size)), (len(q), gap.shape[1], len(group.free))
         )
         if not count:
             return LinearLoops(gap, jacobian, np.zeros((*gap.shape, 0)))
-        seeds = [Dual(one[:, None], row[None, :]) for one, row in zip(c.T, np.eye(count), strict=True)]
+        seeds = [Dual(offset[:, None], row[None, :]) for offset, row in zip(c.T, np.eye(count), strict=True)]
         deep = self._coordinates(q, deep=True)
         opened = group.gaps(group.place(self._elements(seeds), deep)[1], deep, self.size)
         effect = _full([n.dual if isinstance(n, Dual) else 0.0 for n in opened], (len(q), count))
@@ -158,13 +157,17 @@ class Loops:
 
     def opening(self, q: Array, c: Array) -> Array:
         """Largest opening of a loop at every lane, in units of the size; rad."""
-        joints = self._coordinates(q)
-        placed = self.group.place(self._elements(list(c.T)), joints)[1]
+        joints, (_, placed, _) = self._coordinates(q), self._place(q, c)
         return np.broadcast_to(self.group.opening(placed, joints, self.size), (len(q),)) / self.size
 
     def frames(self, q: Array, c: Array) -> tuple[Any, ...]:
         """Frames of the links."""
-        return self.group.place(self._elements(list(c.T)), self._coordinates(q))[0]
+        frames: tuple[Any, ...] = self._place(q, c)[0]
+        return frames
+
+    def _place(self, q: Array, c: Array) -> tuple[Any, ...]:
+        placed: tuple[Any, ...] = self.group.place(self._elements(list(c.T)), self._coordinates(q))
+        return placed
 
     def moved(self, q: Array, steps: Array) -> Array:
         """Coordinates (lane, kept) after steps (lane, free) in every free coordinate, slides in units of the size."""
@@ -172,10 +175,10 @@ class Loops:
         parts: list[list[Number]] = [[0.0] * len(MOTIONS[joint.kind].steps) for joint in group.joints]
         for (k, i), step in zip(group.free, steps.T, strict=True):
             parts[k][i] = step * self.size if group.slides(k, i) else step
-        found: list[Number] = []
+        coordinates: list[Number] = []
         for joint, values, step in zip(group.joints, self._coordinates(q), parts, strict=True):
-            found += MOTIONS[joint.kind].advanced(values, step)
-        return np.stack([np.broadcast_to(found[i], (len(q),)) for i in group.kept], axis=-1)
+            coordinates += MOTIONS[joint.kind].advanced(values, step)
+        return np.stack([np.broadcast_to(coordinates[i], (len(q),)) for i in group.kept], axis=-1)
 
     def least_open(self, q: Array, c: Array) -> tuple[Array, Array]:
         """Coordinates near by at which the loops are open least (least squares), and by how much: (lane,)."""
@@ -188,10 +191,10 @@ class Loops:
             near = part.moved(near, steps * np.minimum(1.0, LARGEST / np.maximum(largest, 1e-300))[:, None])
             if not np.any(largest > STILL):
                 break
-        found, gap = q.copy(), np.full(len(q), np.nan)
-        found[lanes] = near
+        nearest, gap = q.copy(), np.full(len(q), np.nan)
+        nearest[lanes] = near
         gap[lanes] = np.max(np.abs(part.linear(near, c[lanes]).gap), axis=-1, initial=0.0)
-        return found, gap
+        return nearest, gap
 
 
 def _full(rows: Sequence[Number], shape: tuple[int, ...]) -> Array:

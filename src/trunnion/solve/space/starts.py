@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,7 @@ from trunnion.solve.assembly import Chosen, choose, distance
 from trunnion.solve.forward import forward, start
 from trunnion.solve.space.determinacy import look
 from trunnion.solve.space.loops import Loops
-from trunnion.solve.space.system import SpatialSystem
-from trunnion.solve.system import Cycle, Values
+from trunnion.solve.system import Cycle, System, Values
 from trunnion.solve.track import GUESSES, SEED, guess_reaches
 
 __all__ = ["Start", "start_of"]
@@ -27,50 +25,30 @@ FOLLOWED = 180  # positions of a cycle through which the one that is open least 
 JUMP = 0.5  # rad, or of the size: farther from one of them to the next it is another assembly
 
 
-class Start(Protocol):
-    """Coordinates (lane, kept) near those of the closed loops at times, s; NaN where there are none."""
-
-    def __call__(self, time: Array) -> Array: ...
+Start = Callable[[Array], Array]  # coordinates (lane, kept) near those of the closed loops at times, s, or NaN
 
 
-@dataclass(frozen=True)
-class _Ideal:
-    """The mechanism without errors, which closes."""
+def _ideal(system: System, values: Values, chosen: Chosen) -> Start:
+    """Those of the mechanism without errors, which closes."""
 
-    system: SpatialSystem
-    values: Values
-    chosen: Chosen
+    def coordinates(time: Array) -> Array:
+        pose = forward(system, values, chosen.assembly, time).poses[0]
+        return np.stack([np.broadcast_to(pose.q[i], time.shape) for i in system.groups[0].kept], axis=-1)
 
-    def __call__(self, time: Array) -> Array:
-        pose = forward(self.system, self.values, self.chosen.assembly, time).poses[0]
-        return np.stack([np.broadcast_to(pose.q[i], time.shape) for i in self.system.groups[0].kept], axis=-1)
+    return coordinates
 
 
-@dataclass(frozen=True)
-class _Nearly:
-    """A mechanism that closes nowhere, followed along the poses in which it is open least."""
-
-    time: Array
-    rows: Array  # (grid, kept)
-    periodic: bool
-
-    def __call__(self, time: Array) -> Array:
-        moment = np.mod(time, self.time[-1]) if self.periodic and self.time[-1] else np.asarray(time)
-        near = np.argmin(np.abs(moment[:, None] - self.time), axis=1)
-        return np.asarray(self.rows[near])
-
-
-def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle) -> tuple[Start, list[Finding]]:
+def start_of(system: System, values: Values, ideal: Values, cycle: Cycle) -> tuple[Start, list[Finding]]:
     """Where to start from, and what there is to say of it.
 
     Raises MechanismError where the mechanism leaves a freedom undetermined, or is nowhere even nearly closed.
     """
     chosen = choose(system, ideal, cycle)
-    wrong = [one for one in look(system, ideal, chosen, cycle).findings() if one.where == "drivers"]
+    wrong = [error for error in look(system, ideal, chosen, cycle).findings() if error.where == "drivers"]
     if wrong:
         raise MechanismError(wrong)
     if chosen.found[0]:
-        return _Ideal(system, ideal, chosen), list(chosen.findings)
+        return _ideal(system, ideal, chosen), list(chosen.findings)
     nearly = _followed(system, values, cycle)
     misfit = finding_for("assembly.misfit", "links")
     if nearly is None:
@@ -79,8 +57,11 @@ def start_of(system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle)
     return nearly, [misfit]
 
 
-def _followed(system: SpatialSystem, values: Values, cycle: Cycle) -> _Nearly | None:
-    """The assembly nearest the hints, of those nearly closed, from the first position that has one on, and back."""
+def _followed(system: System, values: Values, cycle: Cycle) -> Start | None:
+    """A mechanism that closes nowhere, along the poses in which it is open least.
+
+    From the first position at which an assembly is nearly closed on, and back: that nearest the hints.
+    """
     time = np.linspace(0.0, cycle.duration, FOLLOWED + 1 if cycle.duration else 1)
     loops = Loops.of(system, values, (), time)
     rows = np.full((len(time), len(loops.group.kept)), np.nan)
@@ -93,14 +74,19 @@ def _followed(system: SpatialSystem, values: Values, cycle: Cycle) -> _Nearly | 
     for order in (range(begin, len(time)), range(begin, -1, -1)):
         q = first
         for place in order:
-            found, gap = loops.at(np.array([place])).least_open(q[None], np.zeros((1, 0)))
-            if not gap[0] <= NEARLY or not np.max(np.abs(found[0] - q)) <= JUMP:
+            coordinates_, gap = loops.at(np.array([place])).least_open(q[None], np.zeros((1, 0)))
+            if not gap[0] <= NEARLY or not np.max(np.abs(coordinates_[0] - q)) <= JUMP:
                 break
-            rows[place] = q = found[0]
-    return _Nearly(time, rows, cycle.periodic)
+            rows[place] = q = coordinates_[0]
+
+    def coordinates(at: Array) -> Array:
+        moment = np.mod(at, time[-1]) if cycle.periodic and time[-1] else np.asarray(at)
+        return np.asarray(rows[np.argmin(np.abs(moment[:, None] - time), axis=1)])
+
+    return coordinates
 
 
-def _nearest(system: SpatialSystem, values: Values, loops: Loops) -> Array | None:
+def _nearest(system: System, values: Values, loops: Loops) -> Array | None:
     """Coordinates of the assembly nearest the hints at one position, from many guesses; None if none nearly closes."""
     rng = np.random.default_rng(SEED)
     guesses = [rng.uniform(-reach, reach, GUESSES) for reach in guess_reaches(loops.group, loops.size)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,10 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward
-from trunnion.solve.geometry import build
 from trunnion.solve.space.cone import CLOSED, Ask, LeastPlay, least_play
 from trunnion.solve.space.loops import End, Loops, ends_of
 from trunnion.solve.space.starts import Start, start_of
-from trunnion.solve.space.system import SpatialSystem
-from trunnion.solve.system import Cycle, System, Values
+from trunnion.solve.system import Cycle, System, Values, build
 from trunnion.studies.assembly.result import ENOUGH, FIGURES, AssemblyStatus, Result, labels
 
 if TYPE_CHECKING:
@@ -82,7 +80,7 @@ def assembled(
     if not any(module.redundant for module in system.plan.modules):
         result = _regular(system, values, cycle, time)
     else:
-        result = AssemblyStudy.of(cast(SpatialSystem, system), values, ideal, cycle, uniform).result(time)
+        result = AssemblyStudy.of(system, values, ideal, cycle, uniform).result(time)
     if progress:
         progress(len(time))
     return result.dataset()
@@ -114,7 +112,7 @@ class AssemblyStudy:
     evened: for each end of `pins`, whether its play is the clearance that is looked for; the others stay.
     """
 
-    system: SpatialSystem
+    system: System
     values: Values
     cycle: Cycle
     start: Start
@@ -124,7 +122,7 @@ class AssemblyStudy:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, system: SpatialSystem, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> AssemblyStudy:
+    def of(cls, system: System, values: Values, ideal: Values, cycle: Cycle, uniform: Uniform) -> AssemblyStudy:
         stated = tuple(ends_of(system, values, every_pin=False))
         every = not any(end.pin for end in stated) and not (uniform == "all" and stated)
         pins = tuple(ends_of(system, values, every_pin=every))
@@ -243,7 +241,7 @@ class AssemblyStudy:
         return float(most[top]), float(best[top])
 
 
-def _nil(system: SpatialSystem, values: Values) -> bool:
+def _nil(system: System, values: Values) -> bool:
     """Whether any joint states a clearance of 0."""
     stated = (clearance(name, values) for name in system.joints)
     return any(one is not None and np.all(primal(one) == 0) for one in stated)
@@ -257,7 +255,7 @@ def _worst(one: LeastPlay, other: LeastPlay, of: Callable[[LeastPlay], Array]) -
     return np.where(np.isfinite(most), most, np.nan)
 
 
-def _check_lengths(system: SpatialSystem, values: Values, ends: Sequence[End]) -> None:
+def _check_lengths(system: System, values: Values, ends: Sequence[End]) -> None:
     """MechanismError for every play that has no length over which a pin or guide could lean."""
     findings = []
     for name in dict.fromkeys(end.joint for end in ends):

@@ -1,10 +1,10 @@
-"""The contacts with friction of each spatial pair: what presses on them, which way they slip, what friction does.
+"""The contacts with friction of each pair: what presses on them, which way they slip, what friction does.
 
-A contact is a normal load, a slip speed and the wrench of a friction force of 1 N along the slip. A cylindrical pair
-slips along the vector (r θ̇, ṡ), so its friction is one force along that, not a full torque and a full force beside each
-other; the model `pezzuti` has both [P 17, 19]. A helical pair slips along its thread. A universal pair is two pins.
-A ball's friction moment opposes the relative angular velocity with the lever of the radius: what a ball has that
-bears on its great circle across that velocity, and the most for any other place of the contact.
+A contact is a normal load, a slip speed and the wrench of a friction force of 1 N along the slip. In space a
+cylindrical pair slips along the vector (r θ̇, ṡ), so its friction is one force along that, not a full torque and a full
+force beside each other; the model `pezzuti` has both [P 17, 19]. A helical pair slips along its thread. A universal
+pair is two pins. A ball's friction moment opposes the relative angular velocity with the lever of the radius: what a
+ball has that bears on its great circle across that velocity, and the most for any other place of the contact.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.plane import Wrench
 from trunnion.algebra.space import Frame, Screw, about
 from trunnion.algebra.vector import Vector3, dot, plus, scaled
-from trunnion.joints.pairs import ContactLoad
+from trunnion.joints.pairs import ContactLoad, PlanarContactLoad
 from trunnion.joints.spatial_load import BallLoad, BearingLoad
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction_problem import Rubbing
-from trunnion.solve.space.motion import SpatialWalk
 
-__all__ = ["at_rest", "bearing_middle", "contacts"]
+__all__ = ["at_rest", "bearing_middle", "contacts_of"]
 
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -35,7 +36,7 @@ def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
 
 
 def at_rest(walk: SpatialWalk, joint: str) -> list[Number]:
-    """Where each contact of a joint does not slip, in the order of `contacts`."""
+    """Where each contact of a joint does not slip, in the order of `contacts_of`."""
     pair, turn_scale = walk.pair(joint), walk.noise(joint, turns=True)
     if pair.crossed:
         return [np.abs(primal(rate)) <= turn_scale for rate in walk.pin_rates(joint)]
@@ -44,12 +45,33 @@ def at_rest(walk: SpatialWalk, joint: str) -> list[Number]:
     turn, slide = (primal(rate) for rate in walk.rates(joint))
     still = [np.abs(turn) <= turn_scale, np.abs(slide) <= walk.noise(joint, turns=False)]
     if len(pair.freedoms) == 2:
-        return still if _summed(walk, joint) else [still[0] & still[1]]
+        return still if walk.system.summed(joint) else [still[0] & still[1]]
     return still[:1] if pair.turns else still[1:]
 
 
-def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
+def contacts_of(walk: Forward, joint: str) -> Iterator[Rubbing]:
     """The contacts of a joint."""
+    return _in_space(walk, joint) if isinstance(walk, SpatialWalk) else _in_plane(walk, joint)
+
+
+def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
+    """The one contact of a joint: a pin in its hole, or a guide, whose middle is at its point on the second link."""
+    turns, path = walk.system.turns(joint), f"joints.{joint}"
+    speed = walk.speed(joint)
+    zero = np.abs(primal(speed)) <= walk.noise(joint, turns)
+    if turns:
+        lever = walk.values[f"{path}.pin.radius"]
+        yield Rubbing(PlanarContactLoad(), lever * speed, Wrench(0.0, 0.0, lever), zero, amount=lever, turning=1.0)
+        return
+    axis, middle = walk.ends(joint)
+    at = axis if joint in walk.system.reversed else middle  # what the module's reaction is about
+    arm = None if at is middle else (middle.x - at.x, middle.y - at.y)
+    load = PlanarContactLoad((-axis.s, axis.c), walk.values[f"{path}.guide.length"], arm)
+    yield Rubbing(load, speed, Wrench(axis.c, axis.s, 0.0), zero)
+
+
+def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
+    """Of a joint in space."""
     zero = at_rest(walk, joint)
     pair, middle = walk.pair(joint), bearing_middle(walk, joint)
     second = walk.ends(joint)[1]
@@ -68,13 +90,13 @@ def contacts(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     lever = walk.values[f"joints.{joint}.pin.radius"]
     moment = Screw(NULL, scaled(lever, axis))
     if pair.threaded:
-        lead = walk.space.lead(walk.values, joint)
-        way = namespace(lead, lever).sqrt(lever * lever + lead * lead)
-        unit = _mixed(axis, middle, lever, lever / way, lead / way)
-        yield Rubbing(load, way * turn, unit, zero[0], amount=lever * lever / way)
+        lead = walk.system.lead(walk.values, joint)
+        helix = namespace(lead, lever).sqrt(lever * lever + lead * lead)
+        unit = _mixed(axis, middle, lever, lever / helix, lead / helix)
+        yield Rubbing(load, helix * turn, unit, zero[0], amount=lever * lever / helix)
     elif not pair.slides:
         yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
-    elif _summed(walk, joint):
+    elif walk.system.summed(joint):
         yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
         yield Rubbing(load, slide, about(axis, NULL, middle), zero[1], amount=0.0)
     else:
@@ -100,21 +122,16 @@ def _mixed(axis: Vector3, middle: Vector3, lever: Number, cosine: Number, sine: 
     return about(scaled(sine, axis), scaled(lever * cosine, axis), middle)
 
 
-def _summed(walk: SpatialWalk, joint: str) -> bool:
-    friction = walk.system.mechanism.effective_joints[joint].friction
-    return friction is not None and friction.model == "pezzuti"
-
-
 def _bearing(walk: SpatialWalk, joint: str, frame: Frame) -> BearingLoad:
     values, path, pair = walk.values, f"joints.{joint}", walk.pair(joint)
     if pair.guided:
         length = values[f"{path}.guide.length"]
-        return BearingLoad(frame, length, _summed(walk, joint), values.get(f"{path}.guide.width"))
+        return BearingLoad(frame, length, walk.system.summed(joint), values.get(f"{path}.guide.width"))
     flank = None
     if pair.threaded:
-        slope = walk.space.lead(values, joint) / values[f"{path}.pin.radius"]
+        slope = walk.system.lead(values, joint) / values[f"{path}.pin.radius"]
         flank = namespace(slope).sqrt(1 + slope * slope)
-    return BearingLoad(frame, values[f"{path}.pin.bearing"], _summed(walk, joint), flank=flank)
+    return BearingLoad(frame, values[f"{path}.pin.bearing"], walk.system.summed(joint), flank=flank)
 
 
 def _ball(walk: SpatialWalk, joint: str, middle: Vector3, zero: Number) -> Rubbing:
@@ -136,6 +153,6 @@ def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3, zero: Sequence[Num
     spin = walk.speed(joint)
     share = lever / np.where(spin > 0, spin, np.inf)  # its friction is told as a torque about the relative spin
     for pin, rate, still in zip(walk.ends(joint), walk.pin_rates(joint), zero, strict=True):
-        load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], _summed(walk, joint))
+        load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], walk.system.summed(joint))
         unit = Screw(NULL, scaled(lever, pin.z))
         yield Rubbing(load, lever * rate, unit, still, amount=share * rate, felt=True)

@@ -177,7 +177,7 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
     return {joint: multiples[joint] for joint in system.joints if joint in multiples}
 
 
-def multiple(rows: Array) -> Array:
+def multiple_of(rows: Array) -> Array:
     """A multiple of friction, which is 0 at least: polynomials through its values pass that by their tolerance."""
     return np.maximum(rows[0], 0.0)
 
@@ -422,7 +422,7 @@ class LockingCourse:
         cut = replace(self.margins, courses=self.margins.courses.parted(np.array([low, high])))
         middles = cut.courses.edges[:-1] + cut.courses.half
         inside = (middles > low) & (middles < high) & cut.valid
-        least = cut.extreme("locking_margin", of=multiple, sign=-1.0, panels=inside)
+        least = cut.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=inside)
         if least is not None:
             return least.value, cut.told(least).removeprefix("at ")
         return (np.inf if np.any(inside & (cut.status < Status.LOAD_UNDEFINED)) else np.nan), ""
@@ -462,7 +462,7 @@ class LockingCourse:
         name, margins = "locking_margin", self.margins
         if margins is None:
             return None
-        least = margins.extreme(name, of=multiple, sign=-1.0, panels=margins.valid)
+        least = margins.extreme(name, of=multiple_of, sign=-1.0, panels=margins.valid)
         if least is not None:
             return Figure(name, subject, least.value, aspect="minimum", place=margins.told(least), note=note)
         if np.any(margins.valid & (margins.status < Status.LOAD_UNDEFINED)):
@@ -477,7 +477,7 @@ class LockingCourse:
         """
         margins = self.margins
         least = (
-            None if margins is None else margins.extreme("locking_margin", of=multiple, sign=-1.0, panels=margins.valid)
+            None if margins is None else margins.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=margins.valid)
         )
         if margins is None or least is None:
             return None
@@ -514,7 +514,7 @@ class LockingCourse:
         every = np.ones(len(course.status), bool)
         for i, joint in enumerate(joints):
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
-            least = course.extreme("multiple", i, of=multiple, sign=-1.0, panels=every)
+            least = course.extreme("multiple", i, of=multiple_of, sign=-1.0, panels=every)
             if least is None:
                 bounded = np.any(np.isinf(tables[joint]))
                 yield Figure(name, subject, MARGIN if bounded else None, aspect=MORE_THAN * bool(bounded))

@@ -179,7 +179,7 @@ def critical_multiples(back: Backward, most: float) -> dict[str, Array]:
 
 def multiple_of(rows: Array) -> Array:
     """A multiple of friction, which is 0 at least: polynomials through its values pass that by their tolerance."""
-    return np.maximum(rows[0], 0.0)
+    return np.asarray(np.maximum(rows[0], 0.0))
 
 
 def _alone(problem: FrictionProblem, masks: NDArray[np.bool_], most: float) -> Array:

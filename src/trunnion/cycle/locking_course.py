@@ -476,10 +476,10 @@ class LockingCourse:
         Of a mechanism that runs, the first to lock it; of one that is locked, the one that need be lowered the least.
         """
         margins = self.margins
-        least = (
-            None if margins is None else margins.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=margins.valid)
-        )
-        if margins is None or least is None:
+        if margins is None:
+            return None
+        least = margins.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=margins.valid)
+        if least is None:
             return None
         time = np.array([margins.side(least, "locking_margin", -1.0)])
         plain = replace(self.method, name="newton", margin_up_to=0.0)

@@ -102,10 +102,13 @@ def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Arr
 
 def _clenshaw(own: Array, spot: Array) -> Array:
     """Values of polynomials, (row, lane, coefficient), at spots of each lane, (lane, place)."""
-    after: Array | float = 0.0
-    value, twice = own[..., -1:], 2.0 * spot
+    twice, after = 2.0 * spot, np.zeros(np.broadcast_shapes((*own.shape[:-1], 1), spot.shape))
+    value, new = after + own[..., -1:], np.empty_like(after)
     for k in range(ORDER - 2, 0, -1):
-        after, value = value, own[..., k, None] + twice * value - after
+        np.multiply(twice, value, out=new)
+        new -= after
+        new += own[..., k, None]
+        after, value, new = value, new, after
     return np.asarray(own[..., :1] + spot * value - after)
 
 

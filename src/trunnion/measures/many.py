@@ -236,8 +236,9 @@ class _Group:
 
     def tune(self, values: Values) -> None:
         """Part the panels until they resolve the courses of some mechanisms as far as their figures need it."""
+        own, lost = self._own_bends(values)
         for _ in range(0 if self.at_place else PARTED):
-            edges, lost = self.own_edges(values)
+            edges = self._own_edges(own)
             panels = np.any(self._on(values, edges, {}, FIRM)[1][~lost], axis=0)
             count = len(self.edges) - 1
             if len(panels) != count:  # the bends of each are edges besides
@@ -249,23 +250,24 @@ class _Group:
 
     # ---- edges of others ----------------------------------------------------------------------------------
 
-    def own_edges(self, values: Values) -> tuple[Number, Flags]:
-        """Edges of the panels of each, (lane, edge), or (1, edge) if they are those of all; where bends are lost."""
+    def _own_bends(self, values: Values) -> tuple[Number | None, Flags]:
+        """Times of the nominal mechanism, s, (lane, bend), at which each switches, None if they are its own; where they
+        are lost."""
         none = np.zeros(lanes_of(values), bool)
         if self.at_place or values is self.values or not self.bends:
-            return self.edges[None], none
-        own, end = self._own_bends(values), self.span[1]
+            return None, none
+        own, end = self._tracked(values), self.span[1]
         times = np.array([bend.time for bend in self.bends])
         lost = np.any(np.isnan(primal(own)), axis=1)
         close = np.abs(primal(own) - times) <= LOCATED * end  # so that the same mechanism has the same edges
         own = own + np.where(close, times - primal(own), 0.0)
         same = np.all(close, axis=1) & ~np.any(derivative(own) + 0.0 * times, axis=1)
         if np.all(same | lost):
-            return self.edges[None], lost
+            return None, lost
         own = linear(own, lambda array: np.where(lost[:, None], 0.0, array)) + np.where(lost[:, None], times, 0.0)
-        return self._along(own, times), lost
+        return own, lost
 
-    def _own_bends(self, values: Values) -> Number:
+    def _tracked(self, values: Values) -> Number:
         """Times of the nominal mechanism, s, (lane, bend), at which each switches; NaN where it is far off."""
         run, count = self.run, lanes_of(values)
         plain, slopes = _parts_of(values)
@@ -284,9 +286,12 @@ class _Group:
         shifts = shifts_of(of, self.bends, times, at, (below, above))
         return Dual(times, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
 
-    def _along(self, own: Number, times: Array) -> Number:
-        """The nominal edges as they go along with the bends of each next to them. What is taken less the nominal
-        mechanism jumps at the bends of that too."""
+    def _own_edges(self, own: Number | None) -> Number:
+        """Edges of the panels of each, (lane, edge), or (1, edge) if they are those of all: the nominal ones go along
+        with the bends next to them. What is taken less the nominal mechanism jumps at the bends of that too."""
+        if own is None:
+            return self.edges[None]
+        times = np.array([bend.time for bend in self.bends])
         (start, end), cycle, count = self.span, self.run.cycle, np.shape(primal(own))[0]
         close, laps = CLOSE * end, np.zeros(1)
         if cycle.periodic:  # all periods that the span touches
@@ -322,7 +327,8 @@ class _Group:
         Panels that do not resolve the course of one as far as its figures need it are parted; what jumps within one has
         courses of its own.
         """
-        edges, lost = self.own_edges(values)
+        own, lost = self._own_bends(values)
+        edges = self._own_edges(own)
         reads, offending, gone = self._on(values, edges, times)
         left = np.flatnonzero(np.any(offending, axis=1) & ~lost & ~gone)
         edges = linear(edges, lambda array: np.broadcast_to(array, (len(lost), array.shape[1]))[left])
@@ -331,8 +337,8 @@ class _Group:
                 break
             parted = np.any(offending[np.any(offending, axis=1)], axis=0)
             edges = _sorted(_joined(edges, _middles(edges, parted)))
-            own, offending, _ = self._on(picked(values, left), edges, times)
-            reads = {name: _put(read, left, own[name]) for name, read in reads.items()}
+            parts, offending, _ = self._on(picked(values, left), edges, times)
+            reads = {name: _put(read, left, parts[name]) for name, read in reads.items()}
             more = np.flatnonzero(np.any(offending, axis=1))
             left, edges = left[more], _taken(edges, more)
         alone = np.union1d(left, np.flatnonzero(lost & ~gone)).astype(np.intp)
@@ -405,7 +411,14 @@ class _Group:
 
     def _nominal(self, time: Number) -> dict[str, list[Number]]:
         """The parts of the nominal mechanism at times, s, of measures that are judged against it."""
-        parts = self._evaluated(self.values, time)[0] if self.against else {}
+        if not self.against:
+            return {}
+        real = np.asarray(primal(time))
+        once = bool(np.all(real == real[:1]))  # as of mechanisms that differ in their derivatives alone
+        at = (Dual(real[:1], np.ones_like(real[:1])) if isinstance(time, Dual) else real[:1]) if once else time
+        parts = self._evaluated(self.values, at)[0]
+        if once and isinstance(time, Dual):
+            parts = {name: [Dual(primal(p), derivative(p) * time.dual) for p in own] for name, own in parts.items()}
         return {one.name: parts[one.name] for one in self.against}
 
     def _rows(

@@ -22,7 +22,7 @@ __all__ = ["Corner", "search"]
 
 Array = NDArray[np.float64]
 MOST_ROUNDS = 12
-SETTLED = 1e-8  # of the figure: a step that gains less is the last
+SETTLED = 1e-7  # of the figure: a step that gains less is the last
 
 # (real, slope) of the figure for a batch of values, (row,): what is made as large as can be
 Objective = Callable[[Mapping[str, Number], Effects], tuple[Array, Array]]

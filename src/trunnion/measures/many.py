@@ -26,7 +26,7 @@ from trunnion.measures.figures import ENDLESS, Panels, Reading, combined, near
 from trunnion.measures.lines import turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.over_cycle import MOTION, Followed, alike, followed, matters, together
-from trunnion.measures.positions import moved
+from trunnion.measures.positions import moved, within
 from trunnion.solve.run import Run
 from trunnion.solve.switches import (
     MARGINS,
@@ -388,11 +388,8 @@ class _Group:
         """The parts at times of the nominal mechanism, s, (lane, panel, node), the statuses, and the times of each, if
         they are others."""
         run, flat = self.run, linear(time, lambda array: array.reshape(len(array), -1))
-        duration, laps = run.cycle.duration, np.zeros(np.shape(primal(flat)))
-        if run.cycle.periodic and duration > 0:
-            laps = np.floor(primal(flat) / duration)
-            flat = flat - laps * duration
-        own = moved(run, values, flat)
+        place = within(run, flat)
+        own = moved(run, values, place)
         alone = len(primal(own)) == 1
         curves, status = self.kernel.courses(values, linear(own, lambda array: array[0]) if alone else own)
         full = (max(lanes_of(values), len(primal(own))), *np.shape(primal(time))[1:])
@@ -400,13 +397,14 @@ class _Group:
         def shaped(array: Any) -> Any:
             array = np.asarray(array)
             if array.size != np.prod(full):
-                array = np.broadcast_to(array, (full[0], laps.shape[1]))
+                array = np.broadcast_to(array, (full[0], np.prod(full[1:])))
             return array.reshape(full)
 
         parts = {one.name: [linear(part, shaped) for part in curves[one.name]] for one in self.measures}
-        if own is flat:
+        if own is place:
             return parts, shaped(status), None
-        own = own + moved(run, values, np.array([duration])) * laps
+        laps = np.rint((primal(flat) - primal(place)) / run.cycle.duration)
+        own = own + moved(run, values, np.array([run.cycle.duration])) * laps
         return parts, shaped(status), linear(own, lambda array: array.reshape(-1, *full[1:]))
 
     def _nominal(self, time: Number) -> dict[str, list[Number]]:

@@ -16,7 +16,7 @@ from trunnion.errors import Status
 from trunnion.measures.evaluation import Curves, courses_of
 from trunnion.measures.figures import ENDLESS, Panels, Reading, near
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import ends_of, plan
+from trunnion.measures.positions import ends_by_name, within
 from trunnion.results.scales import ROUNDING, Scales
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
@@ -80,10 +80,10 @@ def together(run: Run, measures: Sequence[Measure]) -> list[tuple[tuple[float, .
 
     Raises MechanismError for places and windows that are not in the cycle.
     """
-    plan(run, measures, 1)
     groups: dict[tuple[object, ...], list[Measure]] = {}
+    every = ends_by_name(run, measures)
     for measure in measures:
-        ends = (0.0,) if run.cycle.duration <= 0 else ends_of(run, measure)
+        ends = every[measure.name]
         against = measure.of.against or measure.rule == "deviation"
         key = (ends, measure.wants_margin, measure.of_motion, against and not measure.of_motion)
         groups.setdefault(key if len(ends) != 1 else (ends,), []).append(measure)
@@ -108,17 +108,17 @@ def followed(
 
     evaluate: their parts at times of the cycle, s, and the statuses; breaks: times, s, where they may bend or jump.
     """
-    duration, rows, first = run.cycle.duration, {}, 0
-    start, end = ends or (0.0, duration)
+    rows, first = {}, 0
+    start, end = ends or (0.0, run.cycle.duration)
     gaps = np.zeros((2, 0)) if gaps is None else gaps
-    parts = evaluate(np.array([start % duration if run.cycle.periodic else start]))[0]
+    parts = evaluate(within(run, np.array([start])))[0]
     for measure in measures:
         rows[measure.name] = slice(first, first := first + len(parts[measure.name]))
     angles = {measure.name: _turns(run, measure, start, end) for measure in measures if measure.turning(run.system)}
 
     def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
-        within = time % duration if run.cycle.periodic else time
-        curves, status = evaluate(within)
+        place = within(run, time)
+        curves, status = evaluate(place)
         numbers = np.array(
             [np.broadcast_to(np.ravel(primal(part)), time.shape) for one in measures for part in curves[one.name]]
         )
@@ -126,7 +126,7 @@ def followed(
             numbers[rows[name]] = near(numbers[rows[name]], np.interp(time, grid, angle), TURN)
         endless = np.any(np.isinf(numbers), axis=0)
         numbers[np.isinf(numbers)] = np.nan
-        lost = np.any((gaps[0] < within[:, None]) & (within[:, None] < gaps[1]), axis=1)
+        lost = np.any((gaps[0] < place[:, None]) & (place[:, None] < gaps[1]), axis=1)
         states = np.where(lost, np.maximum(status.ravel(), Status.CONTACT_LOST), status.ravel())
         return numbers, states.astype(np.intp) + ENDLESS * endless
 
@@ -139,7 +139,7 @@ def followed(
 def _turns(run: Run, measure: Measure, start: float, end: float) -> tuple[Array, Array]:
     """An angle without jumps at many times, s, so that others are told by how many turns they are off."""
     time = np.linspace(start, end, 1 + int(np.ceil(TURNED * max(1.0, run.cycle.turns))))
-    walk = run.walk(time % run.cycle.duration if run.cycle.periodic else time)
+    walk = run.walk(within(run, time))
     angle, rate = (
         np.array(np.broadcast_to(np.asarray(primal(number), float), time.shape))
         for number in (measure.curve(walk)[0], measure.coordinate(run.system).rate(walk))

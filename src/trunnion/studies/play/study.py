@@ -36,7 +36,7 @@ from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
-from trunnion.measures.positions import place_of, plan
+from trunnion.measures.positions import place_of, plan, within
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
@@ -220,8 +220,7 @@ def _extremes(run: Run, measures: Sequence[Measure], known: Mapping[str, Play]) 
         time = many.times[measure.name]
         if not np.isfinite(time):
             continue
-        time = time % run.cycle.duration if run.cycle.periodic else time
-        there = _over(run, [measure], known, np.array([time]))
+        there = _over(run, [measure], known, within(run, np.array([time])))
         if measure.kind not in MOTIONS:
             loads, others = _both(run, known, partial(of_figure, many, measure))
             _put(there, 0, loads, slice(None), np.ones(1, bool), others)

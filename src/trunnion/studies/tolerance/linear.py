@@ -22,7 +22,7 @@ from trunnion.measures.lines import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
 from trunnion.measures.over_cycle import follow
-from trunnion.measures.positions import PositionPlan, Window, moved
+from trunnion.measures.positions import PositionPlan, Window, moved, within
 from trunnion.solve.forward import forward
 from trunnion.studies.tolerance.effects import Effects, FirstOrder
 from trunnion.studies.tolerance.search import Corner, search
@@ -247,8 +247,7 @@ def _placed(
     """
     run, measure, time = kernel.run, known.measure, many.spots(known.measure)
     for _ in range(ROUNDS):
-        within = time % run.cycle.duration if run.cycle.periodic and run.cycle.duration > 0 else time
-        curves, _ = kernel.courses(values, moved(run, values, within))
+        curves, _ = kernel.courses(values, moved(run, values, within(run, time)))
         parts = [Dual(*effects.slopes(part, (len(time),))) for part in curves[measure.name]]
         course = FirstOrder(effects, effects.without_noise(_scalar(known, effects, parts)[1]))
         if measure.rule == "peak-to-peak":

@@ -245,7 +245,7 @@ class Reading:
             if len(tops) == 1:
                 return self._apart(tops[0].value, times[0])
             most, least = (top.value for top in tops)
-            figure = namespace(most, least).maximum(most, -least)
+            figure = namespace(most, least).maximum(-least, most)
             if rule == "deviation":
                 return figure, least, most, times[0] * np.nan
             return self._apart(figure, np.where(primal(most) >= -primal(least), *times))

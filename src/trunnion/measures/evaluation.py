@@ -84,10 +84,10 @@ class NumpyKernel:
             status = pose_status(found, shape) if isinstance(found, Forward) else status_of(found, shape)
             return self.curves(found, status), status
 
-    def curves(self, found: Backward | Forward, status: NDArray[np.int8]) -> Curves:
+    def curves(self, solved: Backward | Forward, status: NDArray[np.int8]) -> Curves:
         """The parts of the courses of what is solved."""
         return {
-            measure.name: tuple(where_known(known(measure, status), part) for part in measure.curve(found))
+            measure.name: tuple(where_known(known(measure, status), part) for part in measure.curve(solved))
             for measure in self.measures
         }
 

@@ -212,11 +212,11 @@ class Reading:
             parts = excess * half / np.sum(half, axis=1, keepdims=True)
             return np.asarray((np.sum(parts, axis=1, keepdims=True) > 1.0) & (parts > 1.0 / len(parts[0])))
         panels, of = self.number(panels)
-        grid, found = panels.on_grid(of), np.zeros(tails.shape, bool)
+        grid, near_top = panels.on_grid(of), np.zeros(tails.shape, bool)
         for sign in SIGNS.get(self.measure.rule, BOTH):
             tops = grid.most if sign > 0 else -grid.least
-            found |= tops + 2.0 * tails >= np.max(tops, axis=1, keepdims=True)
-        return np.asarray(found & (excess > 1.0) & panels.wide())
+            near_top |= tops + 2.0 * tails >= np.max(tops, axis=1, keepdims=True)
+        return np.asarray(near_top & (excess > 1.0) & panels.wide())
 
     def number(self, panels: Panels) -> tuple[Panels, Made]:
         """What an extreme is of: rows and the number made of them."""

@@ -217,21 +217,21 @@ class _Group:
         if not self.at_place:
             return self.course.angles
         parts = self._evaluated(self.values, self.edges[:, None, None])[0]
-        return {one.name: (self.edges, np.ravel(primal(parts[one.name][0]))) for one in self.measures}
+        return {measure.name: (self.edges, np.ravel(primal(parts[measure.name][0]))) for measure in self.measures}
 
     @cached_property
     def _scales(self) -> dict[str, float]:
         """What the numbers of each measure are like."""
-        return {one.name: float(alike(self.run, one)) for one in self.measures}
+        return {measure.name: float(alike(self.run, measure)) for measure in self.measures}
 
     @cached_property
     def _sizes(self) -> dict[str, float]:
         """The largest magnitude of the courses of the nominal mechanism, or of what is like them but for rounding."""
         sizes = {}
-        for one in self.measures:
-            own = np.max(self.course.courses.sizes[self.course.rows[one.name]])
-            attitude = one.of_attitude(self.run.system)
-            sizes[one.name] = 1.0 if attitude else float(max(own, ROUNDING * self._scales[one.name]))
+        for measure in self.measures:
+            own = np.max(self.course.courses.sizes[self.course.rows[measure.name]])
+            attitude = measure.of_attitude(self.run.system)
+            sizes[measure.name] = 1.0 if attitude else float(max(own, ROUNDING * self._scales[measure.name]))
         return sizes
 
     def tune(self, values: Values) -> None:
@@ -400,7 +400,7 @@ class _Group:
                 array = np.broadcast_to(array, (full[0], np.prod(full[1:])))
             return array.reshape(full)
 
-        parts = {one.name: [linear(part, shaped) for part in curves[one.name]] for one in self.measures}
+        parts = {measure.name: [linear(part, shaped) for part in curves[measure.name]] for measure in self.measures}
         if own is place:
             return parts, shaped(status), None
         laps = np.rint((primal(flat) - primal(place)) / run.cycle.duration)
@@ -417,7 +417,7 @@ class _Group:
         parts = self._evaluated(self.values, at)[0]
         if once and isinstance(time, Dual):
             parts = {name: [Dual(primal(p), derivative(p) * time.dual) for p in own] for name, own in parts.items()}
-        return {one.name: parts[one.name] for one in self.against}
+        return {measure.name: parts[measure.name] for measure in self.against}
 
     def _rows(
         self,
@@ -508,9 +508,9 @@ class _Group:
         for lanes in _blocks(lanes_of(values), ALONE):
             for course in self._courses(picked(values, lanes)):
                 status, row = np.array([np.max(course.states % ENDLESS)], np.int8), 0
-                for one in self.measures:
-                    panels = Panels.of(course, slice(row, row := row + self._row_counts[one.name]))
-                    reads[one.name].append(self._read(one, panels, status, times))
+                for measure in self.measures:
+                    panels = Panels.of(course, slice(row, row := row + self._row_counts[measure.name]))
+                    reads[measure.name].append(self._read(measure, panels, status, times))
         return {name: Read.of(_after, *parts) for name, parts in reads.items()}
 
     @cached_property
@@ -518,8 +518,8 @@ class _Group:
         """How many rows the figure of each measure is read of."""
         system, rows = self.run.system, self.course.rows
         return {
-            one.name: 1 if one.of_attitude(system) else rows[one.name].stop - rows[one.name].start
-            for one in self.measures
+            measure.name: 1 if measure.of_attitude(system) else rows[measure.name].stop - rows[measure.name].start
+            for measure in self.measures
         }
 
     def _courses(self, values: Values) -> list[Courses]:
@@ -541,7 +541,7 @@ class _Group:
             panels = time[:, None]
             parts, status, _ = self._evaluated(picked(values, lanes), panels)
             nominal = self._nominal(panels)
-            rows = [np.asarray(self._rows(one, parts, nominal, panels))[:, :, 0] for one in self.measures]
+            rows = [np.asarray(self._rows(measure, parts, nominal, panels))[:, :, 0] for measure in self.measures]
             numbers = np.concatenate(rows)
             endless = np.any(np.isinf(numbers), axis=0)
             numbers[np.isinf(numbers)] = np.nan

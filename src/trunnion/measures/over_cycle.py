@@ -58,9 +58,9 @@ def figures_of(
         else:
             course, slices, _ = _settled(run, group, method, ends, gaps)
             panels = {name: Panels.of(course, own) for name, own in slices.items()}
-        for one in group:
-            figure = float(np.ravel(Reading(run, one, ends).read(panels[one.name]).figure)[0])
-            figures[one.name] = 0.0 * figure if one.against_nominal(run.system) else figure
+        for measure in group:
+            figure = float(np.ravel(Reading(run, measure, ends).read(panels[measure.name]).figure)[0])
+            figures[measure.name] = 0.0 * figure if measure.against_nominal(run.system) else figure
     return {measure.name: figures[measure.name] for measure in measures}
 
 
@@ -119,9 +119,8 @@ def followed(
     def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
         place = within(run, time)
         curves, status = evaluate(place)
-        numbers = np.array(
-            [np.broadcast_to(np.ravel(primal(part)), time.shape) for one in measures for part in curves[one.name]]
-        )
+        each = (part for measure in measures for part in curves[measure.name])
+        numbers = np.array([np.broadcast_to(np.ravel(primal(part)), time.shape) for part in each])
         for name, (grid, angle) in angles.items():
             numbers[rows[name]] = near(numbers[rows[name]], np.interp(time, grid, angle), TURN)
         endless = np.any(np.isinf(numbers), axis=0)
@@ -130,7 +129,7 @@ def followed(
         states = np.where(lost, np.maximum(status.ravel(), Status.CONTACT_LOST), status.ravel())
         return numbers, states.astype(np.intp) + ENDLESS * endless
 
-    scales = np.repeat([alike(run, one) for one in measures], [len(parts[one.name]) for one in measures])
+    scales = np.concatenate([np.full(len(parts[measure.name]), alike(run, measure)) for measure in measures])
     between = breaks_between(run.cycle, np.concatenate([breaks, gaps.ravel()]), start, end)
     courses = Courses.of(look, between, lambda sizes: np.maximum(sizes, scales), accuracy_of(run.cycle, accuracy))
     return Followed(courses, rows, angles)

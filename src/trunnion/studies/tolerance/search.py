@@ -1,9 +1,9 @@
 """The worst case on the mechanism itself: the corner of the tolerance box that first order names, followed and re-run.
 
 From the linear corner, derivatives are taken again at the corner until it stays the same or gains nothing; then every
-number is moved to its other limit alone, and to nominal, and the best of these is kept as long as it is better. Pins lie at the rims of
-their holes, turned as the loads at the corner say. It finds the worst corner of a measure that is monotone in each
-number over its tolerance, and of others the best that such steps reach.
+number is moved to its other limit alone, and to nominal, and the best of these is kept as long as it is better. Pins
+lie at the rims of their holes, turned as the loads at the corner say. It finds the worst corner of a measure that is
+monotone in each number over its tolerance, and of others the best that such steps reach.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ there, and 0 where the slider does not come so far.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import trunnion
-from measured import many
+from measured import many, reads
 from trunnion.measures.measures import named
 from trunnion.measures.over_cycle import figures_of
 from trunnion.solve.friction_method import FrictionMethod
@@ -154,3 +155,16 @@ def test_a_seat_that_moves_the_load_far() -> None:
     ).sel(measure="power")
     assert float(study["nominal"]) == pytest.approx(-FORCE * (R + ROD + play - touch) / TIME, rel=1e-7)
     assert float(study["worst_case_upper"]) == pytest.approx(FORCE / TIME * 1e-4, rel=1e-6)
+
+
+def test_courses_of_others_are_shown_where_their_jumps_go_over_the_start() -> None:
+    """The piston turns round at 0°, where friction jumps; off its guide line it does so before or after."""
+    model = trunnion.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml")
+    run = prepare(model)
+    [measure] = named(run.system.mechanism, ["maximum:effort:O"], run.values)
+    offsets = np.array([[-1e-4], [0.0], [1e-4]])
+    shown = reads(run, [measure], {"dimensions.offset": offsets}, 24)[measure.name].shown
+    for offset, course in zip(offsets[:, 0].tolist(), np.asarray(shown), strict=True):
+        moved = model.with_values({"dimensions.offset": offset})
+        beside = run.cycle.times(24) + 1e-7 * run.cycle.duration
+        assert course == pytest.approx(prepare(moved).solve(beside).efforts["O"], rel=1e-3)

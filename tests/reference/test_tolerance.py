@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from toleranced import (
 )  # fmt: skip
 from toleranced import slider_crank as sized_slider
 from trunnion import Mechanism
+from trunnion.studies.tolerance.first_order import study
 
 FAST = ("linear", "worst-case")
 Case = tuple[Callable[..., Mechanism], Callable[..., Any], dict[str, float]]
@@ -505,3 +507,13 @@ def test_worst_case_of_figures_of_a_course() -> None:
         assert at["searched_lower"].item() == pytest.approx(min(one[name][0] for one in corners), rel=1e-4, abs=1e-15)
         if name != "rms":  # of which first order takes the largest instead
             assert at["worst_case_upper"].item() == pytest.approx(at["searched_upper"].item(), rel=0.01)
+
+
+def test_the_search_for_a_corner_ends_where_a_step_gains_nothing() -> None:
+    """Pins go on to turn in their holes long after the figure has settled."""
+    ready = study(trunnion.read(Path(__file__).parents[2] / "examples" / "toleranced-slider-crank.yaml"))
+    corners = [end for ends in ready.worst() for end in ends]
+    assert max(end.rounds for end in corners) < 8
+    # of all twelve steps, on panels of their own in each
+    every = [-1.709756288e-4, 1.708035261e-4, -0.259497913]
+    assert [end.value for end in corners[:3]] == pytest.approx(every, rel=3e-8)

@@ -86,26 +86,30 @@ def spread_out(coefficients: Array, low: Array, half: Array, time: Array) -> Arr
     low, half: starts and half widths of the panels, (lane, panel), one lane if they are those of all.
     """
     found, near = np.full((*coefficients.shape[:2], len(time)), np.nan), 1e-12 * np.ptp(time)
-    for k in range(low.shape[1]):
-        start, width, own = low[:, k, None], 2.0 * half[:, k, None], coefficients[:, :, k]
-        if not np.any(width > 0.0):
+    width = 2.0 * half
+    first, last = np.searchsorted(time, [np.min(low, axis=0) - near, np.max(low + width, axis=0) + near])
+    shared = np.all((low == low[0]) & (width == width[0]), axis=0)
+    scale = 2.0 / np.where(width > 0.0, width, np.nan)
+    for k in np.flatnonzero((last > first) & np.any(width > 0.0, axis=0)):
+        part = slice(first[k], last[k])
+        if shared[k]:
+            found[..., part] = coefficients[:, :, k] @ _basis((time[part] - low[0, k]) * scale[0, k] - 1.0)
             continue
-        lane = slice(*np.searchsorted(time, [np.min(start) - near, np.max(start + width) + near]))
-        spot = 2.0 * (time[lane] - start) / np.where(width > 0.0, width, np.nan) - 1.0
-        if np.all(start == start[0]) and np.all(width == width[0]):
-            found[..., lane] = own @ _basis(spot[0])
-        else:
-            inside = np.abs(spot) <= 1.0 + 1e-9
-            found[..., lane] = np.where(inside, _clenshaw(own, spot), found[..., lane])
+        spot = (time[part] - low[:, k, None]) * scale[:, k, None] - 1.0
+        inside = np.abs(spot) <= 1.0 + 1e-9
+        found[..., part] = np.where(inside, _clenshaw(coefficients[:, :, k], spot), found[..., part])
     return found
 
 
 def _clenshaw(own: Array, spot: Array) -> Array:
     """Values of polynomials, (row, lane, coefficient), at spots of each lane, (lane, place)."""
-    after: Array | float = 0.0
-    value, twice = own[..., -1:], 2.0 * spot
+    twice, after = 2.0 * spot, np.zeros(np.broadcast_shapes((*own.shape[:-1], 1), spot.shape))
+    value, new = after + own[..., -1:], np.empty_like(after)
     for k in range(ORDER - 2, 0, -1):
-        after, value = value, own[..., k, None] + twice * value - after
+        np.multiply(twice, value, out=new)
+        new -= after
+        new += own[..., k, None]
+        after, value, new = value, new, after
     return np.asarray(own[..., :1] + spot * value - after)
 
 

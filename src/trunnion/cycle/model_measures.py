@@ -14,7 +14,7 @@ from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.over_cycle import figures_of
-from trunnion.measures.positions import plan
+from trunnion.measures.positions import plan, within
 from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
@@ -161,8 +161,7 @@ def _beside_switch(run: Run, time: Array, places: NDArray[np.intp]) -> bool:
 def _resting_on(run: Run, measure: Measure, values: Array, time: Array) -> NDArray[np.intp]:
     """Positions that a figure is of, nearest to it: those of its extremes, or all of its window."""
     window = plan(run, [measure], len(time)).windows[measure.name]
-    duration = run.cycle.duration
-    places = window.time % duration if run.cycle.periodic and duration > 0 else window.time
+    duration, places = run.cycle.duration, within(run, window.time)
     more = [duration] if run.cycle.periodic and duration > 0 else []  # after the last position the first one again
     index = np.unique(np.rint(np.interp(places, [*time, *more], range(len(time) + len(more)))).astype(int) % len(time))
     course = values[index]

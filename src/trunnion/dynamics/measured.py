@@ -16,8 +16,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.dynamics.batch import figures_in_time, one_by_one
 from trunnion.dynamics.prepared import CYCLES
 from trunnion.errors import Finding
-from trunnion.measures.evaluation import Curves, NumpyKernel, shape_of
-from trunnion.measures.many import step_of
+from trunnion.measures.evaluation import Curves, NumpyKernel, shape_of, step_of
 from trunnion.measures.measures import Measure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run

@@ -15,7 +15,8 @@ import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.measures.motion import MOTIONS, MotionRequest, component
+from trunnion.measures import motion
+from trunnion.measures.motion import MotionRequest, component
 from trunnion.measures.transmission import of_joint
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, SpatialWalk
@@ -31,19 +32,14 @@ Course = Callable[[MotionRequest, Any], tuple[Number, ...]]
 # ---- of the places --------------------------------------------------------------------------------------------
 
 
-def _motion(measure: MotionRequest, walk: Forward, of: str = "") -> Number:
-    kind = MOTIONS[of or measure.kind]
-    return kind.value_in_space(measure, walk) if isinstance(walk, SpatialWalk) else kind.value(measure, walk)
-
-
 def value(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """The number of the motion itself."""
-    return (_motion(measure, walk),)
+    return (motion.value(measure, walk),)
 
 
 def of_joint_motion(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
     """The rotation of a joint, or the slide of one that does not turn."""
-    return (_motion(measure, walk, "rotation" if walk.system.turns(measure.subject) else "slide"),)
+    return (motion.value(measure, walk, "rotation" if walk.system.turns(measure.subject) else "slide"),)
 
 
 def attitude(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
 from trunnion.measures.figures import known
@@ -23,9 +23,11 @@ from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.status import pose_status, status_of
 
-__all__ = ["Curves", "Kernel", "NumpyKernel", "courses_of", "shape_of", "where_known"]
+__all__ = ["Curves", "Kernel", "NumpyKernel", "courses_of", "lanes_of", "picked", "shape_of", "step_of", "where_known"]
 
+Array = NDArray[np.float64]
 Curves = dict[str, tuple[Number, ...]]  # the parts of the course of each measure
+STEP, STEP_OF_NONE = 1e-3, 1e-4  # of a number, and of the size of the mechanism for one that is 0: of a difference
 
 
 class Kernel(Protocol):
@@ -77,16 +79,17 @@ class NumpyKernel:
 
         NaN where a status rules it out.
         """
-        found = self.solved(values, time)
-        shape = shape_of(values, time)
+        found, shape = self.solved(values, time), shape_of(values, time)
         with np.errstate(all="ignore"):
             status = pose_status(found, shape) if isinstance(found, Forward) else status_of(found, shape)
-            courses = {measure.name: self._course(measure, found, status) for measure in self.measures}
-        return courses, status
+            return self.curves(found, status), status
 
-    def _course(self, measure: Measure, found: Backward | Forward, status: NDArray[np.int8]) -> tuple[Number, ...]:
-        there = known(measure, status)
-        return tuple(where_known(there, part) for part in measure.curve(found))
+    def curves(self, solved: Backward | Forward, status: NDArray[np.int8]) -> Curves:
+        """The parts of the courses of what is solved."""
+        return {
+            measure.name: tuple(where_known(known(measure, status), part) for part in measure.curve(solved))
+            for measure in self.measures
+        }
 
 
 def courses_of(
@@ -103,17 +106,42 @@ def courses_of(
         seated = seating_of(run, kernel.method).at(time, kernel.method)
         status = status_of(seated.back, time.shape)
         np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
-        found = {
-            measure.name: tuple(where_known(known(measure, status), part) for part in measure.curve(seated.back))
-            for measure in measures
-        }
-    return found, status
+        return kernel.curves(seated.back, status), status
 
 
 def shape_of(values: Mapping[str, Number], time: Number) -> tuple[int, ...]:
     """(sample, position) of a batch."""
     shapes = {number.shape for number in values.values() if isinstance(number, (Dual, np.ndarray))}
     return np.broadcast_shapes(np.shape(time), *shapes)
+
+
+def lanes_of(values: Mapping[str, Number]) -> int:
+    """How many mechanisms values are of."""
+    shape = shape_of(values, np.zeros(1))
+    return shape[0] if len(shape) == 2 else 1
+
+
+def picked(values: Mapping[str, Number], lanes: NDArray[np.intp]) -> dict[str, Number]:
+    """The numbers of some mechanisms."""
+    return {
+        path: value[lanes] if np.ndim(primal(value)) == 2 and len(primal(value)) > 1 else value
+        for path, value in values.items()
+    }
+
+
+def step_of(run: Run, values: Mapping[str, Number], count: int) -> Array:
+    """By how much each mechanism is moved along its derivatives for a difference, (lane, 1); 0 of one without any."""
+    size = float(np.ravel(primal(run.system.size(run.values)))[0])
+    step = np.zeros((count, 1))
+    for value in values.values():
+        if not isinstance(value, Dual):
+            continue
+        slope = np.abs(np.broadcast_to(derivative(value), (count, 1)))
+        number = np.abs(np.broadcast_to(primal(value), (count, 1)))
+        with np.errstate(all="ignore"):
+            own = np.where(number > 1e-9 * size, STEP * number / slope, STEP_OF_NONE * size / slope)
+        step = np.where((slope > 0) & ((own < step) | (step == 0)), own, step)
+    return step
 
 
 def where_known(known: NDArray[np.bool_], number: Number) -> Number:

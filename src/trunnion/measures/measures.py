@@ -13,10 +13,10 @@ from typing import Any, cast
 import numpy as np
 from pydantic import ValidationError
 
-from trunnion.algebra import space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
+from trunnion.measures import motion
 from trunnion.measures.curves import CURVES
 from trunnion.measures.motion import AXES, MOTIONS
 from trunnion.model.checks.measures import check_measure
@@ -27,7 +27,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest
 from trunnion.model.parts import Measure as Stated
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward, SpatialWalk
+from trunnion.solve.forward import Forward
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.system import System, Values
 
@@ -141,10 +141,14 @@ class Measure:
         """Whether the figure is a place in the cycle."""
         return self.rule.startswith(("place", "dead"))
 
+    def against_nominal(self, system: System) -> bool:
+        """Whether it is judged against the nominal mechanism."""
+        return self.of.against or self.of_attitude(system) or self.rule == "deviation"
+
     def turning(self, system: System) -> bool:
         """Whether the course is an angle, which may gain whole turns."""
-        motion = self.coordinate(system)
-        return motion.kind in MOTIONS and motion.unit(system) == "rad" and not self.of_attitude(system)
+        own = self.coordinate(system)
+        return own.kind in MOTIONS and own.unit(system) == "rad" and not self.of_attitude(system)
 
     def of_attitude(self, system: System) -> bool:
         """Whether it is the turn of a link in space from where it lies in the nominal mechanism."""
@@ -168,27 +172,15 @@ class Measure:
 
     def value(self, walk: Forward) -> Number:
         """The measure of the motion, m or rad; the turn of a link in space is from where it lies without errors: 0."""
-        kind = MOTIONS[self.kind]
-        return kind.value_in_space(self, walk) if isinstance(walk, SpatialWalk) else kind.value(self, walk)
+        return motion.value(self, walk)
 
     def loads(self, walk: Forward) -> dict[str, Any]:
-        """The unit loads by link: their power is the rate of the measure. About the global origin.
-
-        They are equal and opposite on the two links of a joint.
-        """
-        kind = MOTIONS[self.kind]
-        return kind.loads_in_space(self, walk) if isinstance(walk, SpatialWalk) else kind.loads(self, walk)
+        """The unit loads by link: their power is the rate of the measure; see `motion.loads`."""
+        return motion.loads(self, walk)
 
     def rate(self, walk: Forward) -> Number:
         """ẏ, by the power of the unit loads."""
-        total: Number = 0.0
-        for link, load in self.loads(walk).items():
-            twist = walk.motions[link].twist
-            if isinstance(walk, SpatialWalk):
-                total = total + space.power(load, twist)
-            else:
-                total = total + (load.x * twist.x + load.y * twist.y + load.m * twist.w)
-        return total
+        return motion.rate(self, walk)
 
 
 def coordinate_unit(system: System, values: Values) -> str:
@@ -296,8 +288,8 @@ def outputs(system: System) -> list[Measure]:
     """Rotation and slide of every joint to the ground that is not driven."""
     ground, drivers = system.mechanism.fixed_link, system.mechanism.drivers
     return [
-        Measure(f"{motion}:{name}", motion, name)
+        Measure(f"{freedom}:{name}", freedom, name)
         for name, (kind, links) in system.joints.items()
         if ground in links and name not in drivers
-        for motion in motions(kind)
+        for freedom in motions(kind)
     ]

@@ -22,7 +22,7 @@ from trunnion.solve.system import System, Values
 if TYPE_CHECKING:
     from trunnion.solve.run import Run
 
-__all__ = ["PositionPlan", "Window", "ends_of", "gain_of", "moved", "path_of", "place_of", "plan"]
+__all__ = ["PositionPlan", "Window", "ends_by_name", "gain_of", "moved", "path_of", "place_of", "plan", "within"]
 
 Array = NDArray[np.float64]
 
@@ -79,35 +79,18 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
 
     Raises MechanismError for places and windows that are not in the cycle.
     """
-    duration = run.cycle.duration
-    findings: list[Finding] = []
-    if duration <= 0:
-        for measure in measures:
-            if measure.of_place or measure.at is not None or measure.over is not None:
-                what = "nothing moves: a cycle has no positions"
-                findings.append(Finding(what, f"measures.{measure.name}", "remove at and over"))
-        if findings:
-            raise MechanismError(findings)
-        nothing = np.zeros(1)
-        one = Window(np.zeros(1, np.intp), nothing)
-        return PositionPlan(run, nothing, {measure.name: one for measure in measures})
-    ends: dict[str, tuple[float, ...]] = {}
-    for measure in measures:
-        try:
-            ends[measure.name] = ends_of(run, measure)
-        except MechanismError as error:
-            findings += error.findings
-    if findings:
-        raise MechanismError(findings)
-    grid = run.cycle.times(steps) if any(len(found) != 1 for found in ends.values()) else np.zeros(0)
-    extra = [_within(run, np.array(found)) for found in ends.values()]
-    times = np.unique(np.concatenate([grid, *extra]))
-    return PositionPlan(run, times, {name: _window(run, found, times, grid) for name, found in ends.items()})
+    ends = ends_by_name(run, measures)
+    grid = run.cycle.times(steps) if any(len(own) != 1 for own in ends.values()) else np.zeros(0)
+    times = np.unique(np.concatenate([grid, *(within(run, np.array(own)) for own in ends.values())]))
+    return PositionPlan(run, times, {name: _window(run, own, times, grid) for name, own in ends.items()})
 
 
-def _within(run: Run, times: Array) -> Array:
+def within(run: Run, times: Number) -> Number:
     """Times within the cycle, s, of such as may run over its end."""
-    return times % run.cycle.duration if run.cycle.periodic else times
+    if not run.cycle.periodic or run.cycle.duration <= 0:
+        return times
+    real = primal(times) % run.cycle.duration
+    return Dual(real, times.dual) if isinstance(times, Dual) else real
 
 
 def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
@@ -151,9 +134,29 @@ def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array) -> Win
 # ---- places and windows as they are stated --------------------------------------------------------------------
 
 
-def ends_of(run: Run, measure: Measure) -> tuple[float, ...]:
-    """Times, s, of the place or of both ends of the window of a measure; none if it is of the whole cycle."""
+def ends_by_name(run: Run, measures: Sequence[Measure]) -> dict[str, tuple[float, ...]]:
+    """Times, s, of the place or of both ends of the window of each measure; none if it is of the whole cycle.
+
+    Raises MechanismError for places and windows that are not in the cycle.
+    """
+    ends: dict[str, tuple[float, ...]] = {}
+    findings: list[Finding] = []
+    for measure in measures:
+        try:
+            ends[measure.name] = _ends_of(run, measure)
+        except MechanismError as error:
+            findings += error.findings
+    if findings:
+        raise MechanismError(findings)
+    return ends
+
+
+def _ends_of(run: Run, measure: Measure) -> tuple[float, ...]:
     where = f"measures.{measure.name}"
+    if run.cycle.duration <= 0:
+        if measure.of_place or measure.at is not None or measure.over is not None:
+            raise MechanismError(Finding("nothing moves: a cycle has no positions", where, "remove at and over"))
+        return (0.0,)
     name = next(iter(run.system.mechanism.drivers))
     if measure.of_place and not run.system.span(run.values, name).one_way:
         what = f"the figure is a coordinate of '{name}', which is not unique: it moves back and forth"

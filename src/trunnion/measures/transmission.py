@@ -37,24 +37,23 @@ def pressure_angle(pose: Any) -> Number | None:
 
 def pressure_angles(walk: Forward) -> dict[str, Number]:
     """Pressure angle of every dyad along a walk in the plane, by its joints' names."""
-    found: dict[str, Number] = {}
-    with np.errstate(all="ignore"):
-        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
-            angle = pressure_angle(pose)
-            if angle is not None:
-                found["-".join(module.joints)] = angle
-    return found
+    return {"-".join(joints): angle for joints, angle in _angles(walk).items()}
 
 
 def of_joint(walk: Forward, joint: str) -> Number:
     """Pressure angle of the dyad that a joint is of; MechanismError if it is of none."""
-    found: dict[str, Number] = {}
-    for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
-        angle = pressure_angle(pose)
-        if angle is not None:
-            found |= dict.fromkeys(module.joints, angle)
-    if joint not in found:
+    angles = {name: angle for joints, angle in _angles(walk).items() for name in joints}
+    if joint not in angles:
         what = f"'{joint}' is no joint of a dyad, which alone has a transmission angle"
-        known = f"those of a dyad are {', '.join(found)}" if found else "this mechanism has no dyad"
-        raise MechanismError(Finding(what, f"joints.{joint}", known))
-    return found[joint]
+        those = f"those of a dyad are {', '.join(angles)}" if angles else "this mechanism has no dyad"
+        raise MechanismError(Finding(what, f"joints.{joint}", those))
+    return angles[joint]
+
+
+@np.errstate(all="ignore")
+def _angles(walk: Forward) -> dict[tuple[str, ...], Number]:
+    angles = {
+        tuple(module.joints): pressure_angle(pose)
+        for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True)
+    }
+    return {joints: angle for joints, angle in angles.items() if angle is not None}

@@ -37,7 +37,7 @@ from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, named, outputs
 from trunnion.measures.motion import MOTIONS
-from trunnion.measures.positions import place_of, plan
+from trunnion.measures.positions import place_of, plan, within
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import strict_keywords
@@ -217,8 +217,7 @@ def _theres(run: Run, measures: Sequence[Measure], known: Mapping[str, Play]) ->
             found[measure.name] = _over(run, [measure], known, plan(run, [measure], 1).times)
         elif measure.rule in EXTREMES:
             many = Many(run, [measure], run.values, lambda some: NumpyKernel(run, some, FrictionMethod()))
-            time = many.times[measure.name] % (run.cycle.duration if run.cycle.periodic else np.inf)
-            there = _over(run, [measure], known, np.array([time if np.isfinite(time) else 0.0]))
+            there = _over(run, [measure], known, within(run, np.nan_to_num([many.times[measure.name]])))
             if measure.kind not in MOTIONS:
                 loads, others = _both(run, known, partial(of_figure, many, measure))
                 _put(there, 0, loads, slice(None), np.ones(1, bool), others)

@@ -60,7 +60,7 @@ class Effects:
     rows: tuple[EffectRow, ...]
 
     def values(self, at: Mapping[str, float] | None = None) -> dict[str, Number]:
-        """Numbers of the mechanism: duals (row, 1) where a row sets or moves them, about a point.
+        """Numbers of the mechanism, (row, 1) where a row sets or moves them, about a point: duals if any row moves one.
 
         at: what is not nominal there, as `corner` gives it.
         """
@@ -73,7 +73,9 @@ class Effects:
             nominal = float(np.ravel(primal(self.inputs.run.values.get(path, 0.0)))[0])
             start = about.get(path, nominal)
             real = np.array([[row.real.get(path, start) - nominal] for row in self.rows])
-            number = Dual(real, np.array([[1.0 if row.seed == path else 0.0] for row in self.rows]))
+            number: Number = real
+            if any(row.seed for row in self.rows):
+                number = Dual(real, np.array([[1.0 if row.seed == path else 0.0] for row in self.rows]))
             (seats if path.startswith(OFFSETS) else deviations)[path] = number
         values = self.inputs.run.system.mechanism.parameters(deviations=deviations)
         for joint in self.inputs.held:

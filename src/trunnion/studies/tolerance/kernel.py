@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
@@ -64,7 +65,9 @@ class CompiledCourses:
         self._compiled.check(values)
 
     def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
-        """As `NumpyKernel.courses`, of plain numbers."""
+        """As `NumpyKernel.courses`; that takes dual numbers."""
+        if any(isinstance(number, Dual) for number in (time, *values.values())):
+            return self.numpy.courses(values, time)
         curves, status = self._compiled.curves(values, np.asarray(time, float))
         found: Curves = {measure.name: () for measure in self.numpy.measures}
         for name, (measure, _) in self._parts.items():
@@ -110,9 +113,6 @@ def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: Fri
     def kernels(some: Sequence[Measure]) -> Kernel:
         return kernel_of(engine, run, some, friction)
 
-    def duals(some: Sequence[Measure]) -> Kernel:
-        return MotionKernel(run, some, friction)
-
-    many = Many(run, measures, inputs.nominal, kernels, duals)
+    many = Many(run, measures, inputs.nominal, kernels)
     many.tune(inputs.values(uniforms(0, 0, inputs.dims, PILOTS)))
     return many

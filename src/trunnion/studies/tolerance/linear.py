@@ -18,11 +18,11 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import selected
 from trunnion.measures.evaluation import NumpyKernel
-from trunnion.measures.figures import follow
 from trunnion.measures.lines import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
-from trunnion.measures.positions import PositionPlan, Window, moved
+from trunnion.measures.over_cycle import follow
+from trunnion.measures.positions import PositionPlan, Window, moved, within
 from trunnion.solve.forward import forward
 from trunnion.studies.tolerance.effects import Effects, FirstOrder
 from trunnion.studies.tolerance.search import Corner, search
@@ -105,7 +105,7 @@ def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str,
             rate = np.broadcast_to(np.asarray(primal(measure.coordinate(system).rate(walk)), float), plan.times.shape)
             follow(parts[0], rate[window.index], window.time)
         attitude = measure.of_attitude(system)
-        against = measure.of.against or attitude or measure.rule == "deviation"
+        against = measure.against_nominal(system)
         figure, time = many.figures[measure.name], many.times[measure.name]
         found[measure.name] = Reference(measure, window, tuple(parts), figure, time, turning, attitude, against)
     return found
@@ -118,10 +118,11 @@ def linear(
     values = effects.values()
     courses, status = _courses(kernel, plan, effects, values)
     lines = {name: one.window.time for name, one in known.items() if one.measure.rule == "line"}
-    reads = many.read(values, lines)
-    found = []
+    wanted = [measure for measure in kernel.measures if _rated(known[measure.name]) or measure.name in lines]
+    some = many if len(wanted) == len(kernel.measures) else many.only(wanted)
+    reads, found = some.read(values, lines), []
     for measure in kernel.measures:
-        one, read = known[measure.name], reads[measure.name]
+        one, read = known[measure.name], reads.get(measure.name)
         there = _placed(replace(kernel, measures=[measure]), effects, values, one, many) if by_position(one) else None
         found.append(_of(one, effects, courses[measure.name], read, there))
     return Linear(effects, plan, found, status[0])
@@ -150,17 +151,18 @@ def _courses(
     return found, status
 
 
-def _of(known: Reference, effects: Effects, course: Course, read: Read, there: tuple[float, Array] | None) -> Of:
-    """First order of one measure. there: where a figure is that is taken at the worst position, and its derivatives."""
+def _of(known: Reference, effects: Effects, course: Course, read: Read | None, there: tuple[float, Array] | None) -> Of:
+    """First order of one measure. read: of its figure, or of the line that it is of; there: where a figure is that is
+    taken at the worst position, and its derivatives."""
     measure, window, time = known.measure, known.window, known.time
     parts = [Dual(part.real[:, window.index], part.dual[:, window.index]) for part in course]
-    real, slope = _scalar(known, effects, parts, read.shown)
+    real, slope = _scalar(known, effects, parts, read.shown if read else 0.0)
     whole = FirstOrder(effects, effects.without_noise(slope))
     lead, place = None, -1
     if there is not None:
         time, steep = there
         place = int(np.argmin(np.abs(window.time - time))) if np.isfinite(time) else -1
-    elif (known.against and measure.rule not in ("mean", "value")) or measure.kind == "path_error":
+    elif read is None or not _rated(known):
         steep = np.full(len(real), np.nan)
         lead = FirstOrder(effects, whole.slope[:, _top(whole.total.upper)])
     else:
@@ -203,6 +205,12 @@ def by_position(known: Reference) -> bool:
     return rule == "deviation" or (known.against and rule in ("maximum", "minimum", "largest", "peak-to-peak"))
 
 
+def _rated(known: Reference) -> bool:
+    """Whether the figure has derivatives at the nominal mechanism, which those of most deviations from it have not."""
+    rule, kind = known.measure.rule, known.measure.kind
+    return not by_position(known) and kind != "path_error" and (rule in ("mean", "value") or not known.against)
+
+
 def _scalar(known: Reference, effects: Effects, parts: Sequence[Dual], line: Number = 0.0) -> tuple[Array, Array]:
     """One number a position, (row, position), with its derivative, that stands for the course.
 
@@ -239,8 +247,7 @@ def _placed(
     """
     run, measure, time = kernel.run, known.measure, many.spots(known.measure)
     for _ in range(ROUNDS):
-        within = time % run.cycle.duration if run.cycle.periodic and run.cycle.duration > 0 else time
-        curves, _ = kernel.courses(values, moved(run, values, within))
+        curves, _ = kernel.courses(values, moved(run, values, within(run, time)))
         parts = [Dual(*effects.slopes(part, (len(time),))) for part in curves[measure.name]]
         course = FirstOrder(effects, effects.without_noise(_scalar(known, effects, parts)[1]))
         if measure.rule == "peak-to-peak":
@@ -273,7 +280,7 @@ def searched(many: Many, found: Linear, of: Of) -> tuple[Corner, Corner]:
 
     Of a figure over all positions: the least and the largest deviation of the course from nominal anywhere.
     """
-    alone = many.alone(of.measure)
+    alone = many.only([of.measure])
 
     def ends(sign: float) -> Corner:
         def objective(values: Mapping[str, Number], effects: Effects) -> tuple[Array, Array]:
@@ -281,6 +288,7 @@ def searched(many: Many, found: Linear, of: Of) -> tuple[Corner, Corner]:
             return effects.slopes(read.most if sign > 0 else read.least, ())
 
         start = of.lead.corner(sign)
+        alone.tune(found.effects.values(start))
         return search(found.effects, objective, start, sign, bool(np.isfinite(of.reference.figure)))
 
     return ends(-1.0), ends(1.0)

@@ -1,9 +1,9 @@
 """The worst case on the mechanism itself: the corner of the tolerance box that first order names, followed and re-run.
 
-From the linear corner, derivatives are taken again at the corner until it stays the same; then every number is moved
-to its other limit alone, and to nominal, and the best of these is kept as long as it is better. Pins lie at the rims of
-their holes, turned as the loads at the corner say. It finds the worst corner of a measure that is monotone in each
-number over its tolerance, and of others the best that such steps reach.
+From the linear corner, derivatives are taken again at the corner until it stays the same or gains nothing; then every
+number is moved to its other limit alone, and to nominal, and the best of these is kept as long as it is better. Pins
+lie at the rims of their holes, turned as the loads at the corner say. It finds the worst corner of a measure that is
+monotone in each number over its tolerance, and of others the best that such steps reach.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ __all__ = ["Corner", "search"]
 
 Array = NDArray[np.float64]
 MOST_ROUNDS = 12
+SETTLED = 1e-7  # of the figure: a step that gains less is the last
 
 # (real, slope) of the figure for a batch of values, (row,): what is made as large as can be
 Objective = Callable[[Mapping[str, Number], Effects], tuple[Array, Array]]
@@ -48,9 +49,10 @@ def search(effects: Effects, objective: Objective, start: Mapping[str, float], s
     at, best, assembles = dict(start), Corner(0.0 if among else np.nan, {}, 0), True  # the nominal mechanism
     for rounds in range(1, MOST_ROUNDS + 1):
         real, slope = objective(effects.values(at), effects)
-        best = _better(best, Corner(float(real[0]), at, rounds), sign)
+        before, best = best, _better(best, Corner(float(real[0]), at, rounds), sign)
         assembles = assembles and (rounds > 1 or bool(np.isfinite(real[0])))
-        if not np.all(np.isfinite(slope)):
+        settled = rounds > 1 and abs(best.value - before.value) <= SETTLED * abs(best.value)
+        if settled or not np.all(np.isfinite(slope)):
             break
         turned = FirstOrder(effects, slope).corner(sign, at)
         if _same(turned, at):

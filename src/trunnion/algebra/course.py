@@ -176,6 +176,11 @@ class Courses:
         panels = np.searchsorted(self.edges, time + BESIDE * self.span, side="right") - 1
         return np.asarray(np.clip(panels, 0, len(self.half) - 1))
 
+    def from_breaks(self, times: Array) -> Array:
+        """How far times, s, are from the nearest break."""
+        after = np.clip(np.searchsorted(self.breaks, times), 1, len(self.breaks) - 1)
+        return np.minimum(np.abs(times - self.breaks[after - 1]), np.abs(self.breaks[after] - times))
+
     # ---- means ------------------------------------------------------------------------------------------------
 
     def mean(self, of: Callable[[Array], Array] | None = None) -> Array:
@@ -277,6 +282,13 @@ class Courses:
         """The rates, at these times, of rows by their values there, (row, time)."""
         slopes = chebyshev.chebder(_fitted(rows), axis=-1) / self.half[panels, None]
         return np.asarray(slopes @ ON_POINTS[:-1]).reshape(rows.shape)
+
+    def integral(self, row: int) -> tuple[Array, Array]:
+        """Times, s, of the nodes of all panels, and the integral of a row up to each; 0 over panels without a value."""
+        grown = chebyshev.chebint(np.nan_to_num(self.coefficients[:, row]), axis=-1) * self.half[:, None]
+        start, end, *inside = np.moveaxis(grown @ chebyshev.chebvander([-1.0, 1.0, *POINTS], ORDER).T, 1, 0)
+        before = np.cumsum(np.append(0.0, end - start))[:-1]
+        return self.nodes(np.ones(len(self.half), bool)), np.ravel(np.transpose(inside) + (before - start)[:, None])
 
     def extended(self, rows: Array, panels: NDArray[np.bool_], elsewhere: float = 0.0) -> Courses:
         """With more rows, by their values at these times; a number on all other panels."""

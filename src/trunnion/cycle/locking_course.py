@@ -306,8 +306,8 @@ class LockingCourse:
         courses = run.courses(look, bends, BACK, like)
         levels = (-least, least, 0.0, least)
         times = np.concatenate([courses.passages(row, level) for row, level in enumerate(levels)])
-        away = np.min(np.abs(times[:, None] - courses.breaks), axis=1)  # a power that is 0 at a break passes there
-        cut = courses.parted(times[away > SHORT * courses.span])
+        # a power that is 0 at a break passes there
+        cut = courses.parted(times[courses.from_breaks(times) > SHORT * courses.span])
         delivered, acting, back_delivered, back_acting, *_ = cut.at(cut.edges[:-1] + cut.half)
         driven, beyond = back_acting > least, acting > least
         cases = [

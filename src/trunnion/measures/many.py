@@ -119,6 +119,11 @@ class Many:
         """The same of some of the measures, their panels tuned to the nominal mechanism alone."""
         return Many(self.run, measures, self.values, self._kernels)
 
+    def angle(self, measure: Measure, times: Array) -> Array:
+        """The angle of the nominal mechanism near some times, s, without jumps, of a measure that turns."""
+        group = next(group for group in self._groups if measure in group.measures)
+        return np.asarray(np.interp(times, *group.angles[measure.name]))
+
     def spots(self, measure: Measure) -> Array:
         """Times, s, rising, at which a course is looked through, both sides of every break among them."""
         group = next(group for group in self._groups if measure in group.measures)

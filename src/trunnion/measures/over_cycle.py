@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
-from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Status
 from trunnion.measures.evaluation import Curves, courses_of
 from trunnion.measures.figures import ENDLESS, Panels, Reading, near
@@ -21,15 +20,16 @@ from trunnion.results.scales import ROUNDING, Scales
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
+from trunnion.solve.status import pose_status
 from trunnion.solve.switches import MARGINS, SEATED, Bend, accuracy_of, breaks_between
 
-__all__ = ["MOTION", "Followed", "alike", "figures_of", "follow", "followed", "matters", "together"]
+__all__ = ["MOTION", "Followed", "alike", "figures_of", "followed", "matters", "together"]
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
 SCANNED = 24  # positions at which it is looked how large forces are
 MOTION = Accuracy(1e-12, 1e-14)  # of the motion, which has neither friction nor corners but where a law has some
-TURNED = 360  # of a turn, between which no angle turns by half a turn
+TURNING = Accuracy(1e-4, 1e-6, shortest=1e-6)  # of the rate of an angle, whose integral tells its whole turns
 
 
 class Followed(NamedTuple):
@@ -136,25 +136,21 @@ def followed(
 
 
 def _turns(run: Run, measure: Measure, start: float, end: float) -> tuple[Array, Array]:
-    """An angle without jumps at many times, s, so that others are told by how many turns they are off."""
-    time = np.linspace(start, end, 1 + int(np.ceil(TURNED * max(1.0, run.cycle.turns))))
-    walk = run.walk(within(run, time))
-    angle, rate = (
-        np.array(np.broadcast_to(np.asarray(primal(number), float), time.shape))
-        for number in (measure.curve(walk)[0], measure.coordinate(run.system).rate(walk))
-    )
-    follow(angle, rate, time)
-    return time, angle
+    """An angle without jumps at many times, s, so that others are told by how many turns they are off: its integral."""
+    coordinate = measure.coordinate(run.system)
 
+    def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
+        walk = run.walk(within(run, time))
+        rate = np.asarray(primal(coordinate.rate(walk)), float)
+        return np.broadcast_to(rate, (1, *time.shape)), pose_status(walk, time.shape)
 
-def follow(angles: Array, rate: Array, time: Array) -> None:
-    """Whole turns in place so that every angle follows the rates from the one before."""
-    steps = np.diff(time)
-    if len(steps) and np.allclose(steps, steps[0], rtol=1e-9, atol=0):
-        unwrap_row(angles, rate, float(steps[0]))
-        return
-    ahead = (rate[:-1] + rate[1:]) / 2 * steps
-    angles[1:] += TURN * np.cumsum(np.nan_to_num(np.rint((ahead - np.diff(angles)) / TURN)))
+    knots = np.array([bend.time for bend in run.bends if bend.scan < 0])
+    rates = Courses.of(look, breaks_between(run.cycle, knots, start, end), None, accuracy_of(run.cycle, TURNING))
+    time, turned = rates.integral(0)
+    whole = np.isfinite(rates.at(time)[0])
+    known = int(np.argmax(whole))
+    first = float(np.ravel(primal(measure.curve(run.walk(within(run, time[known : known + 1])))[0]))[0])
+    return time, turned - turned[known] + np.nan_to_num(first)
 
 
 def alike(run: Run, measure: Measure) -> float:

@@ -18,12 +18,11 @@ from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import selected
 from trunnion.measures.evaluation import NumpyKernel
+from trunnion.measures.figures import near
 from trunnion.measures.lines import turn
 from trunnion.measures.many import Many, Read
 from trunnion.measures.measures import Measure
-from trunnion.measures.over_cycle import follow
 from trunnion.measures.positions import PositionPlan, Window, moved, within
-from trunnion.solve.forward import forward
 from trunnion.studies.tolerance.effects import Effects, FirstOrder
 from trunnion.studies.tolerance.search import Corner, search
 from trunnion.studies.tolerance.zones import Spread
@@ -93,7 +92,6 @@ def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str,
     """Every measure of the nominal mechanism, at the positions of the plan too."""
     system, values = kernel.run.system, many.values
     curves, _ = kernel.courses(values, plan.times)
-    walk = forward(system, values, kernel.run.chosen.assembly, plan.times)
     found = {}
     for measure in kernel.measures:
         window, turning = plan.windows[measure.name], measure.turning(system)
@@ -102,8 +100,7 @@ def references(kernel: NumpyKernel, plan: PositionPlan, many: Many) -> dict[str,
             for part in curves[measure.name]
         ]
         if turning:
-            rate = np.broadcast_to(np.asarray(primal(measure.coordinate(system).rate(walk)), float), plan.times.shape)
-            follow(parts[0], rate[window.index], window.time)
+            parts[0] = near(parts[0], many.angle(measure, window.time), 2 * np.pi)
         attitude = measure.of_attitude(system)
         against = measure.against_nominal(system)
         figure, time = many.figures[measure.name], many.times[measure.name]

@@ -252,9 +252,9 @@ IDENTIFY = {
     ),
     "fit.not_repeated": Sentence(
         WARNING,
-        "no {one} is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
+        "no turn is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
         "intervals are too narrow if the data are filtered",
-        "record several {one}s",
+        "record several turns",
     ),
     "fit.freedom": Sentence(
         NOTE,

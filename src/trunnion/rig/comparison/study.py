@@ -59,11 +59,6 @@ def compare(
     """
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
-    if measurement.of_starts:
-        what = "the data are of starts, which have no cycle to compare"
-        raise MechanismError(
-            Finding(what, measurement.name, "fit them with identify, whose residuals are measured minus model")
-        )
     wanted = _channels(measurement, channels)
     check_settings(mechanism, measurement)
     method, joints = friction_method or FrictionMethod(), load_joints(mechanism)

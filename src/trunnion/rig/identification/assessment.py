@@ -207,7 +207,7 @@ class Assessment:
             before = np.where(mask, self.problem.misses(self.start, k, block.mean), np.nan)
             after = np.where(mask, self.problem.misses(self.found.x, k, block.mean), np.nan)
             scatter = np.sqrt(self._variance(k) / np.maximum(block.count, 1) + block.unresolved**2)
-            known = scatter if block.known else np.full(len(mask), np.nan)
+            known = scatter if block.repeats else np.full(len(mask), np.nan)
             out = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
             row = (before, after, np.where(mask, known, np.nan))
             found.append(Misses(k, _rms(before), _rms(after), _rms(row[2]), int(np.count_nonzero(mask)), out, row))
@@ -244,8 +244,6 @@ class Assessment:
         block = self.problem.blocks[k]
         if block.repeats:
             return self._variance(k)
-        if block.stated:
-            return np.full(block.held.shape[1], block.unresolved**2)
         if len(block.held) > 1:
             gaps = (block.held - block.held_mean)[:, self.problem.masks[k]]
             return np.full(block.held.shape[1], float(np.nanmean(gaps**2)) * len(gaps) / (len(gaps) - 1))

@@ -109,10 +109,9 @@ def _fit(judged: Assessment) -> Iterator[Finding]:
             remedy = f"see {odd.channel} in {odd.condition}, whose residual stands out"
         phrases = {"times_told": _times(times), "remedy": remedy}
         yield finding_for("fit.conditions_disagree", where, severity=severity, phrases=phrases, times=times)
-    single = [block for block in problem.blocks if block.fitted and not block.known]
+    single = [block for block in problem.blocks if block.fitted and not block.repeats]
     if single and len(single) == sum(block.fitted for block in problem.blocks):
-        phrases = {"one": "start" if judged.found.measurement.of_starts else "turn"}
-        yield finding_for("fit.not_repeated", "data", phrases=phrases)
+        yield finding_for("fit.not_repeated", "data")
     freedom = judged.found.spread.freedom[: problem.count][~judged.lost[: problem.count]]
     if freedom.size and np.min(freedom) < FEW and not refuted:
         least = round(float(np.min(freedom)))

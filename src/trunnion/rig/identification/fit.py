@@ -316,8 +316,6 @@ class FitProblem:
         for block in self.blocks:
             if block.repeats:
                 self.variances.append(block.variance)
-            elif block.stated:  # all of it is `unresolved`
-                self.variances.append(np.zeros(block.turns.shape[1]))
             else:
                 data = block.mean if block.fitted else block.held_mean
                 size = float(np.sqrt(np.nanmean(data**2))) if np.any(np.isfinite(data)) else 0.0
@@ -325,7 +323,7 @@ class FitProblem:
 
     def learn_scatter(self, x: Array) -> bool:
         """Variances of blocks without repetitions by the residuals of their channel; whether there are such."""
-        single = [k for k, block in enumerate(self.blocks) if block.fitted and not block.known]
+        single = [k for k, block in enumerate(self.blocks) if block.fitted and not block.repeats]
         for channel in dict.fromkeys(self.blocks[k].channel for k in single):
             own = [k for k in single if self.blocks[k].channel == channel]
             gaps = [self.misses(x, k, self.blocks[k].mean)[self.masks[k]] for k in own]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from trunnion.model.parameters import measured
 from trunnion.model.units import KINDS
 from trunnion.rig.identification.fit import FitProblem
-from trunnion.rig.identification.start_signals import StartModel
 from trunnion.rig.identification.unknowns import Unknown, unknowns
 
 __all__ = ["likely_lengths"]
@@ -23,15 +22,14 @@ ACTS = 1e-6  # of its derivatives, that neither unknowns nor sensors have as wel
 
 
 def likely_lengths(problem: FitProblem, x: Array) -> list[Unknown]:
-    """Lengths that, in first order beside all that is fitted, take most off the sum of squares; none of starts.
+    """Lengths that, in first order beside all that is fitted, take most off the sum of squares.
 
     With Q the directions of the other columns of the Jacobian, r the residuals and e the column of a length, both
     without Q: (e·r)²/(e·e). Derivatives are exact, all lengths at once.
     """
     model = problem.model
-    extra = [] if isinstance(model, StartModel) else unknowns(
-        model.run.system.mechanism, {path.removeprefix("dimensions."): (path,) for path in _lengths(problem)}, {}
-    )  # fmt: skip
+    paths = {path.removeprefix("dimensions."): (path,) for path in _lengths(problem)}
+    extra = unknowns(model.run.system.mechanism, paths, {})
     if not extra:
         return []
     n, more = problem.count, len(extra)

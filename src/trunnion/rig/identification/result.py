@@ -17,7 +17,6 @@ from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.findings import sentences
 from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.uncertainty import CONFIDENCE
-from trunnion.rig.reading.measurement import Measurement
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,7 +58,6 @@ def dataset(found: Identified) -> xr.Dataset:
         "channel_measures": [one.name for one in problem.model.measures.values()],
         "drive": _drive(found),
         "drive_range": _driven(judged),
-        **({"durations": _durations(measurement)} if measurement.of_starts else {}),
         "files": [list(one.files) for one in measurement.conditions],
         "data_files": hashed_files(measurement.conditions),
         "data_findings": data_findings(measurement),
@@ -72,11 +70,6 @@ def dataset(found: Identified) -> xr.Dataset:
         "findings": finding_rows(sentences(judged)),
     }
     return dataset_of("identification", variables, labels, attributes)
-
-
-def _durations(measurement: Measurement) -> list[float | None]:
-    """How long each start is followed, s; None for what the model states."""
-    return [one.duration if np.isfinite(one.duration) else None for one in measurement.conditions]
 
 
 def _drive(found: Identified) -> str:

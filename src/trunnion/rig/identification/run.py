@@ -20,7 +20,6 @@ from trunnion.rig.identification.identifiability import inseparable
 from trunnion.rig.identification.misfit import explanations
 from trunnion.rig.identification.search import search
 from trunnion.rig.identification.signals import Model, SeatedModel
-from trunnion.rig.identification.start_signals import StartModel, check_starts
 from trunnion.rig.identification.uncertainty import left_over, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
 from trunnion.rig.identification.unused import UnusedChannels
@@ -87,13 +86,11 @@ def identify(
     joints = load_joints(stated)
     held, share = held_out(stated, measurement, hold_out)
     blocks = blocks_of(measurement, channels_of(measurement, channels, joints), held, share, joints)
-    measures = _measures(stated, run, blocks, measurement.of_starts)
+    measures = _measures(stated, run, blocks)
     phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
     kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
     model = kind(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
                  friction_method or FrictionMethod())  # fmt: skip
-    if measurement.of_starts:
-        model = StartModel.of(model, measurement.conditions)
     unused = UnusedChannels(model, [])
     if channels is None:
         model, blocks, unused = _telling(model, blocks, measurement, delay or 0.0)
@@ -201,7 +198,7 @@ def _settings(
     return tuple(found)
 
 
-def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block], of_starts: bool) -> dict[str, Measure]:
+def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
     """What each channel measures; MechanismError for what has no course."""
     texts: dict[str, str] = {}
     for block in blocks:
@@ -209,9 +206,6 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block], of_starts
             what = f"measures {texts[block.channel]} in one condition and {block.course.measures} in another"
             raise MechanismError(Finding(what, f"channel {block.channel}", "use separate channels"))
     found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
-    if of_starts:
-        check_starts(mechanism, found, blocks)
-        return found
     for name, measure in found.items():
         if not measure.everywhere or not (measure.single(run.system) or measure.kind == EFFICIENCY):
             what = f"measures {texts[name]}, which is no one number at each position{told_at(measure)}"

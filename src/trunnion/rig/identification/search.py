@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, fit
 from trunnion.rig.identification.identifiability import sizes_of
-from trunnion.rig.identification.start_signals import StartModel
 from trunnion.rig.identification.uncertainty import correlation_factors, lack_of_fit
 
 __all__ = ["Search", "inside", "refined", "refuse_unusable", "search"]
@@ -167,11 +166,6 @@ def _unusable(problem: FitProblem, start: Array) -> Iterator[Finding]:
     if _any(bare, start):
         what = "all positions are left out: each is next to a friction reversal"
         yield Finding(what, "guard", "give a smaller guard, or resample to more positions")
-        return
-    if isinstance(problem.model, StartModel):
-        what = "the model has no start with all that was measured: it stalls, ends early or does not run steadily"
-        remedy = "give start values with which it starts, or a longer duration; see `trunnion simulate`"
-        yield Finding(what, "start", remedy)
         return
     codes = np.concatenate([np.asarray(one) for one in problem.courses(start).status])
     worst = list(Status)[int(np.bincount(codes).argmax())]

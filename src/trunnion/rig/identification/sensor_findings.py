@@ -12,7 +12,7 @@ from trunnion.rig.identification.assessment import Assessment
 from trunnion.rig.identification.blocks import OWN, shared_zero
 from trunnion.rig.identification.fit import SensorError
 from trunnion.rig.identification.number_text import joined, share
-from trunnion.rig.identification.uncertainty import RANDOM, STATED
+from trunnion.rig.identification.uncertainty import RANDOM
 from trunnion.rig.reading.log import few_digits
 
 __all__ = ["exact_channels", "of_sensors"]
@@ -29,7 +29,7 @@ def of_sensors(judged: Assessment) -> Iterator[Finding]:
     names, shares = judged.budget
     for p, unknown in enumerate(judged.problem.model.unknowns):
         for source, part in zip(names, shares[p], strict=True):
-            if source not in (*RANDOM, STATED, "resolution") and part > MOSTLY:
+            if source not in (*RANDOM, "resolution") and part > MOSTLY:
                 remedy = "calibrate that sensor better"
                 if source.startswith(OWN):
                     remedy = "record a longer unloaded stretch in each file, or more files"
@@ -75,7 +75,7 @@ def exact_channels(judged: Assessment) -> Iterator[Finding]:
     for one in judged.problem.blocks:
         accuracy = one.course.accuracy
         if one.fitted:
-            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain or accuracy.stated)
+            stated = bool(one.effects or shared_zero(accuracy) or accuracy.gain)
             known[one.channel] = known.get(one.channel, False) or stated
     bare = [channel for channel, stated in known.items() if not stated]
     forces = [channel for channel in bare if not measures[channel].of_motion]

@@ -50,7 +50,7 @@ class Accuracy:
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
     of `zero` is the same in all files. datum: value at which the sensor reads 0, in the unit of the course; an error of
-    its gain acts on value − datum. stated: of a value of one start, by itself. cut: of what all readings are off by
+    its gain acts on value − datum. cut: of what all readings are off by
     alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`. left:
     what of the error by the resolution all turns repeat, so that averaging leaves it; None for all of step/√12.
     """
@@ -59,7 +59,6 @@ class Accuracy:
     gain: float = 0.0
     resolution: float = 0.0
     own: float = 0.0
-    stated: float = 0.0
     cut: float = 0.0
     left: LeftOfSteps | None = None
     datum: float = 0.0
@@ -114,10 +113,10 @@ class Signal:
     @cached_property
     def unresolved(self) -> float:
         """Standard uncertainty by the resolution, what turns repeat of step/√12 (GUM F.2.2.1), where they scatter by
-        less than half a step; more carries them over the steps, and their mean is finer. Of a value what is stated."""
+        less than half a step; more carries them over the steps, and their mean is finer."""
         step = self.accuracy.resolution
         if not step:
-            return self.accuracy.stated
+            return 0.0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             scatter = float(np.nanmedian(self.scatter))
@@ -128,10 +127,9 @@ class Signal:
     def uncertainty(self) -> Array:
         """Standard uncertainty of the mean, (position,): scatter/√n, zero, gain and resolution.
 
-        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns of which nothing is stated.
+        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns.
         """
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
-        repeated = np.where((self.count == 1) & (self.accuracy.stated > 0), 0.0, repeated)
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
             known = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
             return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.read) ** 2))
@@ -151,8 +149,6 @@ class Condition:
     `values` that are the mean of what was measured.
     duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
     known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
-    of_start: whether it is no cycle but a motion from its start, of which `duration` is what is followed, s, NaN for
-    what the model states; its turns are repetitions, its phases shares of that duration.
     """
 
     name: str
@@ -171,7 +167,6 @@ class Condition:
     zero: float = float("nan")
     own_zero: bool = False
     entry: Mapping[str, Any] = field(default_factory=dict)
-    of_start: bool = False
 
 
 def between_turns(turns: Array) -> Array:
@@ -223,11 +218,6 @@ class Measurement:
     conditions: tuple[Condition, ...]
     findings: tuple[Finding, ...] = ()
     done: Sequence[str] = field(default_factory=tuple)
-
-    @property
-    def of_starts(self) -> bool:
-        """Whether it is of starts, in place of cycles."""
-        return any(one.of_start for one in self.conditions)
 
     @property
     def channels(self) -> dict[str, Signal]:

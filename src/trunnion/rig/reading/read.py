@@ -30,14 +30,13 @@ from trunnion.rig.reading.channels import (
 from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
 from trunnion.rig.reading.log import Account, counted, gathered, told
-from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
+from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero
 from trunnion.rig.reading.mapping_file import read_mapping, vague_gains
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
-from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
@@ -78,8 +77,6 @@ def read_measured(
             failed = True
         findings += account.findings
         accounts.append(account)
-    starts = [(k, one) for k, one in enumerate(mapped.mapping.starts) if not one.file]
-    conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
     findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
     findings = mapped.placed(findings)
     if failed or not conditions:
@@ -99,8 +96,6 @@ def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> s
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
-    if any(one.of_start for one in conditions):
-        return f"{each} start{'s' * (max(counts) > 1)}{where}"
     if sum(counts) < recorded - 2 * len(counts):
         where += f", {sum(counts):,}" if len(counts) > 1 else ""
         where += f" of {recorded:,.0f} recorded"
@@ -234,8 +229,7 @@ class _File:
         mapping = self.mapping
         cycle = float(mapping.cycle.evaluate())
         if mapping.timed:
-            begin = self.entry.over[0].value if isinstance(self.entry, Start) and self.entry.over else 0.0
-            return (self.line.seconds - begin) / cycle, 1.0, np.empty((0, 2))
+            return self.line.seconds / cycle, 1.0, np.empty((0, 2))
         assert mapping.angle is not None
         source, speed = mapping.angle, None
         if source.channel is not None:
@@ -285,7 +279,7 @@ class _File:
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
             where = _where(setting)
-            if turns.numbers.size < 2 and not isinstance(self.entry, Start):
+            if turns.numbers.size < 2:
                 account.warn(
                     "data.turns.one",
                     where,
@@ -443,13 +437,12 @@ class _File:
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
-        found = Condition(
+        return Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, cut=self.cut, dimensions=known_as, followed=tuple(part.setting.means), duration=duration,
             zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
             own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip
-        return with_values(found, self.entry) if isinstance(self.entry, Start) else found
 
 
 def _where(setting: Setting) -> str:

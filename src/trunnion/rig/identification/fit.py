@@ -182,8 +182,8 @@ class FitProblem:
     """What is fitted: the model to the blocks.
 
     masks: positions used, by block; variances: of one turn, by block; factors: by channel, for the correlation within a
-    turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; refused: how often a step
-    was taken back because the model has no answer there; progress: called with the number of models evaluated.
+    turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; progress: called with the
+    number of models evaluated.
     """
 
     model: Model
@@ -194,7 +194,6 @@ class FitProblem:
     variances: list[Array] = field(default_factory=list)
     factors: dict[str, float] = field(default_factory=dict)
     left_over: float = 1.0
-    refused: int = 0
     evaluations: int = 0
     progress: Callable[[int], None] | None = None
 
@@ -346,10 +345,7 @@ class FitProblem:
             if block.fitted:
                 mask = self.masks[k]
                 rows.append((np.sqrt(self.weight(k)) * self.misses(x, k, block.mean))[mask])
-        found = np.concatenate([*rows, (x * self.prior)[self.count :]])
-        if not np.all(np.isfinite(found)):
-            self.refused += 1
-        return found
+        return np.concatenate([*rows, (x * self.prior)[self.count :]])
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (residual, unknown and sensor)."""

@@ -29,12 +29,11 @@ COURSE = 1e-3  # of the largest value: what the model must change by over the cy
 class Search:
     """How the search went.
 
-    start: (unknown,), after what was changed of it; shares: of the stated start that friction was lessened to;
-    fit: where it ended; starts: how many; other: another place that fits as well.
+    start: (unknown,), with less friction than stated where that locks; fit: where it ended; starts: how many; other:
+    another place that fits as well.
     """
 
     start: Array
-    shared: float
     fit: LeastSquaresFit
     starts: int
     other: Array | None
@@ -44,7 +43,7 @@ class Search:
 def search(problem: FitProblem, starts: int | None) -> Search:
     """The estimates. starts: how many places to begin at; 1, and more if the model does not fit, if not given."""
     problem.start_scatter()
-    first, shared = _runnable(problem)
+    first = _runnable(problem)
     best, settled = refined(problem, inside(problem, first))
     count, other = 1, None
     wanted = len(OTHERS) if starts is None else max(0, starts - 1)
@@ -66,15 +65,15 @@ def search(problem: FitProblem, starts: int | None) -> Search:
         elif away > CLOSE and found.cost < best.cost + AS_GOOD:
             other = found.x
     problem.masks, problem.variances, problem.factors = kept
-    return Search(first[: problem.count], shared, best, count, other, settled)
+    return Search(first[: problem.count], best, count, other, settled)
 
 
-def _runnable(problem: FitProblem) -> tuple[Array, float]:
-    """The start, with less friction where that locks; how much of it is left. MechanismError if nothing runs."""
+def _runnable(problem: FitProblem) -> Array:
+    """The start, with less friction where that locks. MechanismError if nothing runs."""
     start = np.array([one.start for one in problem.model.unknowns] + [0.0] * len(problem.sensors))
     rubs = np.array([any(".friction." in path for path in one.paths) for one in problem.model.unknowns], bool)
     low = np.array([one.lower for one in problem.model.unknowns])
-    lost, shared, best = problem.unanswered(start), 1.0, start
+    lost, best = problem.unanswered(start), start
     for k in range(1, HALVINGS + 1):
         if not lost or not np.any(rubs):
             break
@@ -82,9 +81,9 @@ def _runnable(problem: FitProblem) -> tuple[Array, float]:
         less[: problem.count][rubs] = np.maximum(start[: problem.count][rubs] * 0.5**k, low[rubs])
         found = problem.unanswered(less)
         if found < lost:
-            lost, shared, best = found, 0.5**k, less
+            lost, best = found, less
     refuse_unusable(problem, best)
-    return best, shared
+    return best
 
 
 def inside(problem: FitProblem, start: Array) -> Array:

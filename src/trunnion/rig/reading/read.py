@@ -15,7 +15,6 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.names import strict_keywords
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
-from trunnion.rig.reading.angle_steps import tell_slopes
 from trunnion.rig.reading.channels import (
     ChannelReading,
     Zeroed,
@@ -40,7 +39,6 @@ from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, s
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
-from trunnion.rig.reading.unloaded import check_unloaded
 
 __all__ = ["read_measured"]
 
@@ -147,17 +145,17 @@ class _File:
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
-        self.lag, self.step, self.cut = 0.0, 0.0, 0.0
-        self.angle: Array | None = None  # of the driver by row, rad
+        self.lag, self.cut = 0.0, 0.0
         self.readings: dict[str, Array] = {}
-        self.beyond: dict[str, faults.BeyondRange] = {}
         self.steps: dict[str, float] = {}  # SI
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
             self.readings[name] = np.array(self.line.rows(column.values))
-            faults.cells(f"channels.{name}", column, self.readings[name], self.line.seconds, account)
-            self.beyond[name] = faults.beyond(self.readings[name], self.own[name].limit)
+            where, limit = f"channels.{name}", self.own[name].limit
+            faults.cells(where, column, self.readings[name], self.line.seconds, account)
+            if limit is not None:
+                faults.clipped(where, self.readings[name], limit, self.own[name].unit, self.line.seconds, account)
         self.table = table
 
     def conditions(self) -> list[Condition]:
@@ -188,7 +186,7 @@ class _File:
         if not cuts:
             return []
         self._check_rows(cuts)
-        self._check_zeros(cuts, share)
+        self._check_zeros(cuts)
         parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
         drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
@@ -198,9 +196,7 @@ class _File:
                 told = signs(mapping.channels, whole, self._zeros_known(zeros), turning, account)
                 units = {name: shown(own) for name, own in self.own.items()}
                 speeds(mapping.channels, whole, units, turning, told, account)
-        found = [self._condition(part, zeros, drifts, way) for part in parts]
-        self._check_steps(found)
-        return found
+        return [self._condition(part, zeros, drifts, way) for part in parts]
 
     def _zeros_known(self, zeros: Mapping[str, Zeroed]) -> dict[str, float]:
         """Standard uncertainty of the zero of each channel, SI."""
@@ -208,12 +204,6 @@ class _File:
             name: float(np.hypot(own.accuracy_zero, own.scale.factor * zeros[name].uncertainty))
             for name, own in self.own.items()
         }
-
-    def _check_steps(self, found: Sequence[Condition]) -> None:
-        """Tell once of steps of the angle that are not stated and matter to a channel."""
-        if self.step and self.mapping.angle is not None:
-            column, cycle = str(self.mapping.angle.column), float(self.mapping.cycle.evaluate())
-            any(tell_slopes(column, self.step, cycle, one.courses, self.account) for one in found)
 
     def _named(self, setting: Setting) -> str:
         return setting.name or self.path.stem
@@ -240,7 +230,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.step, self.cut, self.angle = found.lag, found.step, found.cut, found.values
+        self.lag, self.cut = found.lag, found.cut
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"
@@ -307,28 +297,16 @@ class _File:
         tail = "; of at most {} positions each has four samples, which are averaged"
         account.say(f"{cubic}{tail * (most > 1)}", told if most > 1 else None)
 
-    def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]], share: Array) -> None:
-        """Tell of unloaded stretches in which the sensor is loaded."""
-        mapping, account, seconds = self.mapping, self.account, self.line.seconds
-        measured = mapping.angle is not None and mapping.angle.from_ != "time" and not mapping.timed
-        angle = share * float(mapping.cycle.evaluate()) if measured else None
-        begin, end = min(one.begin[0] for _, one in cuts), max(one.end[-1] for _, one in cuts)
-        run = slice(int(np.searchsorted(seconds, begin)), int(np.searchsorted(seconds, end)))
-        for name, channel in mapping.channels.items():
-            where, scale = f"channels.{name}.zero", self.own[name].scale
-            unit, factor = shown(self.own[name])
+    def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
+        """Tell of unloaded stretches that reach into turns."""
+        for name, channel in self.mapping.channels.items():
             for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
                 inside = sum(int(np.sum((one.begin < high.value) & (one.end > low.value))) for _, one in cuts)
                 if inside:
-                    what = (
-                        f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into {counted(inside, 'turn')}"
-                    )
+                    span = f"{low.value:g} to {high.value:g} s"
+                    what = f"the unloaded stretch {span} reaches into {counted(inside, 'turn')}"
                     remedy = "state a stretch in which the sensor is not loaded"
-                    account.warn("data.zero.in_turns", where, what, remedy)
-                    continue
-                size = factor / abs(scale.factor)
-                span = low.value, high.value
-                check_unloaded(where, span, seconds, angle, self.readings[name], run, (unit, size), account)
+                    self.account.warn("data.zero.in_turns", f"channels.{name}.zero", what, remedy)
 
     def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
         """The courses of a channel, put into the parts; the drift that is left in them."""
@@ -336,14 +314,13 @@ class _File:
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
         begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
         low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
-        start, cycle = float(mapping.start.evaluate()), float(mapping.cycle.evaluate())
         reach = float(np.median(end - begin)) / mapping.positions
         reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
         beside = faults.WIDTH + int(reach / line.step)
-        span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit, beside)
+        span = faults.FaultSpan(low, high, begin, end, beside)
         readings = self.readings.pop(name)
         speed = channel.measures.startswith("rate:")
-        faults.signal(where, readings, line.seconds, span, own.limit, account, speed, self.beyond[name])
+        faults.signal(where, readings, line.seconds, span, account, speed)
         step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         angle = values if own.scale.unit == "rad" else None

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from trunnion.model.names import strict_keywords
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
 from trunnion.rig.reading.channels import (
+    LOOKED_AT,
     ChannelReading,
     Zeroed,
     filtered,
@@ -61,20 +63,20 @@ def read_measured(
     """
     mapped = read_mapping(mapping)
     conditions: list[Condition] = []
-    findings: list[Finding] = []
-    accounts: list[Account] = []
-    failed = False
     entries, notes = files_of(mapped, files)
-    for path, entry in entries:
-        account = Account(str(path))
-        try:
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
-                conditions += _File(mapped.mapping.of_file(entry), path, entry, account).conditions()
-        except MechanismError as error:
-            account.findings += [one for one in error.findings if one not in account.findings]
-            failed = True
-        findings += account.findings
-        accounts.append(account)
+    accounts = [Account(str(path)) for path, _ in entries]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
+        opened: list[_File] = []
+        for (path, entry), account in zip(entries, accounts, strict=True):
+            with _kept(account):
+                opened.append(_File(mapped.mapping.of_file(entry), path, entry, account))
+                opened[-1].find_turns()
+        steps = _steps(opened)
+        for file in opened:
+            with _kept(file.account):
+                conditions += file.conditions(steps)
+    failed = any(account.failed for account in accounts)
+    findings = [one for account in accounts for one in account.findings]
     findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
     findings = mapped.placed(findings)
     if failed or not conditions:
@@ -86,6 +88,28 @@ def read_measured(
         tuple(findings),
         (_averaged(conditions, accounts), *told(accounts)),
     )
+
+
+@contextmanager
+def _kept(account: Account) -> Iterator[None]:
+    """What one file fails by is told with what the others do."""
+    try:
+        yield
+    except MechanismError as error:
+        account.findings += [one for one in error.findings if one not in account.findings]
+        account.failed = True
+
+
+def _steps(files: Sequence[_File]) -> dict[tuple[object, ...], float]:
+    """The step of each channel with one scale, in readings, from the levels of all files that have it.
+
+    A file whose readings span a few steps only does not tell them by itself.
+    """
+    levels: dict[tuple[object, ...], list[Array]] = {}
+    for file in files:
+        for name, own in file.own.items():
+            levels.setdefault((name, own.unit, own.scale.factor), []).append(file.levels(name))
+    return {key: resolution(np.concatenate(rows)) for key, rows in levels.items()}
 
 
 def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> str:
@@ -157,17 +181,18 @@ class _File:
             if limit is not None:
                 faults.clipped(where, self.readings[name], limit, self.own[name].unit, self.line.seconds, account)
         self.table = table
+        self.parts: list[_Part] = []
 
-    def conditions(self) -> list[Condition]:
-        """The conditions of the file, each with its turns."""
+    def find_turns(self) -> None:
+        """Find the turns of each condition, and leave out what is wrong of the readings in them."""
         mapping, account = self.mapping, self.account
-        zeros = {
+        self.zeros = {
             name: zeroed(
                 name, channel, self.own[name], self.readings[name], self.line, mapping.drift == "remove", account
             )
             for name, channel in mapping.channels.items()
         }
-        share, way, spoilt = self._share(zeros)
+        share, self.way, spoilt = self._share(self.zeros)
         cuts, used = [], self._used()
         for setting in settings(mapping, self.entry, self.table, self.line, account):
             allowed = used[setting.window] & setting.rows
@@ -184,11 +209,31 @@ class _File:
                 what = self._no_turn(share[setting.window], allowed)
                 account.error("data.turns.none", where, what, "check angle, or record for longer")
         if not cuts:
-            return []
+            return
         self._check_rows(cuts)
         self._check_zeros(cuts)
-        parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
-        drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
+        self.parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
+        begin, end = (np.sort(np.concatenate([getattr(turns, one) for _, turns in cuts])) for one in ("begin", "end"))
+        low, high = np.searchsorted(self.line.seconds, begin[0]), np.searchsorted(self.line.seconds, end[-1], "right")
+        self.running = slice(int(low), int(high))
+        reach = float(np.median(end - begin)) / mapping.positions
+        reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
+        span = faults.FaultSpan(int(low), int(high), begin, end, faults.WIDTH + int(reach / self.line.step))
+        for name, channel in mapping.channels.items():
+            speed = channel.measures.startswith("rate:")
+            faults.signal(f"channels.{name}", self.readings[name], self.line.seconds, span, account, speed)
+
+    def levels(self, name: str) -> Array:
+        """Different readings of a channel while the drive runs."""
+        readings = self.readings[name][self.running] if self.parts else np.empty(0)
+        return np.unique(readings[np.isfinite(readings)])[:LOOKED_AT]
+
+    def conditions(self, steps: Mapping[tuple[object, ...], float]) -> list[Condition]:
+        """The conditions of the file, each with its turns. steps: of the channels, by name, unit and factor."""
+        if not self.parts:
+            return []
+        mapping, account, parts, zeros, way = self.mapping, self.account, self.parts, self.zeros, self.way
+        drifts = {name: self._channel(name, zeros[name], parts, steps) for name in mapping.channels}
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
@@ -308,20 +353,15 @@ class _File:
                     remedy = "state a stretch in which the sensor is not loaded"
                     self.account.warn("data.zero.in_turns", f"channels.{name}.zero", what, remedy)
 
-    def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
+    def _channel(
+        self, name: str, zero: Zeroed, parts: Sequence[_Part], steps: Mapping[tuple[object, ...], float]
+    ) -> Drift | None:
         """The courses of a channel, put into the parts; the drift that is left in them."""
         mapping, account, line = self.mapping, self.account, self.line
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
-        begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
-        low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
-        reach = float(np.median(end - begin)) / mapping.positions
-        reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
-        beside = faults.WIDTH + int(reach / line.step)
-        span = faults.FaultSpan(low, high, begin, end, beside)
         readings = self.readings.pop(name)
-        speed = channel.measures.startswith("rate:")
-        faults.signal(where, readings, line.seconds, span, account, speed)
-        step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
+        step = own.resolution or steps[name, own.unit, own.scale.factor]
+        noise = noise_of(readings[self.running])
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         angle = values if own.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
@@ -336,7 +376,7 @@ class _File:
         self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over them
         if step and noise < step / 2:
             self._check_repeated(name, step, noise, parts, readings, max(scatters))
-        if speed:  # one that creeps is the drive's
+        if channel.measures.startswith("rate:"):  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
         if found is None:

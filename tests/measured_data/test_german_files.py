@@ -145,5 +145,3 @@ def test_a_zero_that_every_file_replaces_is_told(tmp_path: Path) -> None:
         (tmp_path / "mapping.json").write_text(json.dumps(mapping))
         found = read_measured(tmp_path / "mapping.json")
         assert ("data.angle.zero_unused" in {one.code for one in found.findings}) == bool(shared and own)
-        assert found.conditions[0].zero == pytest.approx(np.radians(2 if own else 1))
-        assert found.conditions[0].own_zero == bool(own)

@@ -5,15 +5,11 @@ Everything is SI. A measurement has conditions, a condition has courses, a cours
 
 from __future__ import annotations
 
-import json
-import math
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +23,7 @@ from trunnion.rig.reading.repeated_steps import LeftOfSteps
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset", "zeros_of_files"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -71,8 +67,6 @@ class Signal:
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
-    nothing: the reading that is stated as zero, what a reading of 1 more measures, SI, and the unit of the readings;
-    None where no number is stated, but an unloaded stretch.
     """
 
     channel: str
@@ -81,7 +75,6 @@ class Signal:
     turns: Array
     accuracy: Accuracy = Accuracy()
     read_in: tuple[str, float] = ("", 1.0)
-    nothing: tuple[float, float, str] | None = None
 
     @property
     def shown(self) -> tuple[str, float]:
@@ -147,8 +140,7 @@ class Condition:
     cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI; followed: those of
     `values` that are the mean of what was measured.
-    duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
-    known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
+    duration: of a cycle that is a time, s; NaN of one that is an angle.
     """
 
     name: str
@@ -164,9 +156,6 @@ class Condition:
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
     followed: Sequence[str] = ()
     duration: float = float("nan")
-    zero: float = float("nan")
-    own_zero: bool = False
-    entry: Mapping[str, Any] = field(default_factory=dict)
 
 
 def between_turns(turns: Array) -> Array:
@@ -174,37 +163,6 @@ def between_turns(turns: Array) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.asarray(np.nanstd(turns, axis=0, ddof=1))
-
-
-def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:
-    """`files` of a mapping, each entry whole, with the zeros of the angle corrected; empty where one is not known.
-
-    ahead: rad, to be added to the zero of each condition.
-    """
-    rows = {one.files[0]: (one, one.zero + size) for one, size in zip(conditions, ahead, strict=True) if one.files}
-    if len(rows) != len(conditions) or not all(math.isfinite(zero) for _, zero in rows.values()):
-        return ""
-    told = []
-    for name, (one, zero) in rows.items():
-        own = {**one.entry, "angle": {"zero": f"{round(math.degrees(zero), 2) + 0.0:.6g} deg"}}
-        order = {"file": own.get("file", Path(name).name), "angle": own.pop("angle"), **own}
-        told.append(flow(order))
-    return ", ".join(told[:MOST_FILES]) + (", …" if len(told) > MOST_FILES else "")
-
-
-def flow(value: object) -> str:
-    """A part of a mapping in one line, as it is written there."""
-    if isinstance(value, Mapping):
-        if "source" in value:  # a number with its unit
-            return str(value["source"])
-        return f"{{{', '.join(f'{key}: {flow(one)}' for key, one in value.items())}}}"
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(flow, value))}]"
-    text = str(value)
-    return json.dumps(text, ensure_ascii=False) if re.search(r"[,:#{}\[\]\"']", text) else text
-
-
-MOST_FILES = 20  # named in a remedy
 
 
 @dataclass(frozen=True)

@@ -426,12 +426,11 @@ class _File:
             extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
-            datum, nothing = 0.0, None
-            if isinstance(channel.zero, Amount):
-                nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
-                datum = 0.0 if own.live(channel.zero) else -nothing[0] * nothing[1]
+            datum = 0.0
+            if isinstance(channel.zero, Amount) and not own.live(channel.zero):
+                datum = -zeros[name].value * channel.sign * own.scale.factor
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file, datum=datum)
-            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
+            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=part.left.get(name)))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
@@ -457,8 +456,6 @@ class _File:
         return Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, cut=self.cut, dimensions=known_as, followed=tuple(part.setting.means), duration=duration,
-            zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
-            own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip
 
 

@@ -10,17 +10,16 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.file import Lines, place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
 from trunnion.model.units import ANGLE, KINDS
 from trunnion.rig.reading.mapping import Channel, DataMapping, File, FromData
 
-__all__ = ["Mapped", "read_mapping", "vague_gains"]
+__all__ = ["Mapped", "read_mapping"]
 
 NOUN = "a mapping file"
-VAGUE = 0.05  # of a gain: a standard uncertainty that hardly a sensor has
 START = "write trunnion-data: 1, then files, time, angle and channels"
 
 
@@ -113,22 +112,6 @@ def _entries(mapping: DataMapping) -> Iterator[tuple[str, File]]:
     """Every file by its place in the mapping."""
     for number, file in enumerate(mapping.files):
         yield f"files.{number}", file
-
-
-def vague_gains(mapping: DataMapping) -> list[Finding]:
-    """Warnings of gains that are hardly known at all: more often a % is missing."""
-    stated = {f"channels.{name}": one.accuracy for name, one in mapping.channels.items()}
-    for key, file in _entries(mapping):
-        stated |= {f"{key}.channels.{name}": one.accuracy for name, one in file.channels.items() if one.accuracy}
-    found = []
-    for where, accuracy in stated.items():
-        gain, source = float(accuracy.gain.evaluate()), accuracy.gain.source
-        if gain > VAGUE:
-            what = f"the standard uncertainty of the gain is {100 * gain:.6g} %: within it nearly every model agrees"
-            remedy = "check it against the data sheet" if "%" in str(source) else f"write {source} % if that is meant"
-            code, figures = "data.accuracy.gain", {"gain": gain}
-            found.append(Finding(what, f"{where}.accuracy.gain", remedy, Severity.WARNING, code=code, figures=figures))
-    return found
 
 
 def _check_channels(file: File, where: str, channels: Mapping[str, Channel]) -> Iterator[Finding]:

@@ -32,7 +32,7 @@ from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
 from trunnion.rig.reading.log import Account, counted, gathered, told
 from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero
-from trunnion.rig.reading.mapping_file import read_mapping, vague_gains
+from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
@@ -77,7 +77,7 @@ def read_measured(
                 conditions += file.conditions(steps)
     failed = any(account.failed for account in accounts)
     findings = [one for account in accounts for one in account.findings]
-    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
+    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])]
     findings = mapped.placed(findings)
     if failed or not conditions:
         raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))

@@ -375,7 +375,9 @@ class _File:
             noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
         self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over them
         if step and noise < step / 2:
-            self._check_repeated(name, step, noise, parts, readings, max(scatters))
+            size = abs(own.scale.factor) * step
+            for part in parts:
+                part.left[name] = left_in_turns(part.turns, part.courses[name] / size, readings / step, noise / step)
         if channel.measures.startswith("rate:"):  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
@@ -397,19 +399,6 @@ class _File:
         for part in parts:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), angle)
         return found
-
-    def _check_repeated(
-        self, name: str, step: float, noise: float, parts: Sequence[_Part], readings: Array, scatter: float
-    ) -> None:
-        """How much of the error by steps, in readings, all turns repeat; it is told where it counts beside scatter."""
-        own = self.own[name]
-        size, (unit, in_si) = abs(own.scale.factor) * step, shown(own)
-        for part in parts:
-            part.left[name] = left_in_turns(part.turns, part.courses[name] / size, readings / step, noise / step)
-        most = max((part.left[name] for part in parts), key=lambda one: one.share)
-        if told := most.told(scatter / step, size / in_si, unit):
-            remedy = "sample at a rate that is no multiple of the turns"
-            self.account.note("data.turns.same", f"channels.{name}", told, remedy)
 
     def _rate(self, turns: Sequence[Turns]) -> float:
         cycle = float(self.mapping.cycle.evaluate())

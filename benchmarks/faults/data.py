@@ -161,13 +161,6 @@ _RIG = (
         ("tests/rig/test_compare.py", "-k", "offset"),
     ),
     Fault(
-        "wild-readings-without-limit",
-        "rig/reading/pulses.py",
-        "if not wild.size or wild.size > 0.01 * readings.size:",
-        "if not wild.size:",
-        ("tests/measured_data/test_angles.py", "-k", "wild"),
-    ),
-    Fault(
         "sign-cut-in-two",
         "rig/reading/text_tables.py",
         "for cut in range(4):",

@@ -13,9 +13,6 @@ from measured_data.recording import IDLE, RPM, ZERO, Columns, faults, mapping, o
 from trunnion.errors import MechanismError
 from trunnion.model.units import KINDS
 from trunnion.rig.reading.channels import resolution
-from trunnion.rig.reading.log import Account
-from trunnion.rig.reading.mapping import AngleSource
-from trunnion.rig.reading.pulses import unwrapped
 from trunnion.rig.reading.read import read_measured
 
 OMEGA = RPM * np.pi / 30
@@ -236,9 +233,9 @@ def test_units_of_what_is_set_stay_with_it(clean: Columns, tmp_path: Path) -> No
 @pytest.mark.parametrize("per_turn", [60, 1440])
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_counter_that_wraps_anywhere(clean: Columns, tmp_path: Path, wrap: int, per_turn: int, way: int) -> None:
-    """Where is told by the steps around; with three counts a sample as well as with one in eight."""
+    """With three counts a sample as well as with one in eight."""
     counts = np.floor(way * clean["angle"] / (2 * np.pi) * per_turn)
-    changes = {"angle": {"from": "pulses", "column": "encoder", "per_turn": per_turn, "sign": way}}
+    changes = {"angle": {"from": "pulses", "column": "encoder", "per_turn": per_turn, "sign": way, "wrap": wrap}}
     found = read({**clean, "encoder": counts % wrap}, tmp_path, changes)
     shift = way * 2 * np.pi * np.floor(counts[0] / wrap) * wrap / per_turn  # nothing tells what was lost before
     assert not found.findings
@@ -249,46 +246,12 @@ def test_a_counter_that_wraps_anywhere(clean: Columns, tmp_path: Path, wrap: int
         assert off(one) < 0.08
 
 
-def test_a_wild_count_is_named(clean: Columns, tmp_path: Path) -> None:
-    counts = clean["encoder"].copy()
-    counts[[3000, 5000]] = 1e9, 0
-    found = read({**clean, "encoder": counts}, tmp_path)
-    (one,) = faults(found, "far off the ones before and after")
-    assert "2 counts of 'encoder'" in one.what
-    assert "at 0.6, 1 s, such as 1e+09" in one.what
-    assert off(found.conditions[0]) < 0.05
-
-
-def test_many_wild_counts_are_not_mended() -> None:
-    """Up to one in a hundred of 1000; more are no accident, and nothing is made up in their place."""
-    source, counts = AngleSource.model_validate(SOURCES["count"][0]), np.arange(1000.0)
-    for wild in (1, 10, 11, 40):
-        places = 20 * np.arange(1, wild + 1)
-        readings, account = counts.copy(), Account("run.csv")
-        readings[places] = 1e6
-        if wild > 10:
-            with pytest.raises(MechanismError):
-                unwrapped(source, readings, counts / 1000, account)
-            assert not account.findings
-            continue
-        found, _ = unwrapped(source, readings, counts / 1000, account)
-        np.testing.assert_array_equal(np.flatnonzero(found != counts), places)
-        np.testing.assert_array_equal(found[places], counts[places] - 1)
-        assert len(account.findings) == 1
-
-
-def test_a_counter_that_is_set_back(clean: Columns, tmp_path: Path) -> None:
-    """What follows has no zero; an index gives it one."""
+def test_a_counter_that_is_set_back_is_refused(clean: Columns, tmp_path: Path) -> None:
+    """What follows has no zero."""
     counts = clean["encoder"].copy()
     counts[6000:] -= counts[6000]
-    found = read({**clean, "encoder": counts}, tmp_path)
-    (one,) = faults(found, "is set back 1 time, at 1.1998 s")
-    assert "to 0; without an index the turns from there on are left out" in one.what
-    assert found.conditions[0].courses["torque-in"].turns.shape[0] == 9
-    assert off(found.conditions[0]) < 0.05
-    tied = read({**clean, "encoder": counts}, tmp_path, {"angle/index": {"column": "z"}})
-    assert tied.conditions[0].courses["torque-in"].turns.shape[0] >= 17
-    assert off(tied.conditions[0]) < 0.08
+    with pytest.raises(MechanismError, match=r"is set back 1 time, at 1.1998 s, .* to 0 — state wrap"):
+        read({**clean, "encoder": counts}, tmp_path)
 
 
 def test_the_angle_beside_the_speed_of_its_driver(clean: Columns, tmp_path: Path) -> None:
@@ -350,17 +313,6 @@ def test_an_angle_in_another_unit_than_the_file_says(clean: Columns, tmp_path: P
     assert one.where == "angle"
     assert "all values are 57.3 times those of the file" in one.what
     assert not [one for one in by_column(clean, tmp_path, {"unit": "deg"}, "angle [°]") if "unit" in one.code]
-
-
-@pytest.mark.parametrize(("zero", "asked"), [(-3.7, True), ("-3.7 deg", False), (0.06, False), (0, False)])
-def test_a_plain_zero_of_an_angle_in_degrees(clean: Columns, tmp_path: Path, zero: Any, asked: bool) -> None:
-    found = [
-        one for one in by_column(clean, tmp_path, {"unit": "deg", "zero": zero}) if one.code == "data.angle.zero_unit"
-    ]
-    assert bool(found) is asked
-    for one in found:
-        assert "taken as rad, -212°; the readings are in deg" in one.what
-        assert one.remedy == "write -3.7 deg or -3.7 rad"
 
 
 @pytest.mark.parametrize(("zero", "told"), [("1 N m", True), ("15 N m", False)])

@@ -40,11 +40,6 @@ def _cells(run: Columns) -> None:
     run["T1"][6000] = np.inf
 
 
-def _zeros(run: Columns) -> None:
-    run["T1"][5000:5010] = 0
-    run["T1"][6000] = 0
-
-
 def _spikes(run: Columns) -> None:
     run["T1"][[4100, 5250, 7001]] += 5  # at 0.2, 0.5 and 0 of a turn
 
@@ -76,20 +71,14 @@ def _lost(run: Columns) -> None:
     run["encoder"][edges[edges > 5000][0] :] -= 1
 
 
-def _plateau(run: Columns) -> None:
-    run["T1"] = np.minimum(run["T1"], 2.4)
-
-
 def _unsteady(run: Columns) -> None:
     run["t"] = run["t"] + 0.02 * run["t"] ** 2
 
 
 FAULTS: list[tuple[Any, str, tuple[str, ...], str]] = [
-    (_cells, "channels.torque-in", ("dropouts: 201 cells", "1 infinite", "at 1, 1.2 s"), "cable"),
-    (_zeros, "channels.torque-in", ("11 readings", "zero in the middle"), "cable"),
+    (_cells, "channels.torque-in", ("dropouts: 201 cells", "at 1, 1.2 s"), "cable"),
     (_spikes, "channels.torque-in", ("spikes: 3 readings", "0.82, 1.05, 1.4002 s"), "shielding"),
     (_stuck, "channels.torque-in", ("stuck", "400 samples", "for 0.0798"), "sensor"),
-    (_plateau, "channels.torque-in", ("seems clipped at 2.4",), "range:"),
     (_drift, "channels.torque-in", ("drift", "N m in 1.8 s"), "drift: remove"),
     (_gap, "time", ("1 gap", "300 samples missing", "0.0602 s at 0.9998 s"), "buffer"),
     (_repeated, "time", ("repeats in 2 rows", "at 1, 1 s"), "logger"),
@@ -118,7 +107,7 @@ def test_faults_are_named(
     assert remedy in named[0].remedy
     assert named[0].severity is Severity.WARNING
     assert named[0].file.endswith("run.csv")
-    if spoil not in (_drift, _plateau, _unsteady):  # these stay in the means, all others are left out of them
+    if spoil not in (_drift, _unsteady):  # these stay in the means, all others are left out of them
         assert off(found.conditions[0]) < 0.12
 
 
@@ -133,7 +122,7 @@ def test_texts_among_numbers(run: Columns, tmp_path: Path) -> None:
 def test_clipped_at_the_range(run: Columns, tmp_path: Path) -> None:
     run["T1"] = np.clip(run["T1"], -2.4, 2.4)
     (one,) = faults(read(run, tmp_path, {"channels/torque-in/range": "24 N m"}), "clipped")
-    assert "at the end of the range" in one.what
+    assert "at or beyond the end of the range of 2.4 V" in one.what
     assert "larger range" in one.remedy
 
 
@@ -145,9 +134,8 @@ def test_a_code_for_an_overload_changes_nothing_else(run: Columns, tmp_path: Pat
     run["T2"][[4000, 5250, 7001]] = code
     for changes in ({}, {"channels/brake/range": "50 N m"}):
         found = read(run, tmp_path, changes)
-        (one,) = faults(found, "3 readings") or faults(found, "3 overload codes such as 9.99e+37")
+        (one,) = faults(found, "3 readings") or faults(found, "3 cells")
         assert "left out" in one.what
-        assert not faults(found, "clipped")
         accuracy = found.conditions[0].courses["brake"].accuracy
         assert (accuracy.resolution, accuracy.cut) == (sound.resolution, sound.cut)
         assert accuracy.left.share == pytest.approx(sound.left.share, rel=0.01)
@@ -216,9 +204,8 @@ def test_coarse_readings_are_no_faults(run: Columns, tmp_path: Path) -> None:
     for name in ("T1", "T2"):
         run[name] = np.rint(run[name] / 0.02) * 0.02
     run["n1"] = np.rint(run["n1"])
-    step, one = read(run, tmp_path).findings  # 500 samples a turn: the steps count too
-    assert step.code == "data.turns.same"
-    assert one.severity is step.severity is Severity.NOTE
+    (one,) = read(run, tmp_path).findings
+    assert one.severity is Severity.NOTE
     assert "reads 600 in every one" in one.what
 
 
@@ -358,34 +345,3 @@ def test_with_few_turns_nothing_is_left_out_that_may_be_the_signals_own(
     assert not faults(found, "left out")
     for course in found.conditions[0].courses.values():
         assert np.isfinite(course.turns).all()
-
-
-def _loaded(found: Any) -> list[Any]:
-    return [one for one in found.findings if one.code == "data.zero.loaded"]
-
-
-def test_an_unloaded_stretch_in_which_the_machine_runs(run: Columns, tmp_path: Path) -> None:
-    """180° of the first turn, with the load on: a warning; with a shaft that is uncoupled until then, a note."""
-    stretch = {"channels/torque-in/zero": {"over": ["0 s", "0.25 s"]}}
-    (one,) = _loaded(read(run, tmp_path, stretch))
-    assert one.severity is Severity.WARNING
-    assert one.where == "channels.torque-in.zero"
-    assert re.search(r"the angle moves by 1[678]\d° and the readings vary by 2\d\.\d N m", one.what)
-    assert "up to 0.19" in one.remedy
-    still = run["t"] < 0.26
-    run["T1"][still] = run["T1"][run["t"] < 0.19][np.arange(still.sum()) % 900]
-    (one,) = _loaded(read(run, tmp_path, stretch))
-    assert one.severity is Severity.NOTE
-    assert "vary" not in one.what
-
-
-def test_an_unloaded_stretch_that_is_loaded_at_rest(run: Columns, tmp_path: Path) -> None:
-    """Noise is no load, whether white or of the mains."""
-    rest = run["t"] < 0.2
-    hum = 0.1 * 0.5 * np.sin(2 * np.pi * 50 * run["t"])
-    assert not _loaded(read({**run, "T1": run["T1"] + hum}, tmp_path))
-    run["T1"][rest & (run["t"] > 0.12)] += 0.1 * 3.0
-    (one,) = _loaded(read(run, tmp_path))
-    assert one.severity is Severity.WARNING
-    assert "angle" not in one.what
-    assert "vary by 3.2" in one.what

@@ -148,32 +148,6 @@ def test_settings_that_cannot_be_are_told(tmp_path: Path, own: dict[str, Any], t
     assert one.line
 
 
-# ---- clipping below the range that is stated ------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("stated", [{}, {"range": "20 N m"}])
-def test_clipping_within_the_stated_range_is_told(tmp_path: Path, stated: dict[str, str]) -> None:
-    written(tmp_path / "a.csv", limit=15.0)
-    (one,) = of(mapping(tmp_path, [{"file": "a.csv"}], **stated), "data.readings.plateau")
-    assert one.severity is Severity.WARNING
-    assert "15 N m" in one.what
-    low, high = (float(text.rstrip("°")) for text in one.what.rpartition("driver at ")[2].split(" to "))
-    beyond = np.degrees(np.arcsin(11 / 13))
-    assert (low, high) == pytest.approx((beyond, 180 - beyond), abs=3)
-    assert "range" in one.remedy
-    assert ("{file: a.csv, channels: {M: {range: 15 N m}}}" in one.remedy) == bool(stated)
-
-
-def test_a_signal_that_jumps_to_its_extreme_is_not_clipped(tmp_path: Path) -> None:
-    """A brake of ±10 N m without noise, or a run that reaches no limit."""
-    path = written(tmp_path / "a.csv")
-    rows = [line.split(";") for line in path.read_text(encoding="utf-8").splitlines()]
-    rows[1:] = [[t, a, "10.00" if float(a) < 180 else "-10.00"] for t, a, _ in rows[1:]]
-    (tmp_path / "b.csv").write_text("\n".join(map(";".join, rows)), encoding="utf-8")
-    found = mapping(tmp_path, [{"file": "a.csv"}, {"file": "b.csv"}], range="20 N m")
-    assert not of(found, "data.readings.plateau")
-
-
 # ---- what a logger leaves behind ------------------------------------------------------------------------------
 
 

@@ -255,25 +255,6 @@ def test_an_error_of_several_files_is_told_once_where_it_says_the_same(
     assert ("2 such findings: a.csv, b.csv" in found[0].what) == alike
 
 
-@pytest.mark.parametrize(("gain", "warned"), [(0.2, "write 0.2 % if that is meant"), ("20 %", "check it"), (0.04, "")])
-@pytest.mark.parametrize("place", ["channels/brake", "files/0/channels/brake"])
-def test_a_gain_that_is_hardly_known_is_a_warning(
-    tmp_path: Path, columns: Columns, gain: float | str, warned: str, place: str
-) -> None:
-    own = {"file": "a.csv", "channels": {"brake": {"accuracy": {"gain": gain}}}}
-    changes = {"files": [own]} if place.startswith("files") else {f"{place}/accuracy": {"gain": gain}}
-    (tmp_path / "a.csv").write_text(text_of(columns), "utf-8")
-    entries = mapping({"files": [{"file": "a.csv"}], **changes})
-    (tmp_path / "mapping.yaml").write_text(json.dumps(entries), "utf-8")
-    found = [one for one in read_measured(tmp_path / "mapping.yaml").findings if one.code == "data.accuracy.gain"]
-    assert len(found) == bool(warned)
-    for one in found:
-        assert (one.severity, one.where) == (Severity.WARNING, f"{place.replace('/', '.')}.accuracy.gain")
-        assert "of the gain is 20 %" in one.what
-        assert one.remedy.startswith(warned)
-        assert one.line
-
-
 def test_forces_and_slides(tmp_path: Path, columns: Columns) -> None:
     """What is measured may be a force or a speed along a line; the unit tells."""
     changes = {

@@ -104,7 +104,6 @@ def test_more_turns_make_it_narrower_but_not_beyond_the_sensor(cardan: trunnion.
     stated = 0.05 * 10.0
     for found in (few, many):
         assert found["standard_uncertainty"].values[0] == pytest.approx(stated, rel=0.02)
-    assert "% of its variance comes from the zero of torque-out: more turns do not reduce it" in said(many)
     assert float(many["share"].sel(source="zero of torque-out")[0]) > 0.99
 
 
@@ -318,7 +317,6 @@ def test_a_start_that_locks_is_left(cardan: trunnion.Mechanism) -> None:
     true = truth(short, TURNED[:2], {"torque-in": "effort:input"}, {FRICTION: 0.1})
     found = identify(short, true.measured(1), [FRICTION])
     assert found["lower"].values[0] < 0.1 < found["upper"].values[0]
-    assert "began with" in said(found)
 
 
 def test_a_clearance_by_the_seat_it_is_given(four_bar: trunnion.Mechanism) -> None:
@@ -438,19 +436,14 @@ def changed(data: Measurement, change: Callable[[Any], Any]) -> Measurement:
     return replace(data, conditions=tuple(found))
 
 
-def test_a_small_misfit_is_a_note_and_of_a_gross_one_nothing_leads_away(
-    four_bar: trunnion.Mechanism, torque: True_
-) -> None:
+def test_a_misfit_is_told_from_scatter(four_bar: trunnion.Mechanism, torque: True_) -> None:
     data = torque.measured(2, sensors=Sensors(noise=0.002))
     wave = max(float(np.max(one["torque"])) for one in torque.courses) * np.cos(12 * np.pi * torque.phase)
-    told = []
-    for size in (0.0, 0.0008, 0.005, 1.0):
+    for size, misfit in ((0.0, False), (0.005, True), (1.0, True)):
         found = identify(four_bar, changed(data, lambda turns, size=size: turns + size * wave), [FRICTION])
-        codes, chance = {one["code"] for one in json.loads(found.attrs["findings"])}, float(found["chi_squared_chance"])
-        assert ("fit.doubtful" in codes) == (0.001 <= chance < 0.05)
-        told.append("note" if "fit.doubtful" in codes else "fit.misfit" in codes)
-    assert told == [False, "note", True, True]
-    assert not codes & {"sensor.off", "parameter.hardly_known", "parameter.sensor"}
+        codes = {one["code"] for one in json.loads(found.attrs["findings"])}
+        assert ("fit.misfit" in codes) == misfit == (float(found["chi_squared_chance"]) < 0.001)
+    assert "sensor.off" not in codes
 
 
 def test_infinite_readings_are_gaps_and_exact_data_no_misfit(four_bar: trunnion.Mechanism, torque: True_) -> None:

@@ -49,7 +49,7 @@ def planned(name: str) -> object:
     rig = Rig.read(RIG)
     key, sensor = next(iter(rig.sensors.items()))
     schedule = rig.schedule.model_copy(update={"over": {}, "conditions": ()})
-    changed = {"sensors": {key: sensor.model_copy(update={"measures": name})}, "faults": (), "set_": {}}
+    changed = {"sensors": {key: sensor.model_copy(update={"measures": name})}, "set_": {}}
     return trunnion.rig.observe(model(), rig.model_copy(update={**changed, "schedule": schedule}))
 
 

@@ -261,7 +261,6 @@ def test_clipped_readings_and_lost_pulses_are_told(mechanism: Mechanism) -> None
         ({"schedule": {"over": {"A.speed": ["-60 rpm", "60 rpm"]}}, "encoder": {"per_turn": 60, "kind": "level"}},
          "encoder.kind", "turn in both directions"),
         ({"set": {"l7": 2}}, "set", "l7"),
-        ({"faults": [{"kind": "drift", "sensor": "T1", "by": "3 rpm"}]}, "faults.0.by", "not in N m"),
         ({"rate": "0.4 Hz", "schedule": {"turns": 1}}, "rate", "no three samples"),
         ({"rate": "300 MHz"}, "rate", "rows, a file at most"),
     ],
@@ -339,45 +338,3 @@ def test_plan_tells_slow_sensors_and_coarse_converters(mechanism: Mechanism) -> 
     alone = plan(trunnion.rig.observe(mechanism, rig(sensors={"T1": SENSORS["T1"]})))
     assert alone.conditions[0].measured is None
     assert "no efficiency is predicted" in alone.findings[-1].what
-
-
-FAULTS = [
-    {"kind": "dropouts", "sensor": "T1", "share": "2 %", "length": 3},
-    {"kind": "gap", "from": "1 s", "to": "1.1 s"},
-    {"kind": "wrong-sign", "sensor": "T2"},
-    {"kind": "drift", "sensor": "w2", "by": "1 rad/s"},
-    {"kind": "spikes", "sensor": "n1", "share": "0.5 %", "by": "40 rpm"},
-    {"kind": "stuck", "sensor": "T1", "from": "2 s", "to": "2.2 s"},
-    {"kind": "lost-pulses", "share": "1 %"},
-]
-
-
-def test_faults_do_what_they_say(mechanism: Mechanism, seen: Observation) -> None:
-    clean = next(seen.records()).columns
-    for fault in FAULTS:
-        faulty = next(trunnion.rig.observe(mechanism, rig(faults=[fault]), seed=4).records()).columns
-        kind = fault["kind"]
-        if kind == "gap":
-            assert len(faulty["t"]) == len(clean["t"]) - 50
-            assert np.max(np.diff(faulty["t"])) == pytest.approx(0.102)
-            continue
-        changed = {name for name in clean if not np.array_equal(clean[name], faulty[name], equal_nan=True)}
-        assert changed == {fault.get("sensor", "encoder")}
-        name = changed.pop()
-        if kind == "dropouts":
-            assert np.mean(np.isnan(faulty[name])) == pytest.approx(0.02, rel=0.4)
-        elif kind == "wrong-sign":
-            assert np.array_equal(faulty[name], -clean[name])
-        elif kind == "drift":
-            assert (faulty[name] - clean[name])[[0, -1]] == pytest.approx([0, 1], abs=1e-3)
-        elif kind == "spikes":
-            moved = np.abs(faulty[name] - clean[name])
-            assert set(np.round(moved, 6)) == {0.0, 40.0}
-        elif kind == "stuck":
-            assert len(set(faulty[name][1000:1100])) == 1
-        else:
-            assert 0 < clean[name][-1] - faulty[name][-1] < 30
-    other = trunnion.rig.observe(mechanism, rig(faults=[{**FAULTS[2], "conditions": [2]}]), seed=4)
-    assert np.array_equal(next(other.records()).columns["T2"], clean["T2"])
-    assert trunnion.rig.observe(mechanism, rig(faults=FAULTS)).truth()["faults"][1] == {"kind": "gap", "sensor": [],
-        "conditions": [], "length": 1, "from": "1 s", "to": "1.1 s"}  # fmt: skip

@@ -130,9 +130,6 @@ sensors:
         ("turns: 2", "over: {l2: 3:2}", 2, "no range", "FROM:TO:COUNT"),
         ("turns: 2", "over: {l2: 3 mm:2 cm:4}", 2, "different units", "same unit"),
         ("turns: 2", "over: {l2: [1]}, conditions: [{l2: 3 mm}]", 2, "a grid and rows", "not both"),
-        ("sensors:", "faults: [{kind: gap}]\nsensors:", 5, "needs 'from'", "state from"),
-        ("sensors:", "faults: [{kind: stuk}]\nsensors:", 5, "stuk", "'stuck'"),
-        ("sensors:", "faults: [{kind: drift, sensor: U, by: 1}]\nsensors:", 5, "no sensor 'U'", "known: 'T'"),
         ("effort:A", "effort:B", 6, "no driver 'B'", "known: 'A'"),
         ("range: 10 N m", "range: 10 V", 6, "'10 V' is not in N m", "state it in N m"),
     ],
@@ -167,22 +164,11 @@ def test_examples_of_rigs_are_read(path: Path) -> None:
 
 
 def test_the_page_tells_every_key() -> None:
-    """Each key of a rig file, and each kind of fault, is on the page."""
+    """Each key of a rig file is on the page."""
     page = (EXAMPLES.parent / "docs" / "how-to" / "virtual-rig.md").read_text("utf-8")
-    parts = (
-        Rig,
-        rig_file.Schedule,
-        rig_file.Encoder,
-        rig_file.Sensor,
-        rig_file.Accuracy,
-        rig_file.Fault,
-        rig_file.Idle,
-    )
-    for part in parts:
+    for part in (Rig, rig_file.Schedule, rig_file.Encoder, rig_file.Sensor, rig_file.Accuracy, rig_file.Idle):
         for name, field in part.model_fields.items():
             assert re.search(rf"\b{re.escape(field.alias or name)}\b", page), (part.__name__, name)
-    for kind in rig_file.FAULTS:
-        assert f"kind: {kind}" in page
 
 
 def test_a_range_keeps_its_unit() -> None:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 __all__ = ["identify"]
 
 MOST_ROWS = 24
-SAID = ("data.angle.steps", "data.angle.zero_unused")  # notes of the data that are said here too
+SAID = ("data.angle.zero_unused",)  # notes of the data that are said here too
 
 Parameters = Annotated[
     list[str] | None,

@@ -93,7 +93,7 @@ def told_at(measure: Measure) -> str:
     if measure.everywhere:
         return ""
     if measure.in_time:
-        return ": it is of a motion in time; state its measured values under starts: in the mapping, for identify"
+        return ": it is of a motion in time"
     return f": the model gives it {f'as {measure.statistic}' if measure.statistic else 'at a place or over a range'}"
 
 

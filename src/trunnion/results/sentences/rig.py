@@ -6,8 +6,6 @@ from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["RIG"]
 
-HELD_OUT = " times its standard uncertainty (scatter and estimates)"
-
 VIRTUAL = {
     "rig.no_answer": Sentence(
         WARNING,
@@ -71,43 +69,26 @@ VIRTUAL = {
 COMPARE = {
     "compare.turns_few": Sentence(
         WARNING,
-        "{once}: its uncertainty cannot be estimated without scatter, {cases}",
+        lambda turns, cases, **_: (
+            (
+                "measured in one turn only"
+                if turns == 1
+                else f"has values from only one turn at a position, although up to {turns} turns were measured"
+            )
+            + f": its uncertainty cannot be estimated without scatter, {cases}"
+        ),
         lambda turns, **_: "see the gaps reported by `trunnion data`" if turns > 1 else "measure more turns",
     ),
     "compare.nothing": Sentence(
         WARNING, "not compared, for lack of measured values or of a solution of the model, {cases}"
     ),
-    "compare.offset": Sentence(
-        ERROR,
-        "agrees within U {cases} apart from {story}: without it {corrected_percent:.0f} % of the positions agree, "
-        "as measured {within_percent:.0f} %",
-        "{remedy}",
-    ),
     "compare.not_within": Sentence(
         ERROR,
-        lambda cases, within_percent, rms_told, several, explained, **_: (
-            f"does not agree within U {cases}: {'down to ' if several else ''}{within_percent:.0f} % of the positions "
-            f"agree, RMS of the residual {'up to ' if several else ''}{rms_told}{explained}"
+        lambda cases, apart, within_percent, rms_told, several, **_: (
+            f"does not agree within U {cases}{apart}: {'down to ' * several}{within_percent:.0f} % of the positions "
+            f"agree, RMS of the residual {'up to ' * several}{rms_told}"
         ),
-        "{remedy}",
-    ),
-    "compare.local": Sentence(
-        ERROR,
-        "does not agree within U over a part of the cycle {cases}{most}: from {place} the mean residual is {mean_told} "
-        "with a U of {wide_told}; it is {percent:.0f} % of the positions, of all {within_percent:.0f} % agree",
-        "check the model there (loads, friction, reversals, stops) and the readings of the channel",
-    ),
-    "compare.bias": Sentence(
-        NOTE,
-        "agrees within U at {within_percent:.0f} % of the positions, but its bias is significant {cases}{most}: the "
-        "mean residual is {bias_told}, its U {wide_told}",
-        "of a true model that is so in 5 % of the conditions; check zero and gain of the channel, and the model",
-    ),
-    "compare.angle_shifted": Sentence(
-        ERROR,
-        "{channels} do not agree within U {cases}; an error {range} explains "
-        "{explains_percent:.0f} % of the mean square of the residuals",
-        "{remedy}",
+        "see what would explain it; `trunnion identify` fits friction and other numbers of the model",
     ),
     "compare.efficiency": Sentence(
         ERROR,
@@ -150,23 +131,9 @@ COMPARE = {
         "no accuracy of zero and gain is stated for {channels}: U includes only the scatter between turns",
         "state accuracy: {{gain: …, zero: …}} in the mapping",
     ),
-    "compare.model_exact": Sentence(
-        NOTE,
-        "the verdicts include the uncertainty of the measurement only; the model counts as exact",
-        lambda toleranced: "see `trunnion tolerance` for the effect of the tolerances" if toleranced else "",
-        quiet=True,
-    ),
 }
 
 IDENTIFY = {
-    "search.start": Sentence(
-        NOTE,
-        "the model has no solution at some positions with the start values: the search began with {share:g} times "
-        "their friction",
-    ),
-    "search.refused": Sentence(
-        NOTE, "{told} of the search to where the model locks or cannot be assembled {count:#was/were} rejected"
-    ),
     "search.not_ended": Sentence(
         ERROR,
         "the search did not converge within {evaluations} evaluations",
@@ -190,86 +157,31 @@ IDENTIFY = {
         WARNING,
         "{story}{times} would explain {explains_percent:.0f} % of the misfit{left}{also}; the estimates would then be "
         "{estimates}",
-        lambda kind, size_told, channel, odd, files, times, lengths, conditions=None, **_: (
-            lengths
-            + (
-                {
-                    "shift": f"check the angle sensor, its coupling and its zero in {odd}; leave these data out, or "
-                    f"correct the zero of their files alone: files: [{files or '{file: …, angle: {zero: …}}'}]",
-                    "zero": f"check the zero of {channel} in {odd}: unloaded stretch, drift, amplifier",
-                    "gain": f"check range and gain of {channel}, and lengths and loads of the model, in {odd}",
-                }
-                if conditions
-                else {
-                    "shift": "check the zero of the angle; if it is off, "
-                    + (
-                        f"correct the zeros that the files state: files: [{files}]"
-                        if files
-                        else f"add {size_told} to angle: zero: in the mapping"
-                    ),
-                    "delay": "check the filters of the channels; --delay allows for a delay and estimates it",
-                    "length": f"check {channel} in the model; --parameter {channel.partition(' ')[0]} identifies it",
-                    "sign": f"state sign: -1 for {channel} in the mapping, or remove it",
-                    "zero": f"check the zero of {channel}"
-                    + ("" if times else "; with accuracy: {zero: …} in the mapping it is estimated too"),
-                    "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike"
-                    + ("" if times else "; with accuracy: {gain: …} in the mapping a gain is estimated too"),
-                }
-            )[kind]
-        ),
+        lambda kind, channel, size_told, times, **_: {
+            "angle": f"check the zero of the angle; if it is off, add {size_told} to angle: zero: in the mapping",
+            "zero": f"check the zero of {channel}"
+            + ("" if times else "; with accuracy: {zero: …} in the mapping it is estimated too"),
+            "gain": f"check unit and gain of {channel}, and lengths and loads of the model, which may act alike"
+            + ("" if times else "; with accuracy: {gain: …} in the mapping a gain is estimated too"),
+        }[kind],
     ),
-    "fit.unused": Sentence(
-        NOTE,
-        "no parameter acts on {channels}: not used in the fit",
-        lambda taken, **_: (
-            taken and f"{taken} fits them all: a motion tells the error of the angle, which is fitted too"
-        ),
-    ),
-    "fit.unused_missed": Sentence(
-        WARNING,
-        "no parameter acts on it, so it is not used, and the model misses it: RMS {rms_told} {of}, where its {by} is "
-        "{known_told}",
-        "{remedy}",
-    ),
-    "fit.doubtful": Sentence(
-        NOTE,
-        "the residuals are larger than expected from the scatter: reduced χ² {reduced_told}, p-value {chance_told}",
-        "a true model has this note in 5 % of cases; see the residuals, and check the lengths of the model",
-    ),
+    "fit.unused": Sentence(NOTE, "no parameter acts on {channels}: not used in the fit"),
     "fit.conditions_disagree": Sentence(
         NOTE,
         "the conditions disagree: the estimates from single conditions vary {times_told} times as much as expected "
         "from the scatter between turns; the interval is widened accordingly",
-        "{remedy}",
-    ),
-    "fit.stands_out": Sentence(
-        WARNING,
-        "{subject}: {rms_told}, {times_told} times what the scatter explains{others_told}{place}",
-        lambda condition, several, **_: (
-            "check the readings there (range, gain and zero in this file, clipping, stops) and the model"
-            + (f"; --hold-out '{condition}' leaves the condition out of the fit" if several else "")
-        ),
+        "look for differences between conditions: settings, speed, temperature, the zero of each file",
     ),
     "fit.not_repeated": Sentence(
         WARNING,
-        "no {one} is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
+        "no turn is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
         "intervals are too narrow if the data are filtered",
-        "record several {one}s",
-    ),
-    "fit.freedom": Sentence(
-        NOTE,
-        "the scatter has only {told} of freedom: the intervals are wide",
-        "record more turns",
+        "record several turns",
     ),
     "fit.turns_alike": Sentence(
         WARNING,
         "successive turns are correlated ({correlation:.2f}): the intervals are widened accordingly",
         "look for a drift; warm the rig up",
-    ),
-    "fit.no_answer": Sentence(
-        WARNING,
-        "with the estimates, {count:#measured position} {count:#is/are} {why} in the model",
-        "run `trunnion analyse` with the estimates, and check the settings of the conditions",
     ),
     "fit.few_positions": Sentence(
         ERROR,
@@ -282,27 +194,13 @@ IDENTIFY = {
         "fix it, or measure a quantity that depends on it",
     ),
     "parameter.not_told_apart": Sentence(
-        WARNING, "{alike}; {known}", "fix {some} of them, or measure a quantity that separates them"
-    ),
-    "parameter.hardly_told_apart": Sentence(
-        NOTE,
-        "is almost inseparable from {other} (correlation {correlation_told}){known}",
-        "fix one of them, or measure a quantity that separates them",
+        WARNING, "{alike}; {known}", "fix one or more of them, or measure a quantity that separates them"
     ),
     "parameter.limit": Sentence(NOTE, "is at its bound {limit_told}: {side} {far_told} (95 %, one-sided)"),
-    "parameter.hardly_known": Sentence(
-        NOTE,
-        "is poorly determined: {told}, the interval is wider than the value",
-        "record more turns, or conditions in which it has a larger effect",
-    ),
-    "parameter.sensor": Sentence(
-        NOTE, "{share_told} of its variance comes from the {source}: more turns do not reduce it", "{remedy}"
-    ),
     "sensor.off": Sentence(
         WARNING,
-        lambda beyond, times, times_told, size_told, **_: (
-            f"would have to be off by {size_told}, {times_told} stated standard uncertainties: the estimates mean "
-            "nothing"
+        lambda beyond, times, times_told, **_: (
+            f"would have to be off by {times_told} stated standard uncertainties: the estimates mean nothing"
             if beyond
             else f"differs from its stated value by {times:.1f} standard uncertainties"
         ),
@@ -322,14 +220,11 @@ IDENTIFY = {
         "{count:,} of {positions:#position} {count:#is/are} left out: friction reverses, a joint is at rest, a load "
         "has a corner or a jump, the position is close to singular, or the model has no solution",
     ),
-    "held_out.untested": Sentence(NOTE, "the expected prediction error of {names} is not known"),
     "held_out.missed": Sentence(
         WARNING,
-        "the held-out data ({names}) differ from the prediction by {times:.1f}" + HELD_OUT,
+        "the held-out data ({names}) differ from the prediction by {times:.1f} times its "
+        "standard uncertainty (scatter and estimates)",
         "the model lacks an effect that differs there",
-    ),
-    "held_out.predicted": Sentence(
-        NOTE, "the held-out data ({names}) differ from the prediction by {times:.2f}" + HELD_OUT
     ),
 }
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Coded
-from trunnion.rig.comparison.stretches import Stretch, worst_stretch
 from trunnion.rig.comparison.uncertainty import (
     Uncertainty,
     at_positions,
@@ -54,7 +53,7 @@ class SignalAssessment:
 
     largest: the residual of the largest size; place: its position, −1 if there is none; least: the share within ±U
     from which the course is taken to be within; bias_expanded: U of the bias; within_unbiased: the share within ±U once
-    the bias is taken off; stretch: where the course misses although the share of its positions does not show it.
+    the bias is taken off.
     """
 
     compared: int = 0
@@ -69,16 +68,10 @@ class SignalAssessment:
     correlation: float = np.nan
     verdict: Verdict = Verdict.NOTHING
     within_unbiased: float = np.nan
-    stretch: Stretch | None = None
 
 
-def judge(
-    course: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0, closed: bool = False
-) -> SignalAssessment:
-    """Measured against the model at the positions that can be compared.
-
-    closed: whether the end of the cycle is next to its start.
-    """
+def judge(course: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0) -> SignalAssessment:
+    """Measured against the model at the positions that can be compared."""
     where = comparable & np.isfinite(course.mean) & np.isfinite(model)
     if not np.any(where):
         return SignalAssessment()
@@ -100,33 +93,11 @@ def judge(
         verdict = Verdict.WITHIN
     elif share_0 >= least_0:
         verdict = Verdict.OFFSET
-    stretch = None
-    if verdict is not Verdict.UNKNOWN:
-        constant = bias if verdict is Verdict.OFFSET else 0.0
-        stretch = _stretch(course, model, where, constant, coverage, closed)
-        if verdict is Verdict.NOT and stretch is not None:  # one of many, or the only one
-            rest = where.copy()
-            rest[list(stretch.positions)] = False
-            elsewhere = _share(residual[rest[where]], at_positions(of, rest[where]), coverage, ROUNDING * size)
-            stretch = stretch if elsewhere[0] >= elsewhere[1] else None
-        verdict = verdict if stretch is None else Verdict.NOT
     return SignalAssessment(
         int(np.count_nonzero(where)), _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]),
         bias, mean_expanded(of, coverage), _rms(unbiased), share, least, _correlation(measured, theirs), verdict,
-        share_0, stretch,
+        share_0,
     )  # fmt: skip
-
-
-def _stretch(
-    course: Signal, model: Array, where: NDArray[np.bool_], constant: float, coverage: float, closed: bool
-) -> Stretch | None:
-    """Where a part of the cycle misses, once a constant is taken off."""
-    of, size = uncertainty_of(course), float(np.max(np.abs(np.append(course.mean[where], model[where]))))
-    if constant:
-        middle = np.mean(of.shared[:, where], axis=1, keepdims=True)
-        of = replace(of, shared=(of.shared - middle)[1:])
-    residual = np.where(where, course.mean - model - constant, np.nan)
-    return worst_stretch(residual, of, where, coverage, closed, ROUNDING * size)
 
 
 def difference(measured: Array, model: Array) -> Array:

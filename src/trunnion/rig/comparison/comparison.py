@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.model.mechanism import Mechanism
 from trunnion.rig.comparison.assessment import SignalAssessment, Verdict
-from trunnion.rig.comparison.error_sources import Cause
+from trunnion.rig.comparison.causes import Cause
 from trunnion.rig.modelled import Modelled
 from trunnion.rig.reading.measurement import Condition, Signal
-from trunnion.solve.loads import useful_loads, useful_springs
 
-__all__ = ["ChannelComparison", "Compared", "Efficient", "unmeasured"]
+__all__ = ["ChannelComparison", "Compared", "Efficient"]
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelComparison:
     """One channel in one condition: what was measured, what the model has, what it comes to.
 
-    friction: what other friction would explain by its course; NaN where it was not tried.
+    causes: what would explain the residual, by kind; empty where the model is within U.
     """
 
     course: Signal
     model: NDArray[np.float64]
     comparable: NDArray[np.bool_]
     judged: SignalAssessment
-    cause: Cause | None
-    others: tuple[Cause, ...] = ()
-    friction: float = np.nan
+    causes: Mapping[str, Cause] = field(default_factory=dict)
 
     @property
     def within(self) -> bool:
@@ -51,6 +47,11 @@ class Efficient:
     reason: tuple[str, str] = ("", "")
 
     @property
+    def known(self) -> bool:
+        """Whether the two can be compared."""
+        return bool(np.isfinite([self.measured, self.expanded, self.model]).all())
+
+    @property
     def within(self) -> bool:
         """Whether the model lies within ±U; not where one of them is unknown."""
         return bool(abs(self.measured - self.model) <= self.expanded)
@@ -68,11 +69,3 @@ class Compared:
     pairs: Mapping[str, ChannelComparison]
     efficiency: Efficient | None
     unmeasured: tuple[str, ...] = ()
-
-
-def unmeasured(mechanism: Mechanism, condition: Condition) -> tuple[str, ...]:
-    """Drivers, useful loads and springs that no channel tells the effort of, by their entries in the model."""
-    told = {course.measures for course in condition.courses.values()}
-    drivers = (f"drivers.{name}" for name in mechanism.drivers if f"effort:{name}" not in told)
-    loads = (f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in told)
-    return (*drivers, *loads, *(f"springs.{name}" for name in useful_springs(mechanism)))

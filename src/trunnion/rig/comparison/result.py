@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from trunnion.cycle.summary import PEZZUTI, inputs, references
 from trunnion.errors import Status
+from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
+from trunnion.model.units import unit as unit_of
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.rig.comparison.assessment import Verdict, difference, expanded, probability, uncertainty_of
+from trunnion.rig.comparison.causes import KINDS, Cause
 from trunnion.rig.comparison.comparison import ChannelComparison, Compared
-from trunnion.rig.comparison.findings import findings_of, units_set
+from trunnion.rig.comparison.findings import findings_of
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
@@ -64,6 +67,14 @@ VARIABLES: dict[str, Variable] = {
     "within_least": Variable(CC, "1", "least share of agreeing positions for agreement of the signal"),
     "correlation": Variable(CC, "1", "correlation of measured and model over the positions"),
     "verdict": Variable(CC, "1", "code of the verdict; see the attribute verdict_meanings", np.int8),
+    "zero_error": Variable(CC, "", "error of the zero that fits the residual best"),
+    "zero_explains": Variable(CC, "1", "share of the mean square of the residual that it explains"),
+    "gain_error": Variable(CC, "1", "relative error of the gain that fits the residual best"),
+    "gain_explains": Variable(CC, "1", "share of the mean square of the residual that it explains"),
+    "angle_error": Variable(CC, "rad", "angle by which the readings would be ahead of the model"),
+    "angle_explains": Variable(CC, "1", "share of the mean square of the residual that it explains"),
+    "friction_error": Variable(CC, "1", "change of all friction, relative to the model's, that fits the residual best"),
+    "friction_explains": Variable(CC, "1", "share of the mean square of the residual that it explains"),
     "efficiency": Variable(C, "1", "measured efficiency"),
     "efficiency_expanded": Variable(C, "1", "expanded uncertainty of the measured efficiency"),
     "efficiency_model": Variable(C, "1", "efficiency of the model"),
@@ -116,8 +127,7 @@ def _fill(
         of = one.efficiency
         arrays["efficiency"][k], arrays["efficiency_model"][k] = of.measured, of.model
         arrays["efficiency_expanded"][k] = of.expanded
-        known = np.isfinite([of.measured, of.expanded, of.model]).all()
-        arrays["efficiency_within"][k] = int(of.within) if known else -1
+        arrays["efficiency_within"][k] = int(of.within) if of.known else -1
 
 
 def _fill_channel(
@@ -140,6 +150,8 @@ def _fill_channel(
         arrays["largest_at"][at] = one.model.drive[judged.place]
     for name, field in JUDGED.items():
         arrays[name][at] = getattr(judged, field)
+    for kind in KINDS:
+        arrays[f"{kind}_error"][at], arrays[f"{kind}_explains"][at] = pair.causes.get(kind, Cause())
 
 
 def _read_in(name: str, found: Sequence[Compared]) -> tuple[str, float]:
@@ -159,8 +171,8 @@ def _attributes(
     drivers = list(mechanism.drivers)
     units = {name: next(one.condition.courses[name].unit for one in found if name in one.pairs) for name in channels}
     sets = list(dict.fromkeys(name for one in found for name in one.condition.values))
-    written = units_set(mechanism, sets, [one.condition.name for one in found])
-    told = findings_of(mechanism, channels, found, coverage)
+    written = _units_set(mechanism, sets, [one.condition.name for one in found])
+    told = findings_of(mechanism, channels, found)
     origins = origin(
         mechanism,
         first.run.system.plan.formula,
@@ -189,6 +201,26 @@ def _attributes(
         "condition_files": [list(one.condition.files) for one in found],
         "inputs": inputs(mechanism),
     }
+
+
+def _units_set(
+    mechanism: Mechanism, names: Iterable[str], conditions: Iterable[str]
+) -> tuple[list[str], list[tuple[str, float]]]:
+    """SI unit of each number that is set, and the unit with its factor that it is read in.
+
+    That of the names of the conditions, such as `input.speed 250 rpm`, else the one that the model states it in.
+    """
+    known = {row["path"]: row for row in inputs(mechanism)}
+    stated = dict(part.partition(" ")[::2] for name in conditions for part in name.split(", "))
+    units, written = [], []
+    for name in names:
+        row = known.get(mechanism.path_of(name), {"unit": "", "text": ""})
+        literals = (LITERAL.fullmatch(one.strip().removeprefix("-")) for one in (stated.get(name, ""), row["text"]))
+        text = next((one["unit"] or one["per"] or "" for one in literals if one and (one["unit"] or one["per"])), "")
+        text = text or {"rad": "deg"}.get(row["unit"], row["unit"])
+        units.append(row["unit"])
+        written.append((text, float(unit_of(text)[0]) if text and text != "1" else 1.0))
+    return units, written
 
 
 def _all_within(found: Sequence[Compared]) -> bool:

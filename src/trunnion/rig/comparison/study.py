@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest, strict_keywords
-from trunnion.rig.comparison.assessment import Verdict, judge, uncertainty_of
-from trunnion.rig.comparison.comparison import ChannelComparison, Compared, Efficient, unmeasured
-from trunnion.rig.comparison.error_sources import STATED, best, beyond_stated, causes
+from trunnion.rig.comparison.assessment import Verdict, difference, judge
+from trunnion.rig.comparison.causes import causes
+from trunnion.rig.comparison.comparison import ChannelComparison, Compared, Efficient
 from trunnion.rig.comparison.result import dataset
-from trunnion.rig.modelled import Modelled, apart, check_settings, modelled
+from trunnion.rig.modelled import Modelled, check_settings, modelled
 from trunnion.rig.reading.efficiency import Pairs, efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Condition, Measurement
 from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.loads import useful_loads, useful_springs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,17 +54,12 @@ def compare(
     Returns a Dataset over (channel, condition, position) of `compared.VARIABLES`, SI, residual = measured − model;
     NaN where the model has no answer or nothing was measured.
     Method: at each position the model with the condition's values; U by the GUM from the scatter between turns, the
-    zero and the gain of the sensor. Where a course is not within U, what a wrong sign, an offset, a wrong gain or a
-    shift of the crank angle would explain of the residual is fitted and said.
+    zero and the gain of the sensor. Where a course is not within U, the size of an error of the zero, the gain, the
+    crank angle and the friction is fitted to the residual, each by itself, with the share that it explains.
     Raises MechanismError for values, channels or measures that the model does not have.
     """
     if not (np.isfinite(coverage) and 0 < coverage <= 8):
         raise MechanismError(Finding(f"{coverage:g} is no coverage factor", "coverage", "give such as 2, up to 8"))
-    if measurement.of_starts:
-        what = "the data are of starts, which have no cycle to compare"
-        raise MechanismError(
-            Finding(what, measurement.name, "fit them with identify, whose residuals are measured minus model")
-        )
     wanted = _channels(measurement, channels)
     check_settings(mechanism, measurement)
     method, joints = friction_method or FrictionMethod(), load_joints(mechanism)
@@ -75,7 +71,7 @@ def compare(
         model = modelled(mechanism, condition, there, method, also)
         without = _Frictionless(mechanism, condition, there, method)
         pairs = {name: _pair(condition, model, name, coverage, without) for name in there}
-        missing = unmeasured(mechanism, condition) if powers else ()
+        missing = _unmeasured(mechanism, condition) if powers else ()
         whole = powers is not None and not missing and also.keys() <= model.courses.keys()
         efficiency = _efficiency(condition, model, joints, coverage) if whole else None
         found.append(Compared(condition, model, pairs, efficiency, missing))
@@ -136,26 +132,21 @@ def _pair(
 ) -> ChannelComparison:
     course, theirs = condition.courses[channel], model.courses[channel]
     comparable = model.comparable(channel)
-    judged = judge(course, theirs, comparable, coverage, model.run.cycle.periodic)
-    pair = ChannelComparison(course, theirs, comparable, judged, None)
-    if judged.verdict not in (Verdict.NOT, Verdict.OFFSET):
+    pair = ChannelComparison(course, theirs, comparable, judge(course, theirs, comparable, coverage))
+    if pair.judged.verdict not in (Verdict.NOT, Verdict.OFFSET):
         return pair
-    where = comparable & np.isfinite(course.mean) & np.isfinite(theirs)
+    residual = np.where(comparable, difference(course.mean, theirs), np.nan)
     free = None if model.measures[channel].of_motion else frictionless.courses.get(channel)
-    found = causes(
-        course.mean[where], theirs[where], np.asarray(condition.phase)[where], closed=model.run.cycle.periodic,
-        turning=model.measures[channel].turning(model.run.system), without=None if free is None else free[where],
-        drive=model.drive[where] if model.unit == "rad" else None, datum=course.accuracy.datum,
-    )  # fmt: skip
-    if apart(condition.speed, model.speed):  # forces of another speed are no error of the angle
-        found = [one for one in found if one.kind not in ("shift", "mirror")]
-    stated = course.accuracy.zero, course.accuracy.gain
-    found.sort(key=lambda one: beyond_stated(one, *stated) > STATED)  # such a sensor only where nothing else explains
-    random = uncertainty_of(course).random[where]
-    noise = float(np.nanmean(random**2)) / judged.rms**2 if np.isfinite(random).any() and judged.rms > 0 else 0.0
-    cause, others = best(found, noise)
-    friction = next((one.explains for one in found if one.kind == "friction"), np.nan)
-    return replace(pair, cause=cause, others=tuple(others), friction=friction)
+    drive = model.drive if model.unit == "rad" else None
+    return replace(pair, causes=causes(residual, theirs, course.accuracy.datum, drive, free))
+
+
+def _unmeasured(mechanism: Mechanism, condition: Condition) -> tuple[str, ...]:
+    """Drivers, useful loads and springs that no channel tells the effort of, by their entries in the model."""
+    measured = {course.measures for course in condition.courses.values()}
+    drivers = (f"drivers.{name}" for name in mechanism.drivers if f"effort:{name}" not in measured)
+    loads = (f"loads.{name}" for name in useful_loads(mechanism) if f"load:{name}" not in measured)
+    return (*drivers, *loads, *(f"springs.{name}" for name in useful_springs(mechanism)))
 
 
 VAGUE = 0.5  # expanded uncertainty from which an efficiency is none

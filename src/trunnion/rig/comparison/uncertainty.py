@@ -68,7 +68,7 @@ def uncertainty_of(course: Signal) -> Uncertainty:
     return Uncertainty(random, local, shared, course.count, course.turns - course.mean)
 
 
-def at_positions(of: Uncertainty, where: NDArray[np.bool_] | NDArray[np.intp]) -> Uncertainty:
+def at_positions(of: Uncertainty, where: NDArray[np.bool_]) -> Uncertainty:
     """The uncertainty at some of the positions."""
     return Uncertainty(of.random[where], of.local[where], of.shared[:, where], of.count[where], of.turns[:, where])
 
@@ -79,11 +79,8 @@ def nearly_whole(turns: Array) -> Array:
     return np.asarray(np.nan_to_num(turns[there]))
 
 
-def mean_expanded(of: Uncertainty, coverage: float, most: float = np.inf) -> float:
-    """U of the mean residual: scatter of the means of the turns, zero and gain; NaN with fewer than two turns.
-
-    most: effective degrees of freedom that are counted at most, for each degree of the turns.
-    """
+def mean_expanded(of: Uncertainty, coverage: float) -> float:
+    """U of the mean residual: scatter of the means of the turns, zero and gain; NaN with fewer than two turns."""
     means = np.mean(nearly_whole(of.turns), axis=1)
     if len(means) < 2:
         return float("nan")
@@ -91,4 +88,4 @@ def mean_expanded(of: Uncertainty, coverage: float, most: float = np.inf) -> flo
     local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
     shared = np.mean(of.shared, axis=1, keepdims=True)
     own = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
-    return float(expanded(own.total, np.minimum(own.freedom, most * (len(means) - 1)), coverage)[0])
+    return float(expanded(own.total, own.freedom, coverage)[0])

@@ -93,16 +93,6 @@ class Block:
         """Whether it tells how much turns scatter."""
         return bool(self.turns.shape[0] > 1 and np.any(self.deviations != 0))
 
-    @property
-    def stated(self) -> bool:
-        """Whether it does not repeat, and what is stated of it tells how far it may be off."""
-        return self.course.accuracy.stated > 0 and not self.repeats
-
-    @property
-    def known(self) -> bool:
-        """Whether how far it may be off is known without the model."""
-        return self.repeats or self.stated
-
     @cached_property
     def variance(self) -> Array:
         """Variance of one turn, (position,): pooled over the positions; NaN if it does not repeat.

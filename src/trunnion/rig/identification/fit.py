@@ -182,8 +182,8 @@ class FitProblem:
     """What is fitted: the model to the blocks.
 
     masks: positions used, by block; variances: of one turn, by block; factors: by channel, for the correlation within a
-    turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; refused: how often a step
-    was taken back because the model has no answer there; progress: called with the number of models evaluated.
+    turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; progress: called with the
+    number of models evaluated.
     """
 
     model: Model
@@ -194,7 +194,6 @@ class FitProblem:
     variances: list[Array] = field(default_factory=list)
     factors: dict[str, float] = field(default_factory=dict)
     left_over: float = 1.0
-    refused: int = 0
     evaluations: int = 0
     progress: Callable[[int], None] | None = None
 
@@ -316,8 +315,6 @@ class FitProblem:
         for block in self.blocks:
             if block.repeats:
                 self.variances.append(block.variance)
-            elif block.stated:  # all of it is `unresolved`
-                self.variances.append(np.zeros(block.turns.shape[1]))
             else:
                 data = block.mean if block.fitted else block.held_mean
                 size = float(np.sqrt(np.nanmean(data**2))) if np.any(np.isfinite(data)) else 0.0
@@ -325,7 +322,7 @@ class FitProblem:
 
     def learn_scatter(self, x: Array) -> bool:
         """Variances of blocks without repetitions by the residuals of their channel; whether there are such."""
-        single = [k for k, block in enumerate(self.blocks) if block.fitted and not block.known]
+        single = [k for k, block in enumerate(self.blocks) if block.fitted and not block.repeats]
         for channel in dict.fromkeys(self.blocks[k].channel for k in single):
             own = [k for k in single if self.blocks[k].channel == channel]
             gaps = [self.misses(x, k, self.blocks[k].mean)[self.masks[k]] for k in own]
@@ -348,10 +345,7 @@ class FitProblem:
             if block.fitted:
                 mask = self.masks[k]
                 rows.append((np.sqrt(self.weight(k)) * self.misses(x, k, block.mean))[mask])
-        found = np.concatenate([*rows, (x * self.prior)[self.count :]])
-        if not np.all(np.isfinite(found)):
-            self.refused += 1
-        return found
+        return np.concatenate([*rows, (x * self.prior)[self.count :]])
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (residual, unknown and sensor)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["amount", "decimals", "joined", "scaled", "share"]
+__all__ = ["amount", "decimals", "joined", "scaled"]
 
 READ = {"rad": (180 / math.pi, "°"), "m": (1e3, "mm"), "1": (1.0, ""), "": (1.0, "")}
 
@@ -39,11 +39,6 @@ def amount(value: float, half: float | None, unit: str) -> str:
     if places < 0:
         return f"{round(value * factor, places):.0f} ± {round(half, places):.0f}{tail}"
     return f"{value * factor + 0.0:.{places}f} ± {half:.{places}f}{tail}"
-
-
-def share(part: float) -> str:
-    """A share in whole percent."""
-    return f"{100 * part:.0f} %"
 
 
 def joined(names: Sequence[str]) -> str:

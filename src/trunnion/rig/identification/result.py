@@ -13,11 +13,9 @@ from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.tables.identification import CURVES
 from trunnion.rig.comparison.result import data_findings, hashed_files
-from trunnion.rig.identification.assessment import Assessment
-from trunnion.rig.identification.findings import sentences
+from trunnion.rig.identification.findings import findings_of
 from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.uncertainty import CONFIDENCE
-from trunnion.rig.reading.measurement import Measurement
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,21 +31,20 @@ SOURCES = (
 
 def dataset(found: Identified) -> xr.Dataset:
     """Estimates with all that is said of them."""
-    judged = Assessment(found)
     problem, measurement = found.problem, found.measurement
     unknowns = problem.model.unknowns
     names = [one.name for one in unknowns]
-    rows = _parameters(judged) | _sensors(judged) | _blocks(judged)
+    rows = _parameters(found) | _sensors(found) | _blocks(found)
     labels = {
         "parameter": names,
         "parameter_2": names,
-        "source": judged.budget[0],
+        "source": found.budget[0],
         "sensor": [one.name for one in problem.sensors],
         "channel": list(problem.model.measures),
         "condition": [one.name for one in measurement.conditions],
     }
     variables = described({name: rows[name] for name in VARIABLES}, VARIABLES)
-    system = found.run.system
+    system = problem.model.run.system
     attributes = {
         "name": found.mechanism.name,  # ahead of `identified`, as it always was
         "identified": measurement.name,
@@ -58,8 +55,7 @@ def dataset(found: Identified) -> xr.Dataset:
         "channel_units": [one.unit(system) for one in problem.model.measures.values()],
         "channel_measures": [one.name for one in problem.model.measures.values()],
         "drive": _drive(found),
-        "drive_range": _driven(judged),
-        **({"durations": _durations(measurement)} if measurement.of_starts else {}),
+        "drive_range": _driven(found),
         "files": [list(one.files) for one in measurement.conditions],
         "data_files": hashed_files(measurement.conditions),
         "data_findings": data_findings(measurement),
@@ -69,14 +65,9 @@ def dataset(found: Identified) -> xr.Dataset:
         "starts": found.search.starts,
         "converged": int(found.search.fit.converged),
         "references": "\n".join([*SOURCES, *references(found.mechanism)]),
-        "findings": finding_rows(sentences(judged)),
+        "findings": finding_rows(findings_of(found)),
     }
     return dataset_of("identification", variables, labels, attributes)
-
-
-def _durations(measurement: Measurement) -> list[float | None]:
-    """How long each start is followed, s; None for what the model states."""
-    return [one.duration if np.isfinite(one.duration) else None for one in measurement.conditions]
 
 
 def _drive(found: Identified) -> str:
@@ -84,10 +75,10 @@ def _drive(found: Identified) -> str:
     return next(iter(found.mechanism.drivers), "")
 
 
-def _driven(judged: Assessment) -> list[list[float] | None]:
+def _driven(found: Identified) -> list[list[float] | None]:
     """Angles of the first driver where the cycle begins and ends, rad, by condition; None if they name no position."""
-    model = judged.problem.model
-    ends = (model.driven(k, judged.told) for k in range(len(model.phases)))
+    model = found.problem.model
+    ends = (model.driven(k, found.told) for k in range(len(model.phases)))
     return [[first, last] if np.isfinite([first, last]).all() else None for first, last, _ in ends]
 
 
@@ -151,36 +142,36 @@ VARIABLES = {
 }
 
 
-def _parameters(judged: Assessment) -> dict[str, Array]:
-    n = judged.problem.count
-    low, high = judged.interval
+def _parameters(found: Identified) -> dict[str, Array]:
+    n = found.problem.count
+    low, high = found.interval
     return {
-        "start": judged.start[:n],
-        "estimate": judged.estimate,
-        "standard_uncertainty": judged.deviation[:n],
+        "start": found.start[:n],
+        "estimate": found.estimate,
+        "standard_uncertainty": found.deviation[:n],
         "lower": low,
         "upper": high,
-        "degrees_of_freedom": judged.found.spread.freedom[:n],
-        "limit": judged.limit,
-        "told": (~judged.lost[:n]).astype(np.int8),
-        "correlation": judged.correlation,
-        "share": judged.budget[1],
-        "singular_value": judged.singular_values,
-        "reduced_chi_squared": np.asarray(judged.found.spread.test.reduced),
-        "chi_squared_freedom": np.asarray(judged.found.spread.test.freedom),
-        "chi_squared_chance": np.asarray(judged.found.spread.test.chance),
-        "turn_correlation": np.asarray(judged.found.spread.follows),
-        "hold_out_ratio": np.asarray(judged.trust),
+        "degrees_of_freedom": found.spread.freedom[:n],
+        "limit": found.limit,
+        "told": (~found.lost[:n]).astype(np.int8),
+        "correlation": found.correlation,
+        "share": found.budget[1],
+        "singular_value": found.singular_values,
+        "reduced_chi_squared": np.asarray(found.spread.test.reduced),
+        "chi_squared_freedom": np.asarray(found.spread.test.freedom),
+        "chi_squared_chance": np.asarray(found.spread.test.chance),
+        "turn_correlation": np.asarray(found.spread.follows),
+        "hold_out_ratio": np.asarray(found.trust),
     }
 
 
-def _sensors(judged: Assessment) -> dict[str, Array]:
-    n = judged.problem.count
-    lost = judged.lost[n:]
+def _sensors(found: Identified) -> dict[str, Array]:
+    n = found.problem.count
+    lost = found.lost[n:]
     return {
-        "sensor_error": np.where(lost, np.nan, judged.found.x[n:]),
-        "sensor_uncertainty": judged.deviation[n:],
-        "sensor_size": np.array([_size(one.sizes) for one in judged.problem.sensors]),
+        "sensor_error": np.where(lost, np.nan, found.x[n:]),
+        "sensor_uncertainty": found.deviation[n:],
+        "sensor_size": np.array([_size(one.sizes) for one in found.problem.sensors]),
     }
 
 
@@ -190,22 +181,22 @@ def _size(sizes: Sequence[float]) -> float:
     return known.pop() if len(known) == 1 else float("nan")
 
 
-def _blocks(judged: Assessment) -> dict[str, Array]:
-    problem = judged.problem
+def _blocks(found: Identified) -> dict[str, Array]:
+    problem = found.problem
     channels = list(problem.model.measures)
-    shape = len(channels), len(judged.found.measurement.conditions)
-    longest = max(len(one.phase) for one in judged.found.measurement.conditions)
+    shape = len(channels), len(found.measurement.conditions)
+    longest = max(len(one.phase) for one in found.measurement.conditions)
     figures = {key: np.full(shape, np.nan) for key in FIGURES}
     counts = {key: np.zeros(shape, np.int32) for key in COUNTS}
     curves = {key: np.full((*shape, longest), np.nan) for key in CURVES}
     phase = np.full((shape[1], longest), np.nan)
-    for i, condition in enumerate(judged.found.measurement.conditions):
+    for i, condition in enumerate(found.measurement.conditions):
         phase[i, : len(condition.phase)] = condition.phase
 
     def place(k: int) -> tuple[int, int]:
         return channels.index(problem.blocks[k].channel), problem.blocks[k].condition
 
-    for one in judged.misses:
+    for one in found.misses:
         at, block = place(one.block), problem.blocks[one.block]
         for key, value in zip(FIGURES[:3], (one.before, one.after, one.expected), strict=True):
             figures[key][at] = value
@@ -213,7 +204,7 @@ def _blocks(judged: Assessment) -> dict[str, Array]:
             counts[key][at] = number
         for key, row in zip(CURVES, (block.mean, *one.curves), strict=True):
             curves[key][at][: len(row)] = row
-    for held in judged.held_out:
+    for held in found.held_out:
         at = place(held.block)
         counts["held_out_turns"][at] = held.turns
         for key, value in zip(FIGURES[3:], (held.before, held.after, held.expected), strict=True):

@@ -20,10 +20,8 @@ from trunnion.rig.identification.identifiability import inseparable
 from trunnion.rig.identification.misfit import explanations
 from trunnion.rig.identification.search import search
 from trunnion.rig.identification.signals import Model, SeatedModel
-from trunnion.rig.identification.start_signals import StartModel, check_starts
 from trunnion.rig.identification.uncertainty import left_over, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.identification.unused import UnusedChannels
 from trunnion.rig.modelled import apart, check_settings, refuse_backwards, refuse_unit, told_at
 from trunnion.rig.reading.efficiency import load_joints
 from trunnion.rig.reading.measurement import Measurement
@@ -87,16 +85,14 @@ def identify(
     joints = load_joints(stated)
     held, share = held_out(stated, measurement, hold_out)
     blocks = blocks_of(measurement, channels_of(measurement, channels, joints), held, share, joints)
-    measures = _measures(stated, run, blocks, measurement.of_starts)
+    measures = _measures(stated, run, blocks)
     phases = tuple(np.asarray(one.phase, float) for one in measurement.conditions)
     kind = SeatedModel if any(seat.given is None for seat in run.seats) else Model
     model = kind(run, tuple(unknowns(stated, paths, start or {})), measures, settings, phases,
                  friction_method or FrictionMethod())  # fmt: skip
-    if measurement.of_starts:
-        model = StartModel.of(model, measurement.conditions)
-    unused = UnusedChannels(model, [])
+    unused: list[str] = []
     if channels is None:
-        model, blocks, unused = _telling(model, blocks, measurement, delay or 0.0)
+        model, blocks, unused = _telling(model, blocks)
     at = np.array([one.start for one in model.unknowns])
     speeds = [(one, model.driven(k, at)[2]) for k, one in enumerate(measurement.conditions)]
     refuse_backwards(next(iter(stated.drivers), ""), speeds)
@@ -108,7 +104,7 @@ def identify(
 
 
 def _solved(
-    mechanism: Mechanism, measurement: Measurement, problem: FitProblem, starts: int | None, unused: UnusedChannels
+    mechanism: Mechanism, measurement: Measurement, problem: FitProblem, starts: int | None, unused: Sequence[str]
 ) -> Identified:
     """The estimates, what they are worth, and what would explain a misfit."""
     found = search(problem, starts)
@@ -120,8 +116,8 @@ def _solved(
     groups = inseparable(problem, found.fit.x, spread)
     speeds = (problem.model.driven(k, found.fit.x[: problem.count])[2] for k in range(len(measurement.conditions)))
     other = any(apart(one.speed, speed) for one, speed in zip(measurement.conditions, speeds, strict=True))
-    causes = explanations(problem, found, spread.test, unused) if spread.test.misfit and not other else []
-    return Identified(mechanism, measurement, problem.model.run, problem, found, spread, groups, causes, unused)
+    causes = explanations(problem, found.start, spread.test) if spread.test.misfit and not other else []
+    return Identified(mechanism, measurement, problem, found, spread, groups, causes, unused)
 
 
 def _check(sensors: str, delay: float | None, guard: int | None, starts: int | None) -> None:
@@ -137,9 +133,7 @@ def _check(sensors: str, delay: float | None, guard: int | None, starts: int | N
         raise MechanismError(Finding(f"the number of start points is {starts}", "starts", "give 1 or more"))
 
 
-def _telling(
-    model: Model, blocks: list[Block], measurement: Measurement, delay: float
-) -> tuple[Model, list[Block], UnusedChannels]:
+def _telling(model: Model, blocks: list[Block]) -> tuple[Model, list[Block], list[str]]:
     """Only the channels that an unknown acts on, as far as the start tells, all if there are none; then the others."""
     courses = model.courses(np.array([one.start for one in model.unknowns]))
     sizes = np.array([one.size or 1.0 for one in model.unknowns])
@@ -150,11 +144,7 @@ def _telling(
             change = float(np.nanmax(np.abs(np.nan_to_num(one.slope)) * sizes[:, None], initial=0.0))
             moved[name] = max(moved[name], change / most if most else change)
     kept = {name: model.measures[name] for name, share in moved.items() if share > NOTHING} or model.measures
-    others = {name: measure for name, measure in model.measures.items() if name not in kept}
-    late = [float(np.hypot(one.cut / (one.speed or np.inf), one.lag)) for one in measurement.conditions]
-    unused = UnusedChannels(
-        replace(model, measures=others), [one for one in blocks if one.channel in others], late, delay
-    )
+    unused = [name for name in model.measures if name not in kept]
     return replace(model, measures=kept), [block for block in blocks if block.channel in kept], unused
 
 
@@ -201,7 +191,7 @@ def _settings(
     return tuple(found)
 
 
-def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block], of_starts: bool) -> dict[str, Measure]:
+def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
     """What each channel measures; MechanismError for what has no course."""
     texts: dict[str, str] = {}
     for block in blocks:
@@ -209,9 +199,6 @@ def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block], of_starts
             what = f"measures {texts[block.channel]} in one condition and {block.course.measures} in another"
             raise MechanismError(Finding(what, f"channel {block.channel}", "use separate channels"))
     found = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
-    if of_starts:
-        check_starts(mechanism, found, blocks)
-        return found
     for name, measure in found.items():
         if not measure.everywhere or not (measure.single(run.system) or measure.kind == EFFICIENCY):
             what = f"measures {texts[name]}, which is no one number at each position{told_at(measure)}"

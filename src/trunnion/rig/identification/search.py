@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, fit
 from trunnion.rig.identification.identifiability import sizes_of
-from trunnion.rig.identification.start_signals import StartModel
 from trunnion.rig.identification.uncertainty import correlation_factors, lack_of_fit
 
 __all__ = ["Search", "inside", "refined", "refuse_unusable", "search"]
@@ -30,12 +29,11 @@ COURSE = 1e-3  # of the largest value: what the model must change by over the cy
 class Search:
     """How the search went.
 
-    start: (unknown,), after what was changed of it; shares: of the stated start that friction was lessened to;
-    fit: where it ended; starts: how many; other: another place that fits as well.
+    start: (unknown,), with less friction than stated where that locks; fit: where it ended; starts: how many; other:
+    another place that fits as well.
     """
 
     start: Array
-    shared: float
     fit: LeastSquaresFit
     starts: int
     other: Array | None
@@ -45,7 +43,7 @@ class Search:
 def search(problem: FitProblem, starts: int | None) -> Search:
     """The estimates. starts: how many places to begin at; 1, and more if the model does not fit, if not given."""
     problem.start_scatter()
-    first, shared = _runnable(problem)
+    first = _runnable(problem)
     best, settled = refined(problem, inside(problem, first))
     count, other = 1, None
     wanted = len(OTHERS) if starts is None else max(0, starts - 1)
@@ -67,15 +65,15 @@ def search(problem: FitProblem, starts: int | None) -> Search:
         elif away > CLOSE and found.cost < best.cost + AS_GOOD:
             other = found.x
     problem.masks, problem.variances, problem.factors = kept
-    return Search(first[: problem.count], shared, best, count, other, settled)
+    return Search(first[: problem.count], best, count, other, settled)
 
 
-def _runnable(problem: FitProblem) -> tuple[Array, float]:
-    """The start, with less friction where that locks; how much of it is left. MechanismError if nothing runs."""
+def _runnable(problem: FitProblem) -> Array:
+    """The start, with less friction where that locks. MechanismError if nothing runs."""
     start = np.array([one.start for one in problem.model.unknowns] + [0.0] * len(problem.sensors))
     rubs = np.array([any(".friction." in path for path in one.paths) for one in problem.model.unknowns], bool)
     low = np.array([one.lower for one in problem.model.unknowns])
-    lost, shared, best = problem.unanswered(start), 1.0, start
+    lost, best = problem.unanswered(start), start
     for k in range(1, HALVINGS + 1):
         if not lost or not np.any(rubs):
             break
@@ -83,9 +81,9 @@ def _runnable(problem: FitProblem) -> tuple[Array, float]:
         less[: problem.count][rubs] = np.maximum(start[: problem.count][rubs] * 0.5**k, low[rubs])
         found = problem.unanswered(less)
         if found < lost:
-            lost, shared, best = found, 0.5**k, less
+            lost, best = found, less
     refuse_unusable(problem, best)
-    return best, shared
+    return best
 
 
 def inside(problem: FitProblem, start: Array) -> Array:
@@ -167,11 +165,6 @@ def _unusable(problem: FitProblem, start: Array) -> Iterator[Finding]:
     if _any(bare, start):
         what = "all positions are left out: each is next to a friction reversal"
         yield Finding(what, "guard", "give a smaller guard, or resample to more positions")
-        return
-    if isinstance(problem.model, StartModel):
-        what = "the model has no start with all that was measured: it stalls, ends early or does not run steadily"
-        remedy = "give start values with which it starts, or a longer duration; see `trunnion simulate`"
-        yield Finding(what, "start", remedy)
         return
     codes = np.concatenate([np.asarray(one) for one in problem.courses(start).status])
     worst = list(Status)[int(np.bincount(codes).argmax())]

@@ -21,7 +21,6 @@ from trunnion.rig.reading.repeated_steps import covariance_of_steps
 __all__ = [
     "CONFIDENCE",
     "RANDOM",
-    "STATED",
     "Covariances",
     "Test",
     "correlation_factors",
@@ -33,7 +32,6 @@ __all__ = [
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 NEIGHBOURS = 5  # frequencies that a power is smoothed over
-STATED = "stated uncertainty"  # of values of starts
 RANDOM = ("scatter", "conditions", "misfit")
 FLOOR = 0.05  # of the mean power: what is below it decides nothing
 UNLIKELY = 0.001  # a chance below which the model is said not to fit
@@ -179,11 +177,9 @@ def spread_of(problem: FitProblem, x: Array) -> Covariances:
         parts["conditions"] = turns * np.outer(wider, wider)
         between = np.full(count, max(len(alone) - 1.0, 1.0))
         freedom = _joined([(turns, freedom), (parts["conditions"], between)])
-    for source, stated in (("resolution", False), (STATED, True)):
-        own = [k for k, block in enumerate(problem.blocks) if (block.course.accuracy.stated > 0) == stated]
-        steps = _steps(problem, x, inverse, own)
-        if np.any(steps):
-            parts[source] = steps
+    steps = _steps(problem, x, inverse, range(len(problem.blocks)))
+    if np.any(steps):
+        parts["resolution"] = steps
     left, pieces = _left_over(problem, x, inverse, again=False)
     if np.any(left):
         freedom = _joined([(turns + parts.get("conditions", 0.0), freedom), (left, np.full(count, pieces))])
@@ -384,11 +380,6 @@ def lack_of_fit(problem: FitProblem, x: Array) -> Test:
         mean += float(np.mean(each)) + sum(float(np.mean(one[1])) for one in found if len(one[1]) != turns)
         least = sum(one[2] for one in found)
         variance += max(float(np.var(each, ddof=1)), least) * (1 + 1 / turns)
-    stated = [k for k, one in enumerate(problem.blocks) if one.fitted and one.stated and np.any(problem.masks[k])]
-    if stated:  # of normal errors of these sizes: χ² of as many
-        weighed = [problem.misses(x, k, problem.blocks[k].mean)[0] / problem.blocks[k].unresolved for k in stated]
-        value, mean = value + float(np.sum(np.square(weighed))), mean + len(stated)
-        variance += 2 * len(stated) * (1 - min(problem.count / mean, 0.5))
     mean -= min(float(problem.count), 0.5 * mean)
     if mean <= 0 or variance <= 0:
         return Test(float("nan"), float("nan"), float("nan"))
@@ -436,7 +427,7 @@ def _left_over(problem: FitProblem, x: Array, inverse: Array, again: bool) -> tu
     pieces, gaps = 0.0, []
     for k, block in enumerate(problem.blocks):
         mask = problem.masks[k]
-        if not block.fitted or block.known != again or not np.any(mask):
+        if not block.fitted or block.repeats != again or not np.any(mask):
             continue
         gap = np.where(mask, problem.misses(x, k, block.mean), 0.0)
         power = _smooth(_powers(gap))

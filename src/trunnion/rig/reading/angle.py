@@ -16,7 +16,6 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.units import UnitError
-from trunnion.rig.reading.angle_steps import stated_as, unstated_step
 from trunnion.rig.reading.channels import compare_units
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.local_polynomials import by_local_polynomials
@@ -33,9 +32,6 @@ TURN = 2 * np.pi
 JUMP = 8.0  # times the usual step, by which a cell is off its neighbours
 SPANS = (2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # turns over which it is tried, the longest first
 ORDER = 3
-LOOKED_AT = 50_000  # readings of which steps are told
-COARSE = 0.3  # of what an angle gains in a sample: steps from which they are told
-PLAIN = 0.5  # rad, from which a zero without a unit is asked about
 FEWEST = 5  # pulses in a span
 BOUND = 1.1  # of what a pulse may be off: more tells that the shaft itself runs unevenly
 EVEN = 1.1 / np.sqrt(3.0)  # the same of the root mean square, of errors spread evenly
@@ -46,14 +42,13 @@ class Coordinate:
     """Coordinate of the driver by row, rad, NaN where it is not known.
 
     spoilt: stretches of time, (stretch, 2), in which it is wrong; lag: standard uncertainty, s, of the time at which it
-    passes a value, in the mean over many pulses; step: of the readings, rad, where it is neither stated nor told of;
-    cut: standard uncertainty, rad with the sign of the readings, of what all are off by if they are cut off.
+    passes a value, in the mean over many pulses; cut: standard uncertainty, rad with the sign of the readings, of what
+    all are off by if they are cut off.
     """
 
     values: Array
     spoilt: Array
     lag: float = 0.0
-    step: float = 0.0
     cut: float = 0.0
 
 
@@ -77,7 +72,6 @@ def coordinate(
     else:
         assert speed is not None
         values = _integrated(speed, line, account)
-    step = _unstated(source, values, account)
     values, lag, cut = _refined(source, values, line, account)
     values = source.sign * values
     if index.size > 1 and source.from_ in ("time", "speed"):
@@ -85,7 +79,7 @@ def coordinate(
     else:
         spoilt = np.empty((0, 2))
         _check_index(values, index, line, account)
-    return Coordinate(values + zero, spoilt, lag, step, source.sign * cut)
+    return Coordinate(values + zero, spoilt, lag, source.sign * cut)
 
 
 def _refined(source: AngleSource, values: Array, line: Timeline, account: Account) -> tuple[Array, float, float]:
@@ -110,37 +104,6 @@ def _refined(source: AngleSource, values: Array, line: Timeline, account: Accoun
     return refined, unresolved((raw - smooth)[spans > 0], step) / rate, step / math.sqrt(12.0)
 
 
-def _unstated(source: AngleSource, values: Array, account: Account) -> float:
-    """The step of an angle, rad, that is not stated; 0 if there is none, or if it is wide enough to be told at once."""
-    if source.from_ != "column" or source.resolution is not None or _tell_steps(source, values, account):
-        return 0.0
-    return unstated_step(values)
-
-
-def _tell_steps(source: AngleSource, values: Array, account: Account) -> bool:
-    """Tell of an angle that is read in steps as wide as what it gains in a few samples: they shift it within a turn.
-
-    From sample to sample it then gains one step or another number of them; of one that is read finely, always as much.
-    """
-    part = values[:LOOKED_AT]
-    gained = np.abs(np.diff(part))
-    gained = gained[np.isfinite(gained)]  # from each row to the next: a reading that is left out is no step
-    levels = np.unique(np.round(part[np.isfinite(part)] % TURN, 9))
-    if not np.any(gained > 0) or not FEWEST < levels.size < part.size / FEWEST:
-        return False
-    apart = np.diff(levels)
-    step = float(np.median(apart))
-    low, high = np.percentile(gained[gained > 0], (1, 99))
-    between = np.diff(np.flatnonzero(gained > 0))  # samples from one step to the next; more than a few, and it stands
-    uneven = high - low > 0.5 * step or np.mean((between > 1) & (between < 1 / COARSE**2)) > 0.05
-    if uneven and float(np.percentile(apart, 5)) > 0.7 * step and step > COARSE * float(np.mean(gained[gained > 0])):
-        told = stated_as(step)
-        what = f"the column '{source.column}' is read in steps of {told}, about what it gains in a sample"
-        account.note("data.angle.steps", "angle", what, f"state angle: {{resolution: {told}}} to have it smoothed")
-        return True
-    return False
-
-
 def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: Account) -> Array:
     column = table.columns[str(source.column)]
     unit = source.unit or column.unit
@@ -162,7 +125,6 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
         raise MechanismError(Finding(what, "angle", "name another column", file=account.file))
     if source.unit:
         compare_units("angle", str(source.column), source.unit, column, account)
-    _check_zero(source, unit, factor, account)
     values = _without_jumps(source, line.rows(column.values) * factor, line, account)
     finite = np.flatnonzero(np.isfinite(values))
     if finite.size < values.size:
@@ -182,15 +144,6 @@ def _of_column(source: AngleSource, table: DataTable, line: Timeline, account: A
         account.warn("data.angle.few_samples", "angle", what, "sample at least 8 times a turn")
     values[finite] = told
     return values
-
-
-def _check_zero(source: AngleSource, unit: str, factor: float, account: Account) -> None:
-    """Tell of a zero that is a plain number, so rad, and may be meant in another unit, that of the readings."""
-    size = float(source.zero.evaluate())
-    if factor != 1 and source.zero.expression is None and abs(size) > PLAIN:
-        told = f"{size:g}"
-        what = f"zero: {told} has no unit and is taken as rad, {np.degrees(size):.4g}°; the readings are in {unit}"
-        account.warn("data.angle.zero_unit", "angle.zero", what, f"write {told} {unit} or {told} rad")
 
 
 def _without_jumps(source: AngleSource, values: Array, line: Timeline, account: Account) -> Array:

@@ -20,6 +20,7 @@ from trunnion.rig.reading.sensor_quantity import HERTZ, Amount, alike, dimension
 from trunnion.rig.reading.timebase import Timeline
 
 __all__ = [
+    "LOOKED_AT",
     "ChannelReading",
     "Zeroed",
     "compare_units",
@@ -279,12 +280,12 @@ def filtered(values: Array, line: Timeline, low_pass: Filter, account: Account, 
 
 
 def resolution(readings: Array) -> float:
-    """Step of which all readings are multiples, in readings; 0 where there is none.
+    """Step of which all readings of a channel are multiples, in readings; 0 where there is none.
 
     The least distance between two levels, if it is one, else the last decimal. Of few levels, of which not most are one
     step apart, it is none: a signal that is switched has no steps.
     """
-    levels = np.unique(readings[np.isfinite(readings)][:LOOKED_AT])
+    levels = np.unique(readings[np.isfinite(readings)])
     if levels.size < FEWEST_LEVELS:
         return 0.0
     apart = np.diff(levels)

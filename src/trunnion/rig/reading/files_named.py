@@ -23,11 +23,6 @@ def files_of(
     """
     entries = mapped.mapping.files
     named = [Path(one) for one in files or ()]
-    if mapped.mapping.starts and named:
-        what = "the mapping states starts, each with the file that it was recorded in"
-        raise MechanismError(mapped.placed([Finding(what, "starts", "name the files there")]))
-    if mapped.mapping.starts:
-        return [(mapped.folder / one.file, one) for one in mapped.mapping.starts if one.file], []
     if not named and not entries:
         finding = Finding(
             "no data file is named", "files", "write files: [{file: run-01.csv}], or name them after the mapping"

@@ -28,6 +28,7 @@ class Account:
     done: dict[str, list[float | str]] = field(default_factory=dict)
     recorded: float = 0.0
     left_out: int = 0
+    failed: bool = False
 
     def warn(self, code: str, where: str, what: str, remedy: str, severity: Severity = Severity.WARNING) -> None:
         """A fault of the data."""

@@ -25,8 +25,6 @@ __all__ = [
     "FixedNumber",
     "FixedTime",
     "FromData",
-    "Measured",
-    "Start",
     "TimeBase",
     "Zero",
 ]
@@ -264,78 +262,6 @@ class File(Part):
         return self
 
 
-def _several(value: object) -> object:
-    """One value as a list of values."""
-    return value if isinstance(value, (list, tuple)) else [value]
-
-
-class Measured(Part):
-    """Values of one quantity of a start, one for each repetition of it, with the standard uncertainty of each."""
-
-    values: Annotated[
-        tuple[Number, ...],
-        BeforeValidator(_several),
-        Field(min_length=1, max_length=10_000),
-        WithJsonSchema({"type": ["number", "string", "array"], "items": {"type": ["number", "string"]}}),
-    ]
-    uncertainty: Number | None = None
-    accuracy: Accuracies = Accuracies()
-
-    @model_validator(mode="after")
-    def _known(self) -> Measured:
-        if self.uncertainty is not None and not self.uncertainty.value > 0:
-            raise problem("the standard uncertainty is not above zero", "write one such as 10 ms")
-        if self.uncertainty is None and len({one.value for one in self.values}) < 2:
-            remedy = "state the standard uncertainty of a value, uncertainty: 10 ms, or the values of several starts"
-            raise problem("the uncertainty of the value is unknown", remedy)
-        return self
-
-
-class Start(File):
-    """A start in place of cycles: what was set, a data file of it from the time at which it begins, and values that
-    were measured of it; `duration` is how long the model is followed where there is no file."""
-
-    file: str = ""
-    duration: FixedTime | None = None
-    measured: Mapping[MeasureText, Measured] = {}
-
-    @model_validator(mode="after")
-    def _whole(self) -> Start:
-        if not self.file and not self.measured:
-            raise problem("nothing was measured", "add measured: {…} or file: start-01.csv")
-        if self.file and self.over is None:
-            raise problem("'over' is missing: when the start begins in the file, and where it ends", "write [0 s, 3 s]")
-        if self.over is not None and (self.duration is not None or not self.file):
-            raise problem("'over' is of a file, in place of a duration", "keep one of them")
-        if self.angle is not None:
-            raise problem("a start has no angle: time names its positions", "remove it")
-        if self.duration is not None and not self.duration.evaluate() > 0:
-            raise problem("the duration is not above zero", "write the time that the start is followed, such as 3 s")
-        for measures, one in self.measured.items():
-            _check_units(measures, one)
-        return self
-
-    @property
-    def followed(self) -> float:
-        """How long it is followed, s; NaN for what the model states."""
-        if self.over is not None:
-            return self.over[1].value - self.over[0].value
-        return float("nan") if self.duration is None else float(self.duration.evaluate())
-
-
-def _check_units(measures: str, measured: Measured) -> None:
-    """Units that what is measured of a start cannot have."""
-    spread = [one for one in (measured.uncertainty, measured.accuracy.zero) if one is not None and one.value]
-    try:
-        found = {scale(measures, one.unit, None).unit for one in (*measured.values, *spread)}
-    except UnitError as error:
-        raise problem(
-            f"{measures}: {error.what}", error.remedy.replace("state the gain, such as 100 mV/", "write ")
-        ) from None
-    if len(found) > 1:
-        raise problem(f"{measures}: values in {' and '.join(sorted(found))}", "write all in units of one quantity")
-
-
 class Filter(Part):
     """Butterworth low-pass, forward and backward: without delay."""
 
@@ -350,7 +276,6 @@ class DataMapping(Part):
     name: str = ""
     notes: str = ""
     files: tuple[File, ...] = ()
-    starts: tuple[Start, ...] = ()
     time: TimeBase | None = None
     angle: AngleSource | None = None
     channels: Annotated[Mapping[Name, Channel], Field(min_length=1)] = {}
@@ -371,8 +296,6 @@ class DataMapping(Part):
                 name: entry.channels[name].of(one) if name in entry.channels else one
                 for name, one in self.channels.items()
             }
-        if isinstance(entry, Start):
-            changes["cycle"] = Quantity.read(f"{entry.followed!r} s")
         return self.model_copy(update=changes) if changes else self
 
     @property

@@ -10,17 +10,16 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
-from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.errors import Finding, MechanismError
 from trunnion.model.file import Lines, place, read_entries
 from trunnion.model.findings import schema_findings
 from trunnion.model.names import nearest
 from trunnion.model.units import ANGLE, KINDS
 from trunnion.rig.reading.mapping import Channel, DataMapping, File, FromData
 
-__all__ = ["Mapped", "read_mapping", "vague_gains"]
+__all__ = ["Mapped", "read_mapping"]
 
 NOUN = "a mapping file"
-VAGUE = 0.05  # of a gain: a standard uncertainty that hardly a sensor has
 START = "write trunnion-data: 1, then files, time, angle and channels"
 
 
@@ -71,7 +70,7 @@ def _explained(finding: Finding, data: Mapping[str, Any]) -> Finding:
 def _check(mapping: DataMapping) -> Iterator[Finding]:
     """What one part alone cannot tell."""
     channels = mapping.channels
-    if not channels and not any(one.measured for one in mapping.starts):
+    if not channels:
         yield Finding("'channels' is missing", "", "write channels: {torque: {column: …, measures: …}}")
     settings = {f"set.{key}": value for key, value in mapping.set.items()}
     for key, file in _entries(mapping):
@@ -86,7 +85,6 @@ def _check(mapping: DataMapping) -> Iterator[Finding]:
             what = "states a zero of the angle, but no column gives an angle"
             yield Finding(what, f"{key}.angle", "add angle: {from: …}, or remove it")
         yield from _check_channels(file, f"{key}.channels", channels)
-    yield from _check_starts(mapping)
     source = mapping.angle.channel if mapping.angle else None
     if source is not None and source not in channels:
         yield Finding(f"there is no channel '{source}'", "angle.channel", nearest(source, channels))
@@ -105,51 +103,15 @@ def _check_cycle(mapping: DataMapping) -> Iterator[Finding]:
         yield Finding(f"'{mapping.cycle.source}' is no angle and no time", "cycle", "write it as 360 deg or 0.5 s")
     elif not float(mapping.cycle.evaluate()) > 0:
         yield Finding("the cycle is not above zero", "cycle", "write it as 360 deg or 0.5 s")
-    elif mapping.angle is None and not mapping.timed and not mapping.starts:
+    elif mapping.angle is None and not mapping.timed:
         remedy = "add angle: {from: …}, or write cycle: as a time"
         yield Finding("'angle' is missing: no column gives the coordinate of the driver", "", remedy)
 
 
 def _entries(mapping: DataMapping) -> Iterator[tuple[str, File]]:
-    """Every file and every start, by its place in the mapping."""
-    for key, files in (("files", mapping.files), ("starts", mapping.starts)):
-        for number, file in enumerate(files):
-            yield f"{key}.{number}", file
-
-
-def vague_gains(mapping: DataMapping) -> list[Finding]:
-    """Warnings of gains that are hardly known at all: more often a % is missing."""
-    stated = {f"channels.{name}": one.accuracy for name, one in mapping.channels.items()}
-    for key, file in _entries(mapping):
-        stated |= {f"{key}.channels.{name}": one.accuracy for name, one in file.channels.items() if one.accuracy}
-    for number, start in enumerate(mapping.starts):
-        stated |= {f"starts.{number}.measured.{name}": one.accuracy for name, one in start.measured.items()}
-    found = []
-    for where, accuracy in stated.items():
-        gain, source = float(accuracy.gain.evaluate()), accuracy.gain.source
-        if gain > VAGUE:
-            what = f"the standard uncertainty of the gain is {100 * gain:.6g} %: within it nearly every model agrees"
-            remedy = "check it against the data sheet" if "%" in str(source) else f"write {source} % if that is meant"
-            code, figures = "data.accuracy.gain", {"gain": gain}
-            found.append(Finding(what, f"{where}.accuracy.gain", remedy, Severity.WARNING, code=code, figures=figures))
-    return found
-
-
-def _check_starts(mapping: DataMapping) -> Iterator[Finding]:
-    """What does not go together with starts."""
-    for key in ("files", "angle", "cycle", "start") if mapping.starts else ():
-        if key in mapping.model_fields_set:
-            yield Finding("is of cycles, and the mapping states starts", key, "remove it, or use two mappings")
-    for number, one in enumerate(mapping.starts):
-        if one.file and not mapping.channels:
-            yield Finding("no channel is read from the file", f"starts.{number}.file", "add channels")
-        if twice := sorted(set(one.measured) & set(mapping.channels)):
-            what = f"'{twice[0]}' is the name of a channel"
-            yield Finding(what, f"starts.{number}.measured", "name the channel otherwise")
-        for name, value in {**mapping.set, **one.set}.items():
-            if isinstance(value, FromData) and not one.file:
-                what = "takes a value from data, but the start has no file"
-                yield Finding(what, f"starts.{number}.set.{name}", "write a number with its unit")
+    """Every file by its place in the mapping."""
+    for number, file in enumerate(mapping.files):
+        yield f"files.{number}", file
 
 
 def _check_channels(file: File, where: str, channels: Mapping[str, Channel]) -> Iterator[Finding]:

@@ -5,15 +5,11 @@ Everything is SI. A measurement has conditions, a condition has courses, a cours
 
 from __future__ import annotations
 
-import json
-import math
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +23,7 @@ from trunnion.rig.reading.repeated_steps import LeftOfSteps
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset", "zeros_of_files"]
+__all__ = ["Accuracy", "Condition", "Measurement", "Signal", "between_turns", "dataset"]
 
 Array = NDArray[np.float64]
 COURSE = ("condition", "channel", "position")
@@ -50,7 +46,7 @@ class Accuracy:
     all turns of a file. resolution: step from one reading to the next, in the unit of the course, 0 if it is not known.
     own: the part of `zero` that each file has by itself, such as that of the mean of its unloaded stretch; what is left
     of `zero` is the same in all files. datum: value at which the sensor reads 0, in the unit of the course; an error of
-    its gain acts on value − datum. stated: of a value of one start, by itself. cut: of what all readings are off by
+    its gain acts on value − datum. cut: of what all readings are off by
     alike where they may be rounded or cut off to a step that noise does not carry them over, beside `zero`. left:
     what of the error by the resolution all turns repeat, so that averaging leaves it; None for all of step/√12.
     """
@@ -59,7 +55,6 @@ class Accuracy:
     gain: float = 0.0
     resolution: float = 0.0
     own: float = 0.0
-    stated: float = 0.0
     cut: float = 0.0
     left: LeftOfSteps | None = None
     datum: float = 0.0
@@ -72,8 +67,6 @@ class Signal:
     channel: its name in the mapping; measures: what it measures, as `measures.measures.named` reads it (`effort:input`,
     `rate:output`, `load:brake`); unit: SI; turns: (turn, position), NaN where there is nothing to be had.
     read_in: unit of the readings for people, factor to SI, where they are in a unit of what is measured: U/min.
-    nothing: the reading that is stated as zero, what a reading of 1 more measures, SI, and the unit of the readings;
-    None where no number is stated, but an unloaded stretch.
     """
 
     channel: str
@@ -82,7 +75,6 @@ class Signal:
     turns: Array
     accuracy: Accuracy = Accuracy()
     read_in: tuple[str, float] = ("", 1.0)
-    nothing: tuple[float, float, str] | None = None
 
     @property
     def shown(self) -> tuple[str, float]:
@@ -114,10 +106,10 @@ class Signal:
     @cached_property
     def unresolved(self) -> float:
         """Standard uncertainty by the resolution, what turns repeat of step/√12 (GUM F.2.2.1), where they scatter by
-        less than half a step; more carries them over the steps, and their mean is finer. Of a value what is stated."""
+        less than half a step; more carries them over the steps, and their mean is finer."""
         step = self.accuracy.resolution
         if not step:
-            return self.accuracy.stated
+            return 0.0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             scatter = float(np.nanmedian(self.scatter))
@@ -128,10 +120,9 @@ class Signal:
     def uncertainty(self) -> Array:
         """Standard uncertainty of the mean, (position,): scatter/√n, zero, gain and resolution.
 
-        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns of which nothing is stated.
+        GUM (JCGM 100:2008), 4.2 and 5.1. NaN with fewer than two turns.
         """
         repeated = self.scatter / np.sqrt(np.maximum(self.count, 1))
-        repeated = np.where((self.count == 1) & (self.accuracy.stated > 0), 0.0, repeated)
         with np.errstate(over="ignore"):  # of numbers near the end of the floats
             known = np.square(self.accuracy.zero) + np.square(self.accuracy.cut) + np.square(self.unresolved)
             return np.asarray(np.sqrt(repeated**2 + known + (self.accuracy.gain * self.read) ** 2))
@@ -149,10 +140,7 @@ class Condition:
     cut: that of the angle, rad with its sign, by readings that may be cut off, alike in all files of that resolution.
     dimensions: of those of `values` that were stated with a unit; the others are plain numbers, SI; followed: those of
     `values` that are the mean of what was measured.
-    duration: of a cycle that is a time, s; NaN of one that is an angle. zero: of the angle, rad, NaN where it is not
-    known; own_zero: whether its file states it, in place of the zero that all share; entry: of the file in the mapping.
-    of_start: whether it is no cycle but a motion from its start, of which `duration` is what is followed, s, NaN for
-    what the model states; its turns are repetitions, its phases shares of that duration.
+    duration: of a cycle that is a time, s; NaN of one that is an angle.
     """
 
     name: str
@@ -168,10 +156,6 @@ class Condition:
     dimensions: Mapping[str, Dimension] = field(default_factory=dict)
     followed: Sequence[str] = ()
     duration: float = float("nan")
-    zero: float = float("nan")
-    own_zero: bool = False
-    entry: Mapping[str, Any] = field(default_factory=dict)
-    of_start: bool = False
 
 
 def between_turns(turns: Array) -> Array:
@@ -179,37 +163,6 @@ def between_turns(turns: Array) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.asarray(np.nanstd(turns, axis=0, ddof=1))
-
-
-def zeros_of_files(conditions: Sequence[Condition], ahead: Sequence[float]) -> str:
-    """`files` of a mapping, each entry whole, with the zeros of the angle corrected; empty where one is not known.
-
-    ahead: rad, to be added to the zero of each condition.
-    """
-    rows = {one.files[0]: (one, one.zero + size) for one, size in zip(conditions, ahead, strict=True) if one.files}
-    if len(rows) != len(conditions) or not all(math.isfinite(zero) for _, zero in rows.values()):
-        return ""
-    told = []
-    for name, (one, zero) in rows.items():
-        own = {**one.entry, "angle": {"zero": f"{round(math.degrees(zero), 2) + 0.0:.6g} deg"}}
-        order = {"file": own.get("file", Path(name).name), "angle": own.pop("angle"), **own}
-        told.append(flow(order))
-    return ", ".join(told[:MOST_FILES]) + (", …" if len(told) > MOST_FILES else "")
-
-
-def flow(value: object) -> str:
-    """A part of a mapping in one line, as it is written there."""
-    if isinstance(value, Mapping):
-        if "source" in value:  # a number with its unit
-            return str(value["source"])
-        return f"{{{', '.join(f'{key}: {flow(one)}' for key, one in value.items())}}}"
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(flow, value))}]"
-    text = str(value)
-    return json.dumps(text, ensure_ascii=False) if re.search(r"[,:#{}\[\]\"']", text) else text
-
-
-MOST_FILES = 20  # named in a remedy
 
 
 @dataclass(frozen=True)
@@ -223,11 +176,6 @@ class Measurement:
     conditions: tuple[Condition, ...]
     findings: tuple[Finding, ...] = ()
     done: Sequence[str] = field(default_factory=tuple)
-
-    @property
-    def of_starts(self) -> bool:
-        """Whether it is of starts, in place of cycles."""
-        return any(one.of_start for one in self.conditions)
 
     @property
     def channels(self) -> dict[str, Signal]:

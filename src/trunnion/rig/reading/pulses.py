@@ -17,12 +17,9 @@ __all__ = ["Pulses", "by_index", "index_times", "pulses_of", "unwrapped"]
 
 Array = NDArray[np.float64]
 TOLD_BY = 5  # samples between pulses from which a lost one shows in the time between its neighbours
-Places = NDArray[np.intp]
-MODULI = (1 << 8, 1 << 16, 1 << 24, 1 << 32)  # at which counters usually wrap
-AROUND = 8  # steps about a fall, that tell how far the count would have gone
 STANDS = 3.0  # times the usual time of a count, from which the shaft stands or a pulse is lost
-WILD = 20.0  # times the largest usual step, by which a single reading is off
-SURE = 0.15  # of a count, standard error of a place to wrap at that can be rounded to a whole number
+FULL = (1 << 8, 1 << 16, 1 << 24, 1 << 32)  # at which counters usually begin anew
+WILD = 20.0  # times the largest usual step, by which a counter is set back
 
 
 @dataclass(frozen=True)
@@ -67,31 +64,24 @@ def pulses_of(source: AngleSource, readings: Array, line: Timeline, indexed: boo
         if found.times.size > 2:
             found = _of_level(source, found, line, indexed, account)
     else:
-        found = _of_count(source, readings[finite], line.seconds[finite], line.step, indexed, account)
+        found = _of_count(source, readings[finite], line.seconds[finite], line.step, account.file)
     if indexed or found.times.size < 9:
         return found
     return _missed(found, line.step, 0.5 * (source.per_turn or 0), account)
 
 
-def _of_count(
-    source: AngleSource, readings: Array, seconds: Array, step: float, indexed: bool, account: Account
-) -> Pulses:
+def _of_count(source: AngleSource, readings: Array, seconds: Array, step: float, file: str) -> Pulses:
     """The rows where the count changes; the edge lies between two samples, its time is taken in the middle.
 
     From a to b it passes b if it counts on by one; if it jumps, half way the count is (a + b + 1)/2 in the mean.
     """
     if readings.size < 2:
         return Pulses(np.empty(0), np.empty(0), np.empty((0, 2)))
-    counts, back = unwrapped(source, readings, seconds, account)
+    counts = unwrapped(source, readings, seconds, file)
     at = np.flatnonzero(np.diff(counts) != 0)
     at = at[np.diff(seconds)[at] <= GAP * step]
     before, after = counts[at], counts[at + 1]
-    found = Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (before + after + 1.0), np.empty((0, 2)))
-    if not back.size:
-        return found
-    if indexed:
-        return replace(found, spoilt=np.column_stack([seconds[back], seconds[back + 1]]))
-    return replace(found, until=float(seconds[back[0]]))
+    return Pulses(0.5 * (seconds[at] + seconds[at + 1]), 0.5 * (before + after + 1.0), np.empty((0, 2)))
 
 
 def _edges(readings: Array, line: Timeline) -> Pulses:
@@ -239,90 +229,27 @@ def _check_per_turn(between: Array, per_turn: int, account: Account) -> None:
     )
 
 
-def unwrapped(source: AngleSource, readings: Array, seconds: Array, account: Account) -> tuple[Array, Places]:
-    """A count that goes on, and the readings after which its counter was set back, so that what follows has no zero.
+def unwrapped(source: AngleSource, readings: Array, seconds: Array, file: str) -> Array:
+    """A count that goes on where its counter is full; MechanismError for one that is set back otherwise.
 
-    A count that falls by as much each time wraps; where, is told by what is missing for a step like those around.
+    Full it is at `wrap`; if that is not stated, at a turn or at a power of 2 that all falls tell alike.
     """
     if source.wrap is not None:
-        return np.unwrap(readings, period=float(source.wrap)), np.empty(0, dtype=np.intp)
-    readings = _without_wild(source, readings, seconds, account)
+        return np.unwrap(readings, period=float(source.wrap))
     steps = np.diff(readings)
-    way = float(np.sign(np.sum(np.sign(steps)))) or 1.0
-    gone = _gone(steps * way)
-    span = float(np.ptp(readings))
-    least = max(WILD * gone, 1.0) if not source.per_turn else min(max(WILD * gone, 1.0), 0.5 * source.per_turn)
-    falls = np.flatnonzero(steps * way < -min(least, 0.5 * span))
-    if not falls.size or span < 2:
-        return readings, np.empty(0, dtype=np.intp)
-    onward, apart = _onward(steps * way, falls)
-    sizes = onward - steps[falls] * way  # what the counter has lost at each
-    modulus = _modulus(source, sizes, apart)
-    if modulus is not None:
-        account.say(f"the count of '{source.column}' wraps at {modulus:,.0f}, {counted(falls.size, 'time')}")
-        return np.unwrap(readings, period=modulus), np.empty(0, dtype=np.intp)
-    if falls.size > 2 and float(np.ptp(sizes)) <= 2 * float(apart.max()) + 1:
-        what = f"the count of '{source.column}' falls by about {np.mean(sizes):,.0f}, {counted(falls.size, 'time')}"
-        what = f"{what}, and its wrap cannot be located to the pulse"
-        raise MechanismError(Finding(what, "angle", "state wrap: of the counter", file=account.file))
-    first = falls[0]
-    what = f"the count of '{source.column}' is set back {counted(falls.size, 'time')}, {times(seconds[falls])}"
-    what = f"{what}, first from {readings[first]:,.0f} to {readings[first + 1]:,.0f}"
-    account.warn("data.counter.set_back",
-        "angle", f"{what}; without an index the turns from there on are left out",
-        "name the parts in files: over:, each by itself, or add an index; state wrap: if the counter is full there",
-    )  # fmt: skip
-    mended = steps.copy()
-    mended[falls] = way * np.rint(onward)
-    return np.concatenate([readings[:1], readings[0] + np.cumsum(mended)]), falls
-
-
-def _gone(steps: Array) -> float:
-    """The usual step of those that go on."""
-    on = steps[steps > 0]
-    return float(np.percentile(on, 90)) if on.size else 0.0
-
-
-def _without_wild(source: AngleSource, readings: Array, seconds: Array, account: Account) -> Array:
-    """The count without single readings that are far off both neighbours, which are close to each other."""
-    if readings.size < 5:
+    steps *= float(np.sign(np.sum(np.sign(steps)))) or 1.0
+    usual = float(np.percentile(steps[steps > 0], 90)) if np.any(steps > 0) else 0.0
+    least = min(max(WILD * usual, 1.0), 0.5 * (source.per_turn or np.inf), 0.5 * float(np.ptp(readings)))
+    back = np.flatnonzero(steps < -least)
+    if not back.size or np.ptp(readings) < 2:
         return readings
-    steps = np.diff(readings)
-    usual = max(float(np.percentile(np.abs(steps), 95)), 1.0)
-    out = (np.abs(steps[:-1]) > WILD * usual) & (np.abs(steps[1:]) > WILD * usual)
-    wild = 1 + np.flatnonzero(out & (np.abs(steps[:-1] + steps[1:]) <= 3 * usual))
-    if not wild.size or wild.size > 0.01 * readings.size:
-        return readings
-    what = f"{counted(wild.size, 'count')} of '{source.column}' of {readings.size:,} far off the ones before and after"
-    what = f"{what}, {times(seconds[wild])}, such as {readings[wild[0]]:,.6g}; the previous reading is used there"
-    account.warn("data.counter.wild", "angle", what, "check the counter and its cable")
-    mended = readings.copy()
-    mended[wild] = mended[wild - 1]
-    return mended
-
-
-def _onward(steps: Array, falls: Places) -> tuple[Array, Array]:
-    """How far a count would have gone at each fall, by the steps around that go on, and how far these are apart."""
-    going = np.flatnonzero(steps > 0)
-    means, spans = np.ones(falls.size), np.zeros(falls.size)
-    if not going.size:
-        return means, spans
-    middle = np.searchsorted(going, falls)
-    for k, place in enumerate(middle.tolist()):
-        near = steps[going[max(place - AROUND // 2, 0) : place + AROUND // 2]]
-        means[k], spans[k] = float(np.mean(near)), float(np.ptp(near))
-    return means, spans
-
-
-def _modulus(source: AngleSource, sizes: Array, apart: Array) -> float | None:
-    """Where a counter wraps that has lost so much at each fall; None if that cannot be told."""
-    usual = float(np.median(sizes))
-    error = float(np.std(sizes)) / np.sqrt(sizes.size) if sizes.size > 1 else float(apart.max())
-    near = max(0.5, 3 * error, float(apart.max()) if sizes.size < AROUND else 0.0)
-    if np.any(np.abs(sizes - usual) > 2 * apart.max() + 1):
-        return None
-    known = [float(one) for one in (source.per_turn or 0, *MODULI) if one and abs(one - np.mean(sizes)) <= near]
-    if known:
-        return known[0]
-    whole = float(np.rint(np.mean(sizes)))
-    return whole if sizes.size > 1 and (error < SURE or not apart.any()) else None
+    apart = {full: np.abs(full + steps[back] - usual) for full in (source.per_turn or 0, *FULL)}
+    full = min(apart, key=lambda full: float(apart[full].max()))
+    if full and np.all(apart[full] <= usual + 1):
+        return np.unwrap(readings, period=float(full))
+    what = (
+        f"the count of '{source.column}' is set back {counted(back.size, 'time')}, {times(seconds[back])}, first from "
+    )
+    what += f"{readings[back[0]]:,.0f} to {readings[back[0] + 1]:,.0f}"
+    remedy = "state wrap: the count at which the counter returns to 0; or select a part by files: over:"
+    raise MechanismError(Finding(what, "angle", remedy, file=file))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.names import strict_keywords
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
-from trunnion.rig.reading.angle_steps import tell_slopes
 from trunnion.rig.reading.channels import (
+    LOOKED_AT,
     ChannelReading,
     Zeroed,
     filtered,
@@ -30,18 +31,16 @@ from trunnion.rig.reading.channels import (
 from trunnion.rig.reading.columns import DataTable, of_text
 from trunnion.rig.reading.files_named import files_of, unused_zero
 from trunnion.rig.reading.log import Account, counted, gathered, told
-from trunnion.rig.reading.mapping import DataMapping, File, FromData, Start, Zero
-from trunnion.rig.reading.mapping_file import read_mapping, vague_gains
+from trunnion.rig.reading.mapping import DataMapping, File, FromData, Zero
+from trunnion.rig.reading.mapping_file import read_mapping
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal, between_turns
 from trunnion.rig.reading.repeated_steps import LeftOfSteps, left_in_turns
 from trunnion.rig.reading.sensor_quantity import Amount, dimensions
 from trunnion.rig.reading.settings import Setting, dimension_of, settings, stated
 from trunnion.rig.reading.signal_checks import Drift, backwards, drift, signs, speeds, steady
-from trunnion.rig.reading.starts import repeated, valued, with_values
 from trunnion.rig.reading.tables import read_table
 from trunnion.rig.reading.timebase import Timeline, timeline
 from trunnion.rig.reading.turns import DENSE, Turns, cut, joined, resampled, time_mean
-from trunnion.rig.reading.unloaded import check_unloaded
 
 __all__ = ["read_measured"]
 
@@ -64,23 +63,21 @@ def read_measured(
     """
     mapped = read_mapping(mapping)
     conditions: list[Condition] = []
-    findings: list[Finding] = []
-    accounts: list[Account] = []
-    failed = False
     entries, notes = files_of(mapped, files)
-    for path, entry in entries:
-        account = Account(str(path))
-        try:
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
-                conditions += _File(mapped.mapping.of_file(entry), path, entry, account).conditions()
-        except MechanismError as error:
-            account.findings += [one for one in error.findings if one not in account.findings]
-            failed = True
-        findings += account.findings
-        accounts.append(account)
-    starts = [(k, one) for k, one in enumerate(mapped.mapping.starts) if not one.file]
-    conditions = repeated([*conditions, *(valued(mapped.mapping, one, k) for k, one in starts)])
-    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries]), *vague_gains(mapped.mapping)]
+    accounts = [Account(str(path)) for path, _ in entries]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of numbers near the end of the floats
+        opened: list[_File] = []
+        for (path, entry), account in zip(entries, accounts, strict=True):
+            with _kept(account):
+                opened.append(_File(mapped.mapping.of_file(entry), path, entry, account))
+                opened[-1].find_turns()
+        steps = _steps(opened)
+        for file in opened:
+            with _kept(file.account):
+                conditions += file.conditions(steps)
+    failed = any(account.failed for account in accounts)
+    findings = [one for account in accounts for one in account.findings]
+    findings = [*findings, *notes, *unused_zero(mapped, [entry for _, entry in entries])]
     findings = mapped.placed(findings)
     if failed or not conditions:
         raise MechanismError(gathered((one for one in findings if one.severity is not Severity.NOTE), same=True))
@@ -93,14 +90,34 @@ def read_measured(
     )
 
 
+@contextmanager
+def _kept(account: Account) -> Iterator[None]:
+    """What one file fails by is told with what the others do."""
+    try:
+        yield
+    except MechanismError as error:
+        account.findings += [one for one in error.findings if one not in account.findings]
+        account.failed = True
+
+
+def _steps(files: Sequence[_File]) -> dict[tuple[object, ...], float]:
+    """The step of each channel with one scale, in readings, from the levels of all files that have it.
+
+    A file whose readings span a few steps only does not tell them by itself.
+    """
+    levels: dict[tuple[object, ...], list[Array]] = {}
+    for file in files:
+        for name, own in file.own.items():
+            levels.setdefault((name, own.unit, own.scale.factor), []).append(file.levels(name))
+    return {key: resolution(np.concatenate(rows)) for key, rows in levels.items()}
+
+
 def _averaged(conditions: Sequence[Condition], accounts: Sequence[Account]) -> str:
     """How many turns there are, and of how many if some are not used."""
     recorded, lost = sum(one.recorded for one in accounts), sum(one.left_out for one in accounts)
     counts = [next(iter(one.courses.values())).turns.shape[0] for one in conditions]
     each = f"{min(counts):,}" if min(counts) == max(counts) else f"{min(counts):,} to {max(counts):,}"
     where = "" if len(counts) == 1 else f" in each of {len(counts):,} conditions"
-    if any(one.of_start for one in conditions):
-        return f"{each} start{'s' * (max(counts) > 1)}{where}"
     if sum(counts) < recorded - 2 * len(counts):
         where += f", {sum(counts):,}" if len(counts) > 1 else ""
         where += f" of {recorded:,.0f} recorded"
@@ -152,29 +169,30 @@ class _File:
         if mapping.filter is not None:
             self._check_filter(table)
         self.own: dict[str, ChannelReading] = {}
-        self.lag, self.step, self.cut = 0.0, 0.0, 0.0
-        self.angle: Array | None = None  # of the driver by row, rad
+        self.lag, self.cut = 0.0, 0.0
         self.readings: dict[str, Array] = {}
-        self.beyond: dict[str, faults.BeyondRange] = {}
         self.steps: dict[str, float] = {}  # SI
         for name, channel in mapping.channels.items():
             column = table.columns[channel.column]
             self.own[name] = reading(name, channel, column, account)
             self.readings[name] = np.array(self.line.rows(column.values))
-            faults.cells(f"channels.{name}", column, self.readings[name], self.line.seconds, account)
-            self.beyond[name] = faults.beyond(self.readings[name], self.own[name].limit)
+            where, limit = f"channels.{name}", self.own[name].limit
+            faults.cells(where, column, self.readings[name], self.line.seconds, account)
+            if limit is not None:
+                faults.clipped(where, self.readings[name], limit, self.own[name].unit, self.line.seconds, account)
         self.table = table
+        self.parts: list[_Part] = []
 
-    def conditions(self) -> list[Condition]:
-        """The conditions of the file, each with its turns."""
+    def find_turns(self) -> None:
+        """Find the turns of each condition, and leave out what is wrong of the readings in them."""
         mapping, account = self.mapping, self.account
-        zeros = {
+        self.zeros = {
             name: zeroed(
                 name, channel, self.own[name], self.readings[name], self.line, mapping.drift == "remove", account
             )
             for name, channel in mapping.channels.items()
         }
-        share, way, spoilt = self._share(zeros)
+        share, self.way, spoilt = self._share(self.zeros)
         cuts, used = [], self._used()
         for setting in settings(mapping, self.entry, self.table, self.line, account):
             allowed = used[setting.window] & setting.rows
@@ -191,11 +209,31 @@ class _File:
                 what = self._no_turn(share[setting.window], allowed)
                 account.error("data.turns.none", where, what, "check angle, or record for longer")
         if not cuts:
-            return []
+            return
         self._check_rows(cuts)
-        self._check_zeros(cuts, share)
-        parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
-        drifts = {name: self._channel(name, zeros[name], parts) for name in mapping.channels}
+        self._check_zeros(cuts)
+        self.parts = [_Part(setting, turns, {}, {}) for setting, turns in cuts]
+        begin, end = (np.sort(np.concatenate([getattr(turns, one) for _, turns in cuts])) for one in ("begin", "end"))
+        low, high = np.searchsorted(self.line.seconds, begin[0]), np.searchsorted(self.line.seconds, end[-1], "right")
+        self.running = slice(int(low), int(high))
+        reach = float(np.median(end - begin)) / mapping.positions
+        reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
+        span = faults.FaultSpan(int(low), int(high), begin, end, faults.WIDTH + int(reach / self.line.step))
+        for name, channel in mapping.channels.items():
+            speed = channel.measures.startswith("rate:")
+            faults.signal(f"channels.{name}", self.readings[name], self.line.seconds, span, account, speed)
+
+    def levels(self, name: str) -> Array:
+        """Different readings of a channel while the drive runs."""
+        readings = self.readings[name][self.running] if self.parts else np.empty(0)
+        return np.unique(readings[np.isfinite(readings)])[:LOOKED_AT]
+
+    def conditions(self, steps: Mapping[tuple[object, ...], float]) -> list[Condition]:
+        """The conditions of the file, each with its turns. steps: of the channels, by name, unit and factor."""
+        if not self.parts:
+            return []
+        mapping, account, parts, zeros, way = self.mapping, self.account, self.parts, self.zeros, self.way
+        drifts = {name: self._channel(name, zeros[name], parts, steps) for name in mapping.channels}
         whole = {name: np.concatenate([part.courses[name] for part in parts]) for name in mapping.channels}
         if not mapping.timed:
             turning = way * self._rate([part.turns for part in parts])
@@ -203,9 +241,7 @@ class _File:
                 told = signs(mapping.channels, whole, self._zeros_known(zeros), turning, account)
                 units = {name: shown(own) for name, own in self.own.items()}
                 speeds(mapping.channels, whole, units, turning, told, account)
-        found = [self._condition(part, zeros, drifts, way) for part in parts]
-        self._check_steps(found)
-        return found
+        return [self._condition(part, zeros, drifts, way) for part in parts]
 
     def _zeros_known(self, zeros: Mapping[str, Zeroed]) -> dict[str, float]:
         """Standard uncertainty of the zero of each channel, SI."""
@@ -213,12 +249,6 @@ class _File:
             name: float(np.hypot(own.accuracy_zero, own.scale.factor * zeros[name].uncertainty))
             for name, own in self.own.items()
         }
-
-    def _check_steps(self, found: Sequence[Condition]) -> None:
-        """Tell once of steps of the angle that are not stated and matter to a channel."""
-        if self.step and self.mapping.angle is not None:
-            column, cycle = str(self.mapping.angle.column), float(self.mapping.cycle.evaluate())
-            any(tell_slopes(column, self.step, cycle, one.courses, self.account) for one in found)
 
     def _named(self, setting: Setting) -> str:
         return setting.name or self.path.stem
@@ -234,8 +264,7 @@ class _File:
         mapping = self.mapping
         cycle = float(mapping.cycle.evaluate())
         if mapping.timed:
-            begin = self.entry.over[0].value if isinstance(self.entry, Start) and self.entry.over else 0.0
-            return (self.line.seconds - begin) / cycle, 1.0, np.empty((0, 2))
+            return self.line.seconds / cycle, 1.0, np.empty((0, 2))
         assert mapping.angle is not None
         source, speed = mapping.angle, None
         if source.channel is not None:
@@ -246,7 +275,7 @@ class _File:
                 raise MechanismError(Finding(what, "angle.channel", "name one in rpm or rad/s", file=self.account.file))
             speed = own.quantity(self.readings[name], zeros[name], mapping.channels[name].sign, self.line.seconds)
         found: Coordinate = coordinate(source, self.table, self.line, speed, self.account)
-        self.lag, self.step, self.cut, self.angle = found.lag, found.step, found.cut, found.values
+        self.lag, self.cut = found.lag, found.cut
         known = np.flatnonzero(np.isfinite(found.values) & self._used())
         if known.size < 3:
             what = "no row in use has a coordinate of the driver"
@@ -285,7 +314,7 @@ class _File:
         account, mapping = self.account, self.mapping
         for setting, turns in cuts:
             where = _where(setting)
-            if turns.numbers.size < 2 and not isinstance(self.entry, Start):
+            if turns.numbers.size < 2:
                 account.warn(
                     "data.turns.one",
                     where,
@@ -313,44 +342,26 @@ class _File:
         tail = "; of at most {} positions each has four samples, which are averaged"
         account.say(f"{cubic}{tail * (most > 1)}", told if most > 1 else None)
 
-    def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]], share: Array) -> None:
-        """Tell of unloaded stretches in which the sensor is loaded."""
-        mapping, account, seconds = self.mapping, self.account, self.line.seconds
-        measured = mapping.angle is not None and mapping.angle.from_ != "time" and not mapping.timed
-        angle = share * float(mapping.cycle.evaluate()) if measured else None
-        begin, end = min(one.begin[0] for _, one in cuts), max(one.end[-1] for _, one in cuts)
-        run = slice(int(np.searchsorted(seconds, begin)), int(np.searchsorted(seconds, end)))
-        for name, channel in mapping.channels.items():
-            where, scale = f"channels.{name}.zero", self.own[name].scale
-            unit, factor = shown(self.own[name])
+    def _check_zeros(self, cuts: Sequence[tuple[Setting, Turns]]) -> None:
+        """Tell of unloaded stretches that reach into turns."""
+        for name, channel in self.mapping.channels.items():
             for low, high in channel.zero.over if isinstance(channel.zero, Zero) else ():
                 inside = sum(int(np.sum((one.begin < high.value) & (one.end > low.value))) for _, one in cuts)
                 if inside:
-                    what = (
-                        f"the unloaded stretch {low.value:g} to {high.value:g} s reaches into {counted(inside, 'turn')}"
-                    )
+                    span = f"{low.value:g} to {high.value:g} s"
+                    what = f"the unloaded stretch {span} reaches into {counted(inside, 'turn')}"
                     remedy = "state a stretch in which the sensor is not loaded"
-                    account.warn("data.zero.in_turns", where, what, remedy)
-                    continue
-                size = factor / abs(scale.factor)
-                span = low.value, high.value
-                check_unloaded(where, span, seconds, angle, self.readings[name], run, (unit, size), account)
+                    self.account.warn("data.zero.in_turns", f"channels.{name}.zero", what, remedy)
 
-    def _channel(self, name: str, zero: Zeroed, parts: Sequence[_Part]) -> Drift | None:
+    def _channel(
+        self, name: str, zero: Zeroed, parts: Sequence[_Part], steps: Mapping[tuple[object, ...], float]
+    ) -> Drift | None:
         """The courses of a channel, put into the parts; the drift that is left in them."""
         mapping, account, line = self.mapping, self.account, self.line
         channel, own, where = mapping.channels[name], self.own[name], f"channels.{name}"
-        begin, end = (np.sort(np.concatenate([getattr(part.turns, one) for part in parts])) for one in ("begin", "end"))
-        low, high = int(np.searchsorted(line.seconds, begin[0])), int(np.searchsorted(line.seconds, end[-1], "right"))
-        start, cycle = float(mapping.start.evaluate()), float(mapping.cycle.evaluate())
-        reach = float(np.median(end - begin)) / mapping.positions
-        reach += PERIODS / mapping.filter.cut_off.value if mapping.filter is not None else 0.0
-        beside = faults.WIDTH + int(reach / line.step)
-        span = faults.FaultSpan(low, high, begin, end, self.angle, start, cycle, own.unit, beside)
         readings = self.readings.pop(name)
-        speed = channel.measures.startswith("rate:")
-        faults.signal(where, readings, line.seconds, span, own.limit, account, speed, self.beyond[name])
-        step, noise = own.resolution or resolution(readings[low:high]), noise_of(readings[low:high])
+        step = own.resolution or steps[name, own.unit, own.scale.factor]
+        noise = noise_of(readings[self.running])
         values = own.quantity(readings, zero, channel.sign, line.seconds)
         angle = values if own.scale.unit == "rad" else None
         values = values if angle is None else joined(angle)
@@ -364,8 +375,10 @@ class _File:
             noise = min([noise, *(PASSED * one for one in rows if one >= 0)])
         self.steps[name] = abs(own.scale.factor) * step * (noise < step / 2)  # more noise carries it over them
         if step and noise < step / 2:
-            self._check_repeated(name, step, noise, parts, readings, max(scatters))
-        if speed:  # one that creeps is the drive's
+            size = abs(own.scale.factor) * step
+            for part in parts:
+                part.left[name] = left_in_turns(part.turns, part.courses[name] / size, readings / step, noise / step)
+        if channel.measures.startswith("rate:"):  # one that creeps is the drive's
             return None
         found = drift([(part.turns, part.courses[name]) for part in parts])
         if found is None:
@@ -387,19 +400,6 @@ class _File:
             part.courses[name] = resampled(part.turns, values - found.slope * (line.seconds - since), angle)
         return found
 
-    def _check_repeated(
-        self, name: str, step: float, noise: float, parts: Sequence[_Part], readings: Array, scatter: float
-    ) -> None:
-        """How much of the error by steps, in readings, all turns repeat; it is told where it counts beside scatter."""
-        own = self.own[name]
-        size, (unit, in_si) = abs(own.scale.factor) * step, shown(own)
-        for part in parts:
-            part.left[name] = left_in_turns(part.turns, part.courses[name] / size, readings / step, noise / step)
-        most = max((part.left[name] for part in parts), key=lambda one: one.share)
-        if told := most.told(scatter / step, size / in_si, unit):
-            remedy = "sample at a rate that is no multiple of the turns"
-            self.account.note("data.turns.same", f"channels.{name}", told, remedy)
-
     def _rate(self, turns: Sequence[Turns]) -> float:
         cycle = float(self.mapping.cycle.evaluate())
         return cycle / float(np.mean(np.concatenate([one.end - one.begin for one in turns])))
@@ -415,12 +415,11 @@ class _File:
             extra = left.error * left.span / 2 if left else 0.0  # of the line that was taken off, at either end
             of_file = float(np.hypot(abs(own.scale.factor) * zeros[name].uncertainty, extra))
             zero = float(np.hypot(own.accuracy_zero, of_file))
-            datum, nothing = 0.0, None
-            if isinstance(channel.zero, Amount):
-                nothing = zeros[name].value, channel.sign * own.scale.factor, own.unit
-                datum = 0.0 if own.live(channel.zero) else -nothing[0] * nothing[1]
+            datum = 0.0
+            if isinstance(channel.zero, Amount) and not own.live(channel.zero):
+                datum = -zeros[name].value * channel.sign * own.scale.factor
             accuracy = Accuracy(zero, own.accuracy_gain, self.steps[name], of_file, datum=datum)
-            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own), nothing)
+            course = Signal(name, channel.measures, own.scale.unit, part.courses[name], accuracy, read_in(own))
             cut = course.unresolved  # rounded or cut off, which is not known: up to half a step, rectangular
             courses[name] = replace(course, accuracy=replace(accuracy, cut=cut, left=part.left.get(name)))
         values, known_as = dict(part.setting.values), dict(part.setting.dimensions)
@@ -443,13 +442,10 @@ class _File:
         start, cycle = (np.nan if timed else float(one.evaluate()) for one in (self.mapping.start, self.mapping.cycle))
         phase = np.arange(positions) / positions
         duration = float(self.mapping.cycle.evaluate()) if timed else np.nan
-        found = Condition(
+        return Condition(
             name, values, phase, courses, (str(self.path),), speed, start, cycle,
             lag=self.lag, cut=self.cut, dimensions=known_as, followed=tuple(part.setting.means), duration=duration,
-            zero=float(self.mapping.angle.zero.evaluate()) if self.mapping.angle is not None and not timed else np.nan,
-            own_zero=self.entry.angle is not None, entry=self.entry.model_dump(exclude_unset=True),
         )  # fmt: skip
-        return with_values(found, self.entry) if isinstance(self.entry, Start) else found
 
 
 def _where(setting: Setting) -> str:

@@ -14,15 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.reading.log import few_digits
 from trunnion.rig.reading.turns import DENSE, Turns
 
 __all__ = ["LeftOfSteps", "covariance_of_steps", "in_step", "left_in_turns", "left_of_steps", "noise_before"]
 
 Array = NDArray[np.float64]
 ALIKE = 0.9  # of 1, from which what a reading differs by from that a turn later is noise
-SAME = 1e-3  # of a step: turns that scatter less read the same
-WORTH = 0.5  # of the scatter of a mean, from which what is left in it is told
 HARMONICS = 10  # of the wave, that are looked at
 PLACES = 8  # of the first sample of a turn, between two
 MOST_TURNS = 4  # after which sampling is looked for at the same places
@@ -43,18 +40,6 @@ class LeftOfSteps:
     turns: int
     samples: float
     every: int
-
-    def told(self, scatter: float, step: float, unit: str) -> str:
-        """A sentence where it counts beside the scatter of turns, in steps; else empty. step: as shown, in its unit."""
-        if self.turns < 2 or self.share / 12**0.5 < WORTH * scatter / self.turns**0.5:
-            return ""
-        sizes = (1.0, self.noise, self.share / 12**0.5)
-        wide, noise, left = (f"{few_digits(size * step)} {unit}".replace(" °", "°") for size in sizes)
-        if scatter < SAME:
-            same = f"reads the same in every turn, in steps of {wide}"
-            return f"{same}: its uncertainty is that of the step, not of scatter"
-        what = f"every turn repeats errors by the steps of {wide}, which the noise of {noise} does not even out"
-        return f"{what}: averaging over turns leaves ± {left} of each reading"
 
 
 def left_in_turns(turns: Turns, course: Array, readings: Array, noise: float) -> LeftOfSteps:

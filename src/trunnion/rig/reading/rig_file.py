@@ -19,14 +19,12 @@ from trunnion.model.entry import Name, Part, forms
 from trunnion.model.expression import LITERAL, normalise
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
-from trunnion.model.names import nearest
 from trunnion.rig.reading.mapping import FixedAngle, FixedNumber, FixedTime
 from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number
 
-__all__ = ["FAULTS", "FORMATS", "Accuracy", "Encoder", "Fault", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
+__all__ = ["FORMATS", "Accuracy", "Encoder", "Idle", "Rig", "Schedule", "Sensor", "placed_in_rig"]
 
 FORMATS = ("csv", "parquet", "tdms")
-FAULTS = ("dropouts", "gap", "wrong-sign", "drift", "spikes", "stuck", "lost-pulses")
 MOST_CONDITIONS = 10_000
 MOST_VALUES = 1000
 Value = float | str
@@ -112,27 +110,6 @@ class Sensor(Part):
     per_turn: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
 
 
-class Fault(Part):
-    """Something that goes wrong, as it does on rigs; not told in the mapping.
-
-    sensor: one or several, all if not stated; conditions: by number from 1, all if not stated; share of the readings;
-    from, to: time in the file; by: drift over the file, or size of a spike; length: readings that a dropout takes.
-    """
-
-    kind: Literal["dropouts", "gap", "wrong-sign", "drift", "spikes", "stuck", "lost-pulses"]
-    sensor: str | tuple[str, ...] = ()
-    conditions: tuple[Count, ...] = ()
-    share: FixedNumber | None = None
-    length: Count = 1
-    start: FixedTime | None = Field(default=None, alias="from")
-    end: FixedTime | None = Field(default=None, alias="to")
-    by: Number | None = None
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        return (self.sensor,) if isinstance(self.sensor, str) else self.sensor
-
-
 class TimeColumn(Part):
     """The column of the time, and its unit."""
 
@@ -141,7 +118,7 @@ class TimeColumn(Part):
 
 
 class Rig(Part):
-    """A test rig: schedule, sampling rate, encoder, sensors, faults. Built from a file (`read`) or from keywords.
+    """A test rig: schedule, sampling rate, encoder, sensors. Built from a file (`read`) or from keywords.
 
     A rig that exists is sound by itself; whether it fits a mechanism is told when it is put to it (`observe`).
     """
@@ -155,7 +132,6 @@ class Rig(Part):
     time: TimeColumn = TimeColumn()
     encoder: Encoder | None = None
     sensors: Annotated[Mapping[Name, Sensor], Field(min_length=1)]
-    faults: tuple[Fault, ...] = ()
     format: Literal["csv", "parquet", "tdms"] = "csv"
 
     def __init__(self, **data: Any) -> None:
@@ -245,8 +221,6 @@ def _unsound(rig: Rig) -> Iterable[Finding]:
     yield from _shared_columns(rig)
     for name, sensor in rig.sensors.items():
         yield from _unsound_sensor(f"sensors.{name}", sensor)
-    for number, fault in enumerate(rig.faults):
-        yield from _unsound_fault(f"faults.{number}", fault, rig)
 
 
 def _shared_columns(rig: Rig) -> Iterable[Finding]:
@@ -280,25 +254,3 @@ def _unsound_sensor(where: str, sensor: Sensor) -> Iterable[Finding]:
         yield Finding("a standard uncertainty is negative", f"{where}.accuracy", "state it positive")
     if sensor.per_turn and not sensor.measures.startswith("rate:"):
         yield Finding("pulses measure a speed only", f"{where}.per_turn", "measure rate:JOINT, or remove per_turn")
-
-
-_NEEDS = {
-    "dropouts": ("share",), "gap": ("start", "end"), "wrong-sign": (), "drift": ("by",), "spikes": ("share", "by"),
-    "stuck": ("start", "end"), "lost-pulses": ("share",),
-}  # fmt: skip
-
-
-def _unsound_fault(where: str, fault: Fault, rig: Rig) -> Iterable[Finding]:
-    for name in fault.sensors:
-        if name not in rig.sensors:
-            yield Finding(f"there is no sensor '{name}'", f"{where}.sensor", nearest(name, rig.sensors))
-    for key in _NEEDS[fault.kind]:
-        if getattr(fault, key) is None:
-            shown = {"start": "from", "end": "to"}.get(key, key)
-            yield Finding(f"a fault of kind {fault.kind} needs '{shown}'", where, f"state {shown}")
-    if fault.share is not None and not 0 <= float(fault.share.evaluate()) <= 1:
-        yield Finding(f"the share {fault.share.source} is not in 0 … 100 %", f"{where}.share", "write 1 %")
-    if fault.kind == "drift" and not fault.sensors:
-        yield Finding("does not state the sensor", where, "state sensor")
-    if fault.kind == "lost-pulses" and rig.encoder is None:
-        yield Finding("there is no encoder to lose pulses", where, "state an encoder, or remove the fault")

@@ -14,7 +14,6 @@ from trunnion.measures.measures import Measure, named
 from trunnion.results.sentences import finding_for
 from trunnion.rig.modelled import told_at
 from trunnion.rig.reading.rig_file import Rig, Value
-from trunnion.rig.virtual.faults import misfits
 from trunnion.rig.virtual.sensors import SensorChannel, resolved
 from trunnion.rig.virtual.true_signals import SampledSignals, cycle_efficiency, sampled
 from trunnion.solve.run import Run
@@ -139,7 +138,6 @@ def channels_of(rig: Rig, run: Run, measures: Sequence[Measure]) -> dict[str, Se
         except MechanismError as error:
             findings += error.findings
     findings += _of_the_drive(rig, run)
-    findings += misfits(rig, found)
     if findings:
         raise MechanismError(findings)
     return found

@@ -389,8 +389,6 @@ def truth_of(observation: Recorded) -> dict[str, Any]:
     }
     if observation.skipped:
         found["left_out"] = list(observation.skipped)
-    if observation.rig.faults:
-        found["faults"] = [_fault(fault.model_dump(by_alias=True)) for fault in observation.rig.faults]
     found["parameters"] = {
         path: float(np.ravel(value)[0]) for path, value in mechanism.parameters().items() if np.size(value) == 1
     }
@@ -406,15 +404,6 @@ def _mean(observation: Recorded, case: Case, i: int) -> float:
     """Mean of a true course over the recorded cycles."""
     whole = round(observation.rig.schedule.turns * case.run.cycle.duration * observation.rate)
     return float(np.mean(case.true.at_samples(i)[case.first : case.first + whole]))
-
-
-def _fault(data: dict[str, Any]) -> dict[str, Any]:
-    """A fault as it was stated."""
-    plain = {key: getattr(value, "source", value) for key, value in data.items()}
-    plain = {key: value["source"] if isinstance(value, dict) else value for key, value in plain.items()}
-    return {
-        key: list(value) if isinstance(value, tuple) else value for key, value in plain.items() if value is not None
-    }
 
 
 HEADS = {

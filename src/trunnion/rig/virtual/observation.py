@@ -16,7 +16,6 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.rig.reading.rig_file import Rig, Value
 from trunnion.rig.virtual.cases import Case
-from trunnion.rig.virtual.faults import faulty
 from trunnion.rig.virtual.sensors import SensorChannel, SensorErrors, draw, index_level, level, pulses, readings, stream
 
 __all__ = ["MOST_SEEDS", "PER_SECOND", "TIME_DECIMALS", "Record", "Recorded", "check_seed"]
@@ -75,7 +74,7 @@ class Recorded:
         return (self.record(case) for case in self.cases)
 
     def record(self, case: Case) -> Record:
-        """The readings of one condition, faults included."""
+        """The readings of one condition."""
         columns = self._readings(case)
         rig = self.rig
         time = (np.arange(case.rows) - case.origin) / self.rate * PER_SECOND[rig.time.unit]
@@ -87,15 +86,14 @@ class Recorded:
             if rig.encoder.index:
                 found[rig.encoder.index] = index_level(angle, rig.encoder.per_turn, zero)
         found.update({self.channels[name].column: values for name, values in columns.items()})
-        found = faulty(found, self.rig, self.channels, case.number, self.seed, self.rate)
         return Record(case.name, case.settings, found)
 
     def perfect(self, case: Case) -> dict[str, Array]:
-        """Readings in their units without faults and random errors: what bandwidth, pulses and range leave."""
+        """Readings in their units without random errors: what bandwidth, pulses and range leave."""
         return self._readings(case, perfect=True)
 
     def _readings(self, case: Case, perfect: bool = False) -> dict[str, Array]:
-        """Readings without faults, in their units; perfect: without random errors either."""
+        """Readings in their units; perfect: without random errors either."""
         found = {}
         for i, (name, channel) in enumerate(self.channels.items()):
             true = np.empty(case.rows)
@@ -143,7 +141,7 @@ class Recorded:
         return Accuracy(zero, channel.gain, channel.step, own)
 
     def measurement(self, positions: int = 360) -> Measurement:
-        """The readings as a Measurement, faults left out, without files in between: the angle is the true one."""
+        """The readings as a Measurement, without files in between: the angle is the true one."""
         phase = np.arange(positions) / positions
         conditions = []
         for case in self.cases:

@@ -20,7 +20,16 @@ from trunnion.views.common.page import inputs_of, said, source, template
 from trunnion.views.compare.comparison import label, units
 from trunnion.views.compare.figure import efficiency, panels, small
 from trunnion.views.compare.notes import definitions
-from trunnion.views.compare.tables import conditions, efficiencies, files, headline, results, sensors, verdicts
+from trunnion.views.compare.tables import (
+    conditions,
+    efficiencies,
+    explained,
+    files,
+    headline,
+    results,
+    sensors,
+    verdicts,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +96,13 @@ def _channel(result: xr.Dataset, channel: int, name: str) -> dict[str, Any]:
             f"{len(shown)} of {len(there)} conditions are drawn, those with the largest residuals for their uncertainty"
         )
     pictures = [_picture(f"{name}, {label(result, k)}", small(result, channel, k)) for k in shown]
-    return {"title": name, "about": "; ".join(about), "pictures": pictures, "table": results(result, channel)}
+    return {
+        "title": name,
+        "about": "; ".join(about),
+        "pictures": pictures,
+        "table": results(result, channel),
+        "explained": explained(result, channel),
+    }
 
 
 def _severity(result: xr.Dataset, channel: int, condition: int) -> float:

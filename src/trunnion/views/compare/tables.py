@@ -10,6 +10,7 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, prefixed
 from trunnion.rig.comparison.assessment import Verdict
+from trunnion.rig.comparison.causes import KINDS
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.table import TextTable
 from trunnion.views.compare.comparison import coverage_of, scale_of, sets, setting, text, units, verdict
@@ -18,7 +19,7 @@ from trunnion.views.rig.conditions import shortened
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["conditions", "efficiencies", "files", "headline", "results", "sensors", "verdicts"]
+__all__ = ["conditions", "efficiencies", "explained", "files", "headline", "results", "sensors", "verdicts"]
 
 NONE = "—"
 
@@ -37,6 +38,29 @@ def results(result: xr.Dataset, channel: int | None = None) -> TextTable:
     first = [what] if channel is not None else [what, "channel"]
     head = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
     return TextTable("results", [*first, *head], rows)
+
+
+def explained(result: xr.Dataset, channel: int | None = None) -> TextTable | None:
+    """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
+    what, told = shortened(names(result, "condition"))
+    rows = []
+    for k, name in enumerate(told):
+        for i in range(result.sizes["channel"]) if channel is None else [channel]:
+            cells = [_cause(result, kind, i, k) for kind in KINDS]
+            if any(cell != NONE for cell in cells):
+                rows.append([name, *([] if channel is not None else [names(result, "channel")[i]]), *cells])
+    head = [what, *([] if channel is not None else ["channel"]), *KINDS]
+    return TextTable("what would explain the residual, each by itself", head, rows) if rows else None
+
+
+def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
+    """An error that would explain a residual, with the share that it explains."""
+    size, share = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
+    if not np.isfinite(size):
+        return NONE
+    factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
+    sign = "+" * (size > 0)
+    return f"{sign}{text(size * factor, unit)} ({100 * share:.1f}\u00a0%)"
 
 
 def verdicts(result: xr.Dataset) -> TextTable:

@@ -128,11 +128,11 @@ def residuals(result: xr.Dataset) -> Figure:
     sheet = new(f"Residuals, before and after{more}", result, height=1.0 + 1.75 * len(pairs))
     drive = str(result.attrs.get("drive", ""))
     angles = {condition: _angles(result, condition) for _, condition in pairs}
-    turned, durations = all(one is not None for one in angles.values()), attribute(result, "durations") or []
+    turned = all(one is not None for one in angles.values())
     over: dict[int, Array] = {}
     for condition, angle in angles.items():
         phase = np.asarray(result["phase"].values[condition], float)
-        over[condition] = angle if turned and angle is not None else phase * (durations[condition] if durations else 1)
+        over[condition] = angle if turned and angle is not None else phase
     ends = np.array([(np.nanmin(x), np.nanmax(x)) for x in over.values()])
     alike = bool(np.all(np.ptp(ends, axis=0) <= ALIKE * np.ptp(ends)))  # not of cycles driven forward and backward
     rows = sheet.subplots(len(pairs), 2, sharex=True if alike else "row", squeeze=False)
@@ -141,8 +141,7 @@ def residuals(result: xr.Dataset) -> Figure:
         _residual(left, result, (channel, condition), x, before=True)
         _residual(right, result, (channel, condition), x, before=False)
     for axes in rows[-1]:
-        other = "time [s]" if durations else "share of the cycle"
-        dress(axes, plain(f"drive angle {drive} [°]") if turned else other, axes.get_ylabel())
+        dress(axes, plain(f"drive angle {drive} [°]") if turned else "share of the cycle", axes.get_ylabel())
     for axes in rows[0]:
         legend(axes, least=1, lift=SUBTITLE)
     return sheet

@@ -18,11 +18,10 @@ def tables(measurement: Measurement) -> list[TextTable]:
     conditions = measurement.conditions
     channels = list(measurement.channels)
     units = {name: one.shown for name, one in measurement.channels.items()}  # of all files, whatever a file is in
-    turns_of = "starts" if measurement.of_starts else "turns"
     speeds = np.isfinite([one.speed for one in conditions]).any()
     named, short = shortened([one.name for one in conditions])
     settings = [named] if named == "condition" else named.split(", ")
-    head = [*settings, turns_of, *(["speed rpm"] if speeds else [])]
+    head = [*settings, "turns", *(["speed rpm"] if speeds else [])]
     head += [f"{name} {_unit(units[name][0])}".strip() for name in channels]
     rows = []
     for one, name in list(zip(conditions, short, strict=True))[:MOST]:
@@ -33,10 +32,10 @@ def tables(measurement: Measurement) -> list[TextTable]:
         rows.append([*own, f"{turns:,}", *speed, *means])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown = [TextTable(f"{measurement.name}\nconditions: mean over {turns_of} and positions", head, rows)]
+    shown = [TextTable(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
     rows = [[name, *_channel([one.courses[name] for one in conditions if name in one.courses])] for name in channels]
-    title = f"channels: mean signal, scatter of {turns_of}, standard uncertainty of the mean"
+    title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
     return [*shown, TextTable(title, head, rows)]
 
 

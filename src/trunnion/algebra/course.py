@@ -171,6 +171,24 @@ class Courses:
         coefficients = (self.coefficients[panel] @ basis) @ FIT.T
         return replace(self, edges=edges, coefficients=coefficients, states=self.states[panel])
 
+    def between(self, low: float, high: float) -> Courses:
+        """The same rows from one time to another, s."""
+        first, last = self.panel(np.array([low, high]))
+        last += int(high > self.edges[last])
+        near = replace(
+            self,
+            edges=self.edges[first : last + 1],
+            coefficients=self.coefficients[first:last],
+            states=self.states[first:last],
+        ).parted(np.array([low, high]))
+        begin, end = np.searchsorted(near.edges, [low, high])
+        return replace(
+            near,
+            edges=near.edges[begin : end + 1],
+            coefficients=near.coefficients[begin:end],
+            states=near.states[begin:end],
+        )
+
     def panels_of(self, time: Array) -> Labels:
         """Numbers of the panels at times, s; at an edge, or next to it, of the one after it."""
         panels = np.searchsorted(self.edges, time + BESIDE * self.span, side="right") - 1

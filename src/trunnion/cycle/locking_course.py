@@ -419,13 +419,12 @@ class LockingCourse:
         """The smallest margin between two times, s, and where."""
         if self.margins is None:
             return np.nan, ""
-        cut = replace(self.margins, courses=self.margins.courses.parted(np.array([low, high])))
-        middles = cut.courses.edges[:-1] + cut.courses.half
-        inside = (middles > low) & (middles < high) & cut.valid
-        least = cut.extreme("locking_margin", of=multiple_of, sign=-1.0, panels=inside)
+        part = self.margins.courses.between(low, high)
+        valid = self.margins.valid[self.margins.courses.panel(part.edges[:-1] + part.half)]
+        least = part.extreme(multiple_of, -1.0, valid)
         if least is not None:
-            return least.value, cut.told(least).removeprefix("at ")
-        return (np.inf if np.any(inside & (cut.status < Status.LOAD_UNDEFINED)) else np.nan), ""
+            return least.value, self.margins.told(least).removeprefix("at ")
+        return (np.inf if np.any(valid & (part.states < Status.LOAD_UNDEFINED)) else np.nan), ""
 
     def attribute(self, time: Array, near: float = NEAR) -> dict[str, Any]:
         """The ranges for the attribute `locking_ranges` of a result: see `docs/reference/results.md`."""

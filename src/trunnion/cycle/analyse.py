@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.cycle import summary
-from trunnion.cycle.kept import ALL, Kept
+from trunnion.cycle.cycle_kernel import Engine
+from trunnion.cycle.kept import ALL, Dtype, Kept
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
+from trunnion.model.units import TableUnits
 from trunnion.solve.friction_method import FrictionMethod
 
 if TYPE_CHECKING:
@@ -24,20 +26,20 @@ from trunnion.solve.run import Run, prepare
 __all__ = ["analyse", "analyse_run", "analysed"]
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")
 def analyse(
     mechanism: Mechanism,
     steps: int = 360,
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
-    engine: str = "auto",
+    engine: Engine = "auto",
     variables: Sequence[str] | None = None,
-    dtype: str = "float64",
+    dtype: Dtype = "float64",
     out: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     units_row: bool = False,
     columns: Sequence[str] | None = None,
-    units: str = "si",
+    units: TableUnits = "si",
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -61,13 +63,14 @@ def analyse(
     return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved).dataset
 
 
+@strict_arguments
 @np.errstate(all="ignore")
 def analysed(
     mechanism: Mechanism,
     steps: int = 360,
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
-    engine: str = "auto",
+    engine: Engine = "auto",
     kept: Kept = ALL,
     out: Sequence[str | os.PathLike[str]] = (),
     saved: Mapping[str, Any] | None = None,

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from trunnion.cycle.deviations import COMPARED
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
 from trunnion.solve.system import System
 
-__all__ = ["ALL", "Kept", "needed"]
+__all__ = ["ALL", "Dtype", "Kept", "needed"]
 
-NUMBERS = ("float64", "float32")
+Dtype = Literal["float64", "float32"]
 # what summary and findings are made of
 BOOKS = {
     "condition", "drive_effort", "drive_power", "friction_iterations", "friction_power", "joint_slide",
@@ -28,24 +30,20 @@ TURNED = {
 }
 
 
+@strict_arguments
 @dataclass(frozen=True)
 class Kept:
     """variables: names of `results.VARIABLES`, all if not given; the status is always kept. dtype: of the floats."""
 
     variables: tuple[str, ...] | None = None
-    dtype: str = "float64"
+    dtype: Dtype = "float64"
 
     @classmethod
-    def read(cls, variables: Sequence[str] | None, dtype: str) -> Kept:
+    def read(cls, variables: Sequence[str] | None, dtype: Dtype) -> Kept:
         """What somebody asks for; MechanismError for a name or a kind of number that there is not."""
-        if dtype not in NUMBERS:
-            what = f"results are not kept as '{dtype}'"
-            raise MechanismError(Finding(what, "dtype", f"use {' or '.join(NUMBERS)}"))
-        if isinstance(variables, str):
-            variables = [variables]
         for name in variables or ():
             if name not in results.VARIABLES:
-                remedy = nearest(str(name), list(results.VARIABLES))
+                remedy = nearest(name, list(results.VARIABLES))
                 raise MechanismError(Finding(f"a result has no variable '{name}'", "variables", remedy))
         return cls(None if variables is None else (*dict.fromkeys([*variables, "status"]),), dtype)
 

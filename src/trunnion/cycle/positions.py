@@ -31,7 +31,7 @@ MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, 
 
 
 def check_steps(steps: int) -> None:
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+    if not 1 <= steps <= MOST_STEPS:
         remedy = f"give a whole number from 1 to {MOST_STEPS:,}, for all positions are held in memory"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
 

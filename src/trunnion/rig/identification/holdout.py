@@ -13,7 +13,7 @@ from trunnion.rig.reading.measurement import Condition, Measurement
 
 __all__ = ["HoldOut", "held_out"]
 
-HoldOut = float | Sequence[str] | None
+HoldOut = float | str | Sequence[str] | None
 MOST_NAMED = 6
 SAME = 1e-6  # of a setting
 
@@ -33,7 +33,7 @@ def held_out(mechanism: Mechanism, measurement: Measurement, wanted: HoldOut) ->
             raise MechanismError(Finding(what, "hold_out", "give a share between 0 and 1, or names of conditions"))
         return frozenset(), float(wanted)
     found: set[str] = set()
-    for text in wanted:
+    for text in [wanted] if isinstance(wanted, str) else wanted:
         named = [one.name for one in measurement.conditions if _is_named(one, text)]
         named = named or _set(mechanism, measurement, text)
         named = named or [one.name for one in measurement.conditions if _has(one.name, text.strip())]

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, cast
 
+import numpy as np
+
 from trunnion.algebra import space as algebra
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
@@ -68,11 +70,20 @@ class SpatialWalk(Forward):
         return apply(axes, wrench.u), apply(axes, moment)
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
-        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
+        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does.
+
+        The slide of a screw tells its whole turns.
+        """
         if self.pair(joint).crossed:  # its second pin lies at (sin θ₁, −cos θ₁, 0)
             sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
             return namespace(sine, cosine).arctan2(sine, cosine)
-        return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]
+        turn, slide = _dual_angle(first, second)
+        if not self.system.turns(joint):
+            return slide
+        if not self.pair(joint).threaded:
+            return turn
+        away = primal(slide) / primal(self.space.lead(self.values, joint)) - primal(turn)
+        return turn + 2 * np.pi * np.round(away / (2 * np.pi))
 
     def local_place(self, link: str, name: str) -> Vector3:
         """A named point of a link, or its element of a joint, in its own frame, m."""

@@ -90,9 +90,9 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        With the names and units of `analyse` over `time`, with works, energies and events beside them; NaN after a
-        motion that ends early. Of a steady cycle that of `analyse`, over as many positions as steps, equally spaced
-        in time.
+        With the names and units of `analyse` over `time`, with works, energies and events beside them; where the
+        motion ends early the last row is its end. Of a steady cycle that of `analyse`, over as many positions as steps,
+        equally spaced in time.
 
     Raises
     ------
@@ -143,9 +143,9 @@ def simulated(
         motion.begin(None)
         integration = integration_of(motion, known, duration, tolerance, progress, rates, evaluations)
         solution = integration.run(row.copy())
-        return Found.of(motion, solution, time, lambda when: Filling(motion, solution, when).books())
+        return Found.of(run, solution, time, lambda when: Filling(motion, solution, when).books())
 
-    return result_of(motion, _balanced(found, tolerance))
+    return result_of(motion, _balanced(found, tolerance), duration)
 
 
 def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
@@ -199,9 +199,9 @@ def _with_play(
         def between(when: Array) -> Books:
             return Filling(motion, solution, when, bare).books()
 
-        return Found.of(motion, solution, time, between, integration.finished())
+        return Found.of(run, solution, time, between, integration.finished())
 
-    return result_of(motion, _balanced(found, max(fine, FINEST)), run)
+    return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
 
 
 def _integrating(motion: FreeMotion, impact_step: float | None) -> Callable[..., ContactMotion]:

@@ -14,7 +14,8 @@ import xarray as xr
 
 from trunnion.errors import Finding
 from trunnion.files import whole
-from trunnion.model.names import strict_keywords
+from trunnion.model.arguments import strict_arguments
+from trunnion.model.units import TableUnits
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.export import frame, save
 from trunnion.results.figure import Figure as Figure
@@ -31,7 +32,7 @@ __all__ = ["Accessor"]
 
 
 @xr.register_dataset_accessor("trunnion")  # type: ignore[no-untyped-call]
-@strict_keywords
+@strict_arguments
 class Accessor:
     """A result of Trunnion, read."""
 
@@ -67,7 +68,7 @@ class Accessor:
         path: str | os.PathLike[str],
         units_row: bool = False,
         columns: Sequence[str] | None = None,
-        units: str = "si",
+        units: TableUnits = "si",
     ) -> None:
         """Write it by the file's extension, as `trunnion.save` does: .csv .json .nc .zarr .parquet .xlsx."""
         save(self._result, path, units_row, columns, units)

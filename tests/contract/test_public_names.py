@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import trunnion
@@ -113,6 +114,64 @@ def test_friction_is_not_switched_off_by_a_keyword(model: str) -> None:
         trunnion.analyse(mechanism, friction_method="off")  # type: ignore[arg-type]
     with pytest.raises(trunnion.MechanismError, match="no method 'off'"):
         trunnion.FrictionMethod("off")  # type: ignore[arg-type]
+
+
+WRONG: dict[str, tuple[Callable[[trunnion.Mechanism], Any], type[Exception], str]] = {
+    "a text for a number": (lambda m: trunnion.analyse(m, steps="9"), TypeError, r"analyse\(steps='9'\) takes a whole"),
+    "a broken count": (lambda m: trunnion.locking(m, 2.5), TypeError, r"locking\(steps=2.5\) takes a whole number"),
+    "a truth value for a count": (lambda m: trunnion.tolerance(m, seed=True), TypeError, "takes a whole number"),
+    "a text for a truth value": (lambda m: trunnion.sweep(m, {}, margin="no"), TypeError, "True or False"),
+    "a word for a method": (
+        lambda m: trunnion.analyse(m, friction_method="newton"), TypeError, "takes a FrictionMethod; mechanism.with_fr",
+    ),
+    "a path for a mechanism": (lambda m: trunnion.simulate("a.yaml"), TypeError, r"Mechanism: trunnion.read\(FILE\)"),
+    "a time with its unit": (lambda m: trunnion.simulate(m, "1 s"), TypeError, r"duration='1 s'\) takes a number"),
+    "a number for a function": (lambda m: trunnion.analyse(m, progress=3), TypeError, "takes a function"),
+    "pairs for a mapping": (lambda m: m.with_values([("r", 1)]), TypeError, r"with_values\(values=.*takes a mapping"),
+    "points for a file": (lambda m: m.with_table("A", [(0, 0)]), TypeError, "takes a text or a path"),
+    "nothing for a file": (lambda m: trunnion.read(None), TypeError, r"path=None\) takes a text or a path"),
+    "numbers for names": (lambda m: trunnion.play(m, [3]), TypeError, r"measures=\[3\]\) takes a list of texts"),
+    "a word that is no choice": (
+        lambda m: trunnion.assemble(m, uniform="pinz"), trunnion.MechanismError, "'pinz' — use pins or all",
+    ),
+    "a method that there is not": (
+        lambda m: trunnion.tolerance(m, methods="linnear"), trunnion.MechanismError, "no method 'linnear' — use",
+    ),
+    "no method": (lambda m: trunnion.tolerance(m, methods=[]), trunnion.MechanismError, "no method is asked for"),
+    "no measure": (lambda m: trunnion.tolerance(m, []), trunnion.MechanismError, "no measure is named"),
+    "degrees without a unit": (
+        lambda m: trunnion.tolerance(m, at=60), trunnion.MechanismError, "at: is 60 rad, .* write 60 deg if",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_argument_is_refused_by_name(name: str) -> None:
+    call, kind, words = WRONG[name]
+    with pytest.raises(kind, match=words):
+        call(trunnion.read("examples/toleranced-fourbar.yaml"))
+
+
+@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+def test_nothing_is_no_mechanism_and_no_file(name: str) -> None:
+    """Every public function checks its arguments."""
+    with pytest.raises(TypeError, match=r"\(.*=None\) takes a "):
+        FUNCTIONS[name](None)
+
+
+def test_one_name_is_a_list_of_one() -> None:
+    mechanism = trunnion.read("examples/toleranced-fourbar.yaml")
+    name = next(iter(mechanism.measures))
+    one, several = (trunnion.tolerance(mechanism, names, "linear", steps=6) for names in (name, [name]))
+    assert one.identical(several)
+    assert trunnion.analyse(mechanism, np.int64(6), variables="drive_effort").sizes["position"] == 6
+
+
+def test_a_copy_with_other_sections_is_checked() -> None:
+    mechanism = trunnion.Mechanism(**MODELS["four-bar"]())
+    assert mechanism.copy(update={"gravity": [0, -1]}).parameters()["gravity.y"] == -1
+    with pytest.raises(trunnion.MechanismError, match="gravity"):
+        mechanism.copy(update={"gravity": "nonsense"})
 
 
 def test_the_options_of_a_view_are_its_own(tmp_path: Path) -> None:

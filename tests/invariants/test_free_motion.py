@@ -117,7 +117,8 @@ def test_a_range_ends_the_motion() -> None:
     result = simulate(Mechanism(**{**data, "drivers": driver}), 1.0, 10, 1e-11)
     (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.range"]
     assert finding.figures["time"] == pytest.approx(np.sqrt(2 * 2 * 0.05 / 4), rel=1e-9)
-    assert np.isnan(result["drive_rate"].values[0, -1])
+    assert result["time"].values[-1] == finding.figures["time"]
+    assert result["drive_rate"].values[0, -1] == pytest.approx(np.sqrt(2 * 4 * 2 / 0.05), rel=1e-9)
 
 
 def test_at_rest_at_the_end_of_its_range_and_driven_out_of_it() -> None:

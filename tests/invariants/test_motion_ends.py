@@ -20,19 +20,46 @@ from timed import (
     two_wheels,
     wheel,
 )  # fmt: skip
-from trunnion import Mechanism, MechanismError, analyse, simulate
+from trunnion import Mechanism, MechanismError, Status, analyse, simulate
 from trunnion.dynamics import compiled_rates
 from trunnion.results.attributes import attribute
 
 
 def ended(result: Any, code: str) -> dict[str, Any]:
-    """The figures of the one finding that tells the end, after which there is no motion."""
+    """The figures of the one finding that tells the end, which is the last row."""
     (figures,) = [one.figures for one in result.trunnion.findings if one.code == f"simulate.{code}"]
-    after = result["time"].values > figures["time"]
-    assert after.any()
-    assert np.all(np.isnan(result["drive_coordinate"].values[:, after]))
-    assert np.all(np.isfinite(result["drive_coordinate"].values[:, ~after]))
+    assert result["time"].values[-1] == pytest.approx(figures["time"], rel=1e-12)
+    assert figures["time"] < result.attrs["duration"]
+    assert np.all(np.isfinite(result["drive_coordinate"].values))
+    assert not np.any(result["status"].values == Status.NOT_CONVERGED)
     return dict(figures)
+
+
+def figures(mechanism: Mechanism, steps: int) -> dict[str, tuple[Any, str]]:
+    result = simulate(mechanism, 1.0, steps)
+    return {one.name: (one.value, one.place) for one in result.trunnion.summary}
+
+
+@pytest.mark.parametrize("space", ["planar", "spatial"])
+def test_figures_are_of_the_motion_and_not_of_its_rows(space: str) -> None:
+    """Extremes between the rows, and what there is at the end of a motion that ends between them."""
+    flat = space == "planar"
+    mechanism = driven_four_bar(space, *PARALLELOGRAM, range=[0.5, 3.0]) if flat else swinging(space, stiffness=40.0)
+    few, many = figures(mechanism, 3), figures(mechanism, 400)
+    assert few.keys() == many.keys()
+    assert any(name.endswith("reaction_max") for name in few)
+    for name, (value, place) in few.items():
+        assert value == pytest.approx(many[name][0], rel=1e-9), name
+        assert place == many[name][1], name
+
+
+def test_the_figures_at_the_end_are_of_the_end() -> None:
+    """A wheel under a constant torque: ω = √(2 T θ / J) at the end of its range."""
+    data = wheel(LINEAR, drag=0.0).data()
+    data["drivers"] = {"A": {"speed": 1, "range": [0, 2], "motor": {"kind": "constant", "effort": 4}}}
+    found = figures(Mechanism(**data), 1)
+    assert found["A.speed_end"][0] == pytest.approx(np.sqrt(2 * 4 * 2 / 0.05), rel=1e-8)
+    assert found["work_drive"][0] == pytest.approx(8.0, rel=1e-8)
 
 
 # ---- ranges -----------------------------------------------------------------------------------------------------

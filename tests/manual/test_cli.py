@@ -565,3 +565,35 @@ def test_a_report_is_html(run: Run, tmp_path: Path) -> None:
     assert done.code == 2
     assert "HTML" in done.err
     assert not list(tmp_path.iterdir())
+
+
+def test_check_tells_ways_a_turn_of_a_screw_apart(run: Run, tmp_path: Path) -> None:
+    """A shoe on a plane leaves the table of a jack any place along the screw that is a half turn from the other."""
+    path = tmp_path / "jack.yaml"
+    axis = "axis: [0, 0, 1], x: [1, 0, 0]"
+    path.write_text(f"""trunnion: 1
+space: spatial
+links:
+  ground: {{points: {{A: {{at: [0, 0, 0], {axis}}}, G: {{at: [0.1, 0, 0], axis: [0, 1, 0], x: [1, 0, 0]}}}}}}
+  screw: {{points: {{A: {{at: [0, 0, 0], {axis}}}, H: {{at: [0, 0, 0], {axis}}}}}}}
+  table: {{points: {{H: {{at: [0, 0, 0], {axis}}}, S: {{at: [0.1, 0, 0], axis: [0, 0, 1]}}}}}}
+  shoe: {{points: {{S: {{at: [0, 0, 0], axis: [1, 0, 0]}}, G: {{at: [0, 0, 0], axis: [0, 1, 0], x: [1, 0, 0]}}}}}}
+joints:
+  A: {{type: revolute, links: [ground, screw]}}
+  H: {{type: helical, links: [screw, table], pitch: 6 mm}}
+  S: {{type: universal, links: [table, shoe]}}
+  G: {{type: planar, links: [ground, shoe]}}
+drivers: {{A: {{speed: 60 rpm, range: [-5 turn, 0 turn]}}}}
+assembly: {{H: 5 turn}}
+""")
+    shown = [line.strip() for line in run("check", path).out.splitlines()]
+    ways = [line.split("  ")[1] for line in shown if line.startswith("way-")]
+    assert len(set(ways)) == len(ways) > 2
+
+
+def test_freedoms_that_no_driver_moves_are_told_without_a_made_up_name(run: Run, tmp_path: Path) -> None:
+    done = run(
+        "check",
+        model(tmp_path, lambda text: "".join(line for line in text.splitlines(True) if "  D: {type" not in line)),
+    )
+    assert "drive a joint for each freedom left, or add a link" in done.err

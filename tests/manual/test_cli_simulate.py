@@ -103,3 +103,21 @@ def test_the_command_line_tells_where_a_motion_ends(program: Run, tmp_path: Path
     code, _, err = program("simulate", "w.json", "--time=1s")
     assert code == 0
     assert "A reaches 114.6°, the end of its stated range" in err
+
+
+def test_a_motion_that_does_not_begin_has_no_table(program: Run, tmp_path: Path) -> None:
+    """The arm falls from the end of its range at once."""
+    path = tmp_path / "ends.yaml"
+    path.write_text("""trunnion: 1
+space: planar
+gravity: [0, -9.81]
+links:
+  ground: {points: {A: [0, 0]}}
+  arm: {points: {A: [0, 0]}, mass: 5 kg, centre: [0.25, 0], inertia: 0.1}
+joints: {A: {type: revolute, links: [ground, arm]}}
+drivers: {A: {speed: 1, range: [0 deg, 90 deg], free: true}}
+""")
+    code, out, err = program("simulate", path, "--time", "1s", "--out", "m.csv")
+    assert code == 0
+    assert "the end of its stated range, at 0 s" in err
+    assert out == "wrote m.csv\n"

@@ -162,7 +162,7 @@ def analyse(
     from trunnion.cycle.positions import Kept
 
     check_files(out or [], report, drawn=False, instead=f"trunnion plot {file}")
-    kept = Kept.read(variables, dtype)
+    kept = Kept.read(variables, dtype)  # type: ignore[arg-type]  # it checks them
     if report and kept.variables is not None:
         raise MechanismError(Finding("a report is made of all variables", "--variables", "leave one of both out"))
     mechanism = stated(file, set_, table, friction, seat)
@@ -388,7 +388,7 @@ def _analysed(
     from trunnion.cycle.analyse import analysed
 
     with bar("positions", steps, least=200_000) as progress:
-        return analysed(mechanism, steps, method, progress, engine, *kept)
+        return analysed(mechanism, steps, method, progress, engine, *kept)  # type: ignore[arg-type]  # it checks it
 
 
 def _run(mechanism: Mechanism, steps: int, method: FrictionMethod | None) -> xr.Dataset:

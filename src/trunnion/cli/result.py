@@ -40,15 +40,15 @@ def check_files(
 
     drawn: whether figures can be written; instead: what writes them where they cannot.
     """
-    from trunnion.results.export import check_format
-    from trunnion.results.tables import check_table
-
     others = IMAGES if drawn else ()
     for path in out:
         if instead and path.suffix.lower() in IMAGES:
             what = f"cannot write a result as '{path.suffix.lower()}'"
             raise MechanismError(Finding(what, "--out", f"figures: {instead} --out {path}"))
         if path.suffix.lower() not in others:
+            from trunnion.results.export import check_format  # with xarray, which only a file needs
+            from trunnion.results.tables import check_table
+
             check_format(path, others)
             if of:
                 check_table(path, of)
@@ -111,11 +111,11 @@ class Shown:
 
     def write(self) -> None:
         """Write every file that is asked for."""
-        from trunnion.results.export import save
-
         for path in self.out:
             if path.suffix.lower() not in IMAGES:
-                save(self.dataset, path, self.units_row, self.columns, self.units)
+                from trunnion.results.export import save
+
+                save(self.dataset, path, self.units_row, self.columns, self.units)  # type: ignore[arg-type]  # it checks them
             elif not self._drawn(path):
                 continue
             self.written.append(path)

@@ -108,7 +108,10 @@ def sweep(
     own = check_measure(measures, mechanism)
     with lines_of(file), bar("points", points(grid)) as progress:
         margin = margin or "locking_margin" in measures
-        result = run(mechanism, grid, steps, progress=progress, margin=margin, measures=own, engine=engine)
+        result = run(
+            mechanism, grid, steps, progress=progress, margin=margin, measures=own,
+            engine=engine,  # type: ignore[arg-type]  # it checks it
+        )  # fmt: skip
     folders = {path.parent for path in files if path not in (out or [])}
     for one in sorted(folders):
         folder(one)

@@ -33,7 +33,9 @@ def wrote(path: Path) -> None:
 
 
 def show_figures(title: str, figures: Sequence[Figure]) -> None:
-    """Figures with label, value and a unit that fits its size."""
+    """Figures with label, value and a unit that fits its size; nothing if there are none."""
+    if not figures:
+        return
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", show_edge=False)

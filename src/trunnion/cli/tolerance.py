@@ -105,7 +105,7 @@ def tolerance(
     counted = samples if any(one in SAMPLINGS for one in methods) else 0
     with lines_of(file), bar("samples", counted, least=1000) as progress:
         result = run(
-            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,  # type: ignore[arg-type]
             cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
         )  # fmt: skip
     shown = shown_of(result, mechanism.name, file, out or [], units_row, kind, report)

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.cycle.positions import ALL, Kept, check_steps, positions
+from trunnion.cycle.cycle_kernel import Engine
+from trunnion.cycle.positions import ALL, Dtype, Kept, check_steps, positions
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import member_units, result_of
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
+from trunnion.model.units import TableUnits
 from trunnion.results import variables as results
 from trunnion.results.attributes import origin
 from trunnion.results.dataset import driven
@@ -29,20 +31,20 @@ __all__ = ["analyse", "analyse_run", "analysed", "drawable"]
 DRAWN = 72  # positions of the curves of points that are drawn
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")
 def analyse(
     mechanism: Mechanism,
     steps: int = 360,
     friction_method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
-    engine: str = "auto",
+    engine: Engine = "auto",
     variables: Sequence[str] | None = None,
-    dtype: str = "float64",
+    dtype: Dtype = "float64",
     out: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     units_row: bool = False,
     columns: Sequence[str] | None = None,
-    units: str = "si",
+    units: TableUnits = "si",
 ) -> xr.Dataset:
     """Motion, reactions with friction, drive effort and power of a mechanism over its cycle.
 
@@ -66,13 +68,14 @@ def analyse(
     return analysed(mechanism, steps, friction_method, progress, engine, kept, paths, saved).dataset
 
 
+@strict_arguments
 @np.errstate(all="ignore")
 def analysed(
     mechanism: Mechanism,
     steps: int = 360,
     method: FrictionMethod | None = None,
     progress: Callable[[int], None] | None = None,
-    engine: str = "auto",
+    engine: Engine = "auto",
     kept: Kept = ALL,
     out: Sequence[str | os.PathLike[str]] = (),
     saved: Mapping[str, Any] | None = None,

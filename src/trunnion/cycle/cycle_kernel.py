@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,11 @@ from trunnion.solve.switches import Mechanisms, accuracy_of, bends, breaks_betwe
 from trunnion.solve.system import System, Values
 from trunnion.solve.walk_kernel import Figure, WalkKernel
 
-__all__ = ["ENGINES", "CycleKernel", "Many", "compiles"]
+__all__ = ["CycleKernel", "Engine", "Many", "compiles"]
 
 Cell = tuple[str, tuple[int, ...]]  # variable, and place in its array but for the position
 
-ENGINES = ("auto", "numpy", "compiled")
+Engine = Literal["auto", "numpy", "compiled"]
 WORTH_COMPILING = 200_000  # positions; NumPy does as many in the time that compiling takes
 MARGIN_WEIGHT = 50.0  # as many plain positions take NumPy as long as one whose locking margin is followed to its end
 PROBED = 64  # positions at which it is seen whether margins are followed
@@ -143,12 +143,10 @@ class CycleKernel:
 
 
 def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
-    """Whether the compiled engine is to be tried. MechanismError if there is no such engine, or it cannot.
+    """Whether the compiled engine is to be tried. MechanismError if it cannot.
 
     method: of friction, where a locking margin is asked for at each position.
     """
-    if engine not in ENGINES:
-        raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(ENGINES)}"))
     if engine == "compiled" and run.seats:
         what = "pins in seats settle in rounds, at each position as many as it needs: that is not compiled"
         raise MechanismError(Finding(what, f"joints.{run.seats[0].joint}.seat", "use the engine numpy"))

@@ -15,8 +15,8 @@ from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import named
 from trunnion.measures.positions import plan
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.results.sentences import finding_for
 from trunnion.solve.assembly_modes import GroupModes, choices
 from trunnion.solve.forward import Forward, forward
@@ -62,7 +62,7 @@ class Check:
         return self.plan.mobility
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def check(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None] | None = None) -> Check:
     """Structure and findings of a mechanism, looked at over `steps` positions of its cycle.

@@ -22,8 +22,8 @@ from trunnion.cycle.locking_course import (
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import attribute, codes, encoded, finding_rows
 from trunnion.results.dataset import Variable, described, with_variables
 from trunnion.results.figure import Figure
@@ -65,7 +65,7 @@ VARIABLES = {
 }
 
 
-@strict_keywords
+@strict_arguments
 def locking(mechanism: Mechanism, steps: int = 360, progress: Callable[[int], None] | None = None) -> xr.Dataset:
     """The result of `analyse` with what is to know of locking at every position, by dims joint, driver and position.
 

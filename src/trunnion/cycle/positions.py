@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_err
 from trunnion.cycle.means import Means, unknown
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.names import nearest
 from trunnion.results import variables as results
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -24,10 +26,10 @@ from trunnion.solve.run import Run
 from trunnion.solve.seating import SETTLED, seating_of
 from trunnion.solve.system import Dial, System, Values
 
-__all__ = ["ALL", "Arrays", "Kept", "Positions", "check_steps", "positions", "stretch"]
+__all__ = ["ALL", "Arrays", "Dtype", "Kept", "Positions", "check_steps", "positions", "stretch"]
 
 
-NUMBERS = ("float64", "float32")
+Dtype = Literal["float64", "float32"]
 # what summary and findings are made of
 BOOKS = {
     "condition", "drive_effort", "drive_power", "friction_iterations", "friction_power", "joint_slide",
@@ -43,29 +45,25 @@ MOST_STEPS = 10_000_000  # all of them are held in memory: of a four-bar 10 GB, 
 
 
 def check_steps(steps: int) -> None:
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+    if not 1 <= steps <= MOST_STEPS:
         remedy = f"give a whole number from 1 to {MOST_STEPS:,}, for all positions are held in memory"
         raise MechanismError(Finding(f"cannot analyse {steps} positions", "steps", remedy))
 
 
+@strict_arguments
 @dataclass(frozen=True)
 class Kept:
     """variables: names of `results.VARIABLES`, all if not given; the status is always kept. dtype: of the floats."""
 
     variables: tuple[str, ...] | None = None
-    dtype: str = "float64"
+    dtype: Dtype = "float64"
 
     @classmethod
-    def read(cls, variables: Sequence[str] | None, dtype: str) -> Kept:
+    def read(cls, variables: Sequence[str] | None, dtype: Dtype) -> Kept:
         """What somebody asks for; MechanismError for a name or a kind of number that there is not."""
-        if dtype not in NUMBERS:
-            what = f"results are not kept as '{dtype}'"
-            raise MechanismError(Finding(what, "dtype", f"use {' or '.join(NUMBERS)}"))
-        if isinstance(variables, str):
-            variables = [variables]
         for name in variables or ():
             if name not in results.VARIABLES:
-                remedy = nearest(str(name), list(results.VARIABLES))
+                remedy = nearest(name, list(results.VARIABLES))
                 raise MechanismError(Finding(f"a result has no variable '{name}'", "variables", remedy))
         return cls(None if variables is None else (*dict.fromkeys([*variables, "status"]),), dtype)
 

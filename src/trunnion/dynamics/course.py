@@ -154,21 +154,8 @@ class Courses:
         found: Array = np.where(np.abs(earlier - speed) <= STEADY * speed, begins, np.nan)
         return found
 
-    def extreme(self, number: int) -> tuple[float, float]:
-        """The number of the first lane that is farthest from 0, one of `OVER_TIME`, and its time, s."""
-        found = [self._top(sign * self.numbers[number]) for sign in (1.0, -1.0)]
-        k = int(found[1][0][0] > found[0][0][0])
-        most, step, place = (one[0] for one in found[k])
-        begin, end = self.numbers[0, 0, step, [0, -1]]
-        return float((1.0, -1.0)[k] * most), float(begin + place * (end - begin))
-
     def largest(self, numbers: Array, counts: Flags | None = None) -> Array:
         """The largest of a number at the nodes, (lane,). counts: at which of the FINE parts of a step."""
-        return self._top(numbers, counts)[0]
-
-    @staticmethod
-    def _top(numbers: Array, counts: Flags | None = None) -> tuple[Array, NDArray[np.intp], Array]:
-        """The largest of a number, the step that it is in and the share of that step, (lane,)."""
         fine = _by(_FINER, numbers)
         seen = np.where(np.isfinite(fine) & (True if counts is None else counts), fine, -np.inf)
         lane = np.arange(len(seen))
@@ -178,8 +165,8 @@ class Courses:
         bend = before - 2.0 * here + after
         top = here - (after - before) ** 2 / (8.0 * bend)
         inside = (part == inner) & (here >= before) & (here >= after) & (bend < 0.0)
-        shift = np.where(inside, (before - after) / (2.0 * bend), 0.0)
-        return np.where(inside, top, most), step, (np.where(inside, inner, part) + shift) / FINE
+        found: Array = np.where(inside, top, most)
+        return found
 
 
 def _basis_where(own: Array, wanted: Array) -> Array:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.course import Accuracy, Courses
 from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.contact_motion import Impact
-from trunnion.dynamics.course import OVER_TIME, Courses
-from trunnion.dynamics.energy import kinetic_energy, potential_energy
+from trunnion.dynamics.course import Courses as DriveCourses
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
@@ -86,43 +86,109 @@ class Books(NamedTuple):
     sticking: NDArray[np.bool_] | None = None
 
 
-class Found(NamedTuple):
-    """A motion with its books: what works and energies differ by at every row, J, and the energy turned over, J.
+class Course(NamedTuple):
+    """A motion as courses between the ends of its steps, from which its figures are read, whatever the rows.
 
-    between: books at other times, s; impacts: of joints in play; share: the largest difference of the energy turned
-    over, 0 where it is rounding.
+    courses: rates of the free coordinates, efforts of the drivers, reactions of the joints by component; counts: how
+    many there are of each; last: the books at the end; scales: of all that was read; worst: the largest difference of
+    works and energies, J; turned_over, stored: the largest work or change of energy, and the largest energy, J.
     """
+
+    courses: Courses
+    counts: tuple[int, int, tuple[int, int]]
+    last: Books
+    scales: Scales
+    worst: float
+    turned_over: float
+    stored: float
+
+    @classmethod
+    def of(cls, run: Run, solution: Solution, between: Callable[[Array], Books]) -> Course | None:
+        """That of a solution, None if it does not begin. between: the books at some rising times, s."""
+        if not solution.end > 0.0:
+            return None
+        ends = np.array([0.0, *(one.end for one in solution.stretches)])
+        breaks = ends[np.append(np.diff(ends) > SHORTEST * solution.end, True)]
+        begin, sizes = between(np.nextafter(ends[:1], np.inf)), [np.zeros(6)]
+
+        def solve(time: Array) -> tuple[Array, NDArray[np.integer]]:
+            found, order = np.empty((len(begin.at.rate) + len(flat(begin)), len(time))), np.argsort(time)
+            for part in np.split(order, range(PORTION, len(order), PORTION)):
+                books = between(time[part])
+                works, changes = books.works - begin.works, books.energies - begin.energies
+                account = _residual(works, changes), np.concatenate([works, changes]), books.energies
+                scales = largest(run, books.arrays)
+                sizes.append(np.array([*scales, *(np.nanmax(np.abs(one), initial=0.0) for one in account)]))
+                found[:, part] = np.concatenate([books.at.rate, flat(books)])
+            return found, np.zeros(len(time), np.intp)
+
+        def flat(books: Books) -> Array:
+            forces = books.arrays["reaction_force"]
+            return np.concatenate([books.arrays["drive_effort"], forces.reshape(-1, forces.shape[-1])])
+
+        courses = Courses.of(solve, breaks, accuracy=ACCURACY)
+        counts = len(begin.at.rate), len(begin.arrays["drive_effort"]), begin.arrays["reaction_force"].shape[:2]
+        *scales, worst, turned_over, stored = (float(one) for one in np.max(sizes, axis=0))
+        return cls(courses, counts, between(ends[-1:]), Scales(*scales), worst, turned_over, stored)
+
+    def rate(self, i: int) -> tuple[float, float]:
+        """The rate of a free coordinate that is farthest from 0, and its time, s."""
+        return self._farthest(i)
+
+    def effort(self, i: int) -> tuple[float, float]:
+        """The effort of a driver that is farthest from 0, and its time, s; NaN where it has none."""
+        return self._farthest(self.counts[0] + i)
+
+    def reaction(self, i: int) -> tuple[float, float]:
+        """The largest size of the reaction of a joint, N, and its time, s."""
+        axes = self.counts[2][1]
+        first = sum(self.counts[:2]) + i * axes
+        return self._top(lambda rows: np.sqrt(np.sum(rows[first : first + axes] ** 2, axis=0)))
+
+    def _farthest(self, row: int) -> tuple[float, float]:
+        most, least = self._top(lambda rows: rows[row]), self._top(lambda rows: -rows[row])
+        return (-least[0], least[1]) if least[0] > most[0] else most
+
+    def _top(self, of: Callable[[Array], Array]) -> tuple[float, float]:
+        place = self.courses.extreme(of)
+        if place is None:
+            return np.nan, np.nan
+        return place.value, float(self.courses.edges[0]) if place.everywhere else place.time
+
+
+class Found(NamedTuple):
+    """A motion with its books at its rows, and its course, None if it does not begin; impacts: of joints in play."""
 
     solution: Solution
     books: Books
-    residual: Array
-    turned_over: float
-    between: Callable[[Array], Books]
+    course: Course | None
     impacts: Sequence[Impact] = ()
 
     @classmethod
     def of(
-        cls, motion: FreeMotion, solution: Solution, time: Array, between: Callable[[Array], Books],
+        cls, run: Run, solution: Solution, time: Array, between: Callable[[Array], Books],
         impacts: Sequence[Impact] = (),
     ) -> Found:  # fmt: skip
-        """The motion with its energy account. time: s, of its rows."""
-        books = between(time)
-        residual, turned_over = _energy(books)
-        return cls(solution, books, residual, max(turned_over, _turned_over(motion, solution)), between, impacts)
+        """time: s, of the rows, up to the end; between: the books at some rising times, s."""
+        if solution.ended is not None:
+            time = np.append(time[time < solution.end], solution.end)
+        return cls(solution, between(time), Course.of(run, solution, between), impacts)
 
     @property
     def share(self) -> float:
-        worst = float(np.nanmax(np.abs(self.residual), initial=0.0))
-        rounding = ROUNDING * float(np.nanmax(np.abs(self.books.energies), initial=0.0))
-        return worst / self.turned_over if self.turned_over > 0 and worst > rounding else 0.0
+        """What works and energies differ by at most, of the energy turned over; 0 where it is rounding."""
+        if self.course is None or not self.course.worst > ROUNDING * self.course.stored:
+            return 0.0
+        return self.course.worst / self.course.turned_over if self.course.turned_over > 0 else 0.0
 
 
-def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Result:
+def result_of(motion: FreeMotion, found: Found, duration: float, stated: Run | None = None) -> Result:
     """The result of a motion in time. stated: the mechanism as it was stated, where joints in play were taken out."""
     solution, books, impacts = found.solution, found.books, found.impacts
     run = stated or motion.run
     _note_switches(motion, solution)
-    mechanism, system, scales = run.system.mechanism, run.system, largest(run, books.arrays)
+    mechanism, system = run.system.mechanism, run.system
+    scales = found.course.scales if found.course else largest(run, books.arrays)
     findings = [
         *motion_findings(motion, solution, run, impacts),
         *_unbalanced(found),
@@ -133,6 +199,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
             **origin(mechanism, system.plan.formula, mobility=system.plan.mobility),
             **cited(references(mechanism)),
             "free_drivers": _shown(motion, run),
+            "duration": duration,
             "findings": finding_rows(findings),
             **(_named_contacts(motion, impacts) if stated else {}),
             **scales.summary(_summary(motion, found, run, scales)),
@@ -147,7 +214,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
         known = {name: one.over("time") for name, one in results.variables(mechanism.space).items()}
         units = member_units(system)
         given = described(books.arrays, known, units)
-        given |= described(_own(motion, run, solution, books, found.residual), MOTION, units)
+        given |= described(_own(motion, run, solution, books), MOTION, units)
         labels, along = dict(books.labels), {"time": Variable(("time",), "s", "time from the start")}
         coordinates = {"time": books.time}
         if stated is not None and books.touches is not None:
@@ -156,6 +223,7 @@ def result_of(motion: FreeMotion, found: Found, stated: Run | None = None) -> Re
                 impact_arrays(impacts), IMPACT
             )
             rows = np.flatnonzero(np.all(np.isfinite(books.touches.normal), axis=0))
+            rows = rows if solution.ended is None else rows[:-1]  # the end is not evenly spaced
             if len(rows) >= FEWEST and not is_rigid(mechanism):  # an impact of rigid bodies has no force
                 along["frequency"] = FREQUENCY
                 coordinates["frequency"], amplitude = spectrum(books.time[rows], books.touches.normal[:, rows])
@@ -176,7 +244,7 @@ def _shown(motion: FreeMotion, run: Run) -> list[str]:
     return [name for name in motion.names if name in run.system.mechanism.drivers]
 
 
-def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residual: Array) -> dict[str, Any]:
+def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books) -> dict[str, Any]:
     """What there is beside the variables of a cycle."""
     system, names = run.system, list(run.system.mechanism.drivers)
     coordinates, rates = np.empty((2, len(names), len(books.time)))
@@ -191,20 +259,20 @@ def _own(motion: FreeMotion, run: Run, solution: Solution, books: Books, residua
     return {
         "drive_coordinate": coordinates,
         "drive_rate": rates,
-        **{f"work_{name}": work for name, work in _works(solution, books).items() if name != IN_CONTACTS},
+        **{f"work_{name}": work for name, work in _works(solution, books.works).items() if name != IN_CONTACTS},
         **_rotors(motion, names, books),
         "kinetic_energy": books.energies[0],
         "potential_energy": books.energies[1],
-        "energy_residual": residual,
+        "energy_residual": _residual(books.works, books.energies),
         "resting": books.resting,
         **({} if books.sticking is None else {"sticking": books.sticking}),
         "event_time": np.array([one.time for one in solution.events], float),
     }
 
 
-def _works(solution: Solution, books: Books) -> dict[str, Array]:
-    """The works at every row, by their names."""
-    return dict(zip(solution.layout.works_named, books.works, strict=True))
+def _works(solution: Solution, works: Array) -> dict[str, Array]:
+    """Works by their names."""
+    return dict(zip(solution.layout.works_named, works, strict=True))
 
 
 def _rotors(motion: FreeMotion, names: Sequence[str], books: Books) -> dict[str, Array]:
@@ -227,37 +295,20 @@ def _note_switches(motion: FreeMotion, solution: Solution) -> None:
 # ---- energy ---------------------------------------------------------------------------------------------------
 
 
-def _energy(books: Books) -> tuple[Array, float]:
-    """What works and energies differ by at every row, J, and the energy turned over, J."""
-    # to friction, and to contacts; from the first row on, which is that after a stop at the start
-    drive, loads, springs, *lost = books.works - books.works[:, :1]
-    energy = books.energies.sum(axis=0)
-    residual = drive + loads + springs - sum(lost) - (energy - energy[0])
-    sizes = [np.nanmax(np.abs(one), initial=0.0) for one in (*books.works, *(books.energies - books.energies[:, :1]))]
-    return residual, float(max(sizes))
+def _residual(works: Array, energies: Array) -> Array:
+    """What works and energies differ by at every time, J."""
+    # to friction, and to contacts; from the first time on, which is that after a stop at the start
+    drive, loads, springs, *lost = works - works[:, :1]
+    energy = energies.sum(axis=0)
+    return np.asarray(drive + loads + springs - sum(lost) - (energy - energy[0]))
 
 
-LOOKED = 400  # times between the rows at which the energy is looked at
-
-
-def _turned_over(motion: FreeMotion, solution: Solution) -> float:
-    """The largest work or change of energy at the ends of steps, J: rows may be far apart."""
-    if motion.followed or not solution.stretches:
-        return 0.0
-    ends = np.array([one.end for one in solution.stretches])
-    time = np.unique(np.append(ends[:: max(1, len(ends) // LOOKED)], solution.stretches[0].begin))
-    rows, _ = solution.at(time)
-    at = solution.layout.moment(time, rows)
-    walk = motion.walk(at, np.zeros_like(at.q))
-    energies = np.array([np.broadcast_to(one, time.shape) for one in (kinetic_energy(walk), potential_energy(walk))])
-    changes = energies - energies[:, :1]
-    return float(np.nanmax(np.abs(np.concatenate([changes, solution.layout.works(rows)])), initial=0.0))
-
-
+PORTION = 10_000  # times whose books are read at once: these are many numbers
+SHORTEST = 1e-12  # of the duration: a step that has no course of its own
+# of what an integration knows; a step is one panel, but where a force bends or jumps within it
+ACCURACY = Accuracy(tolerance=1e-6, widest=1.0, rounds=10, most=16)
 DIFFERS = 0.01  # of a restitution: a difference that is worth a note
 FEW = 2  # contacts that begin slowly, of which nothing is said
-PARTS = 16  # of the interval between two rows in which the largest reaction is looked for
-RATE, EFFORT = OVER_TIME["rate"], OVER_TIME["effort"]
 ROUNDING = 1e-12  # of the energy turned over: a work that is none
 WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
@@ -392,77 +443,38 @@ def _holding(motion: FreeMotion, solution: Solution, stretch: Stretch) -> tuple[
 
 
 def _summary(motion: FreeMotion, own: Found, run: Run, scales: Scales) -> Sequence[Figure]:
-    """The figures that one looks at first."""
+    """The figures that one looks at first; none of a motion that does not begin."""
     found: list[Figure] = []
-    solution, books, impacts, names = own.solution, own.books, own.impacts, list(run.system.mechanism.drivers)
+    solution, course, impacts, names = own.solution, own.course, own.impacts, list(run.system.mechanism.drivers)
+    if course is None:
+        return found
     for i, name in enumerate(_shown(motion, run)):
         turns, effort = motion.system.turns(name), effort_units(motion.system)[names.index(name)]
-        rate, unit = books.at.rate[i], "rad/s" if turns else "m/s"
-        if not np.any(np.isfinite(rate)) or not np.any(np.isfinite(books.works[0])):
-            continue
-        course = Courses.of_solution(motion, solution, i)
-        found.append(_largest(f"{name}.speed_max", f"speed of {name}", unit, books.time, rate, course.extreme(RATE)))
-        last = np.flatnonzero(np.isfinite(rate))[-1]
-        found.append(Figure(f"{name}.speed_end", f"speed of {name}", rate[last], unit, "at the end",
-                            _at(books.time[last])))  # fmt: skip
-        efforts = books.arrays["drive_effort"][names.index(name)]
-        noun = "drive torque" if turns else "drive force"
+        unit, speed = "rad/s" if turns else "m/s", f"speed of {name}"
+        found.append(_largest(f"{name}.speed_max", speed, unit, *course.rate(i)))
+        last = float(course.last.at.rate[i, 0])
+        found.append(Figure(f"{name}.speed_end", speed, last, unit, "at the end", _at(solution.end)))
+        peak, noun = course.effort(names.index(name)), "drive torque" if turns else "drive force"
         # of others it is rounding; where nothing has inertia at a dead centre there is none
-        if motion.system.mechanism.drivers[name].motor is not None and np.any(np.isfinite(efforts)):
-            found.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, books.time, efforts,
-                                  course.extreme(EFFORT)))  # fmt: skip
-        found += steady_figures(motion, solution, i, course)
+        if motion.system.mechanism.drivers[name].motor is not None and np.isfinite(peak[0]):
+            found.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, *peak))
+        found += steady_figures(motion, solution, i, DriveCourses.of_solution(motion, solution, i))
     ended = solution.ended is not None and solution.ended.code == "simulate.change_point"
     if not ended and not any(event.kind == "change-point" for event in solution.events):  # there they have no bound
-        found += _reactions(own, list(run.system.joints))
+        for i, joint in enumerate(run.system.joints):
+            if (peak := course.reaction(i))[0] > 0:
+                found.append(_largest(f"{joint}.reaction_max", f"reaction in {joint}", "N", *peak))
     found += impact_figures(motion.contacts.labels, impacts, solution.end)
-    if not np.any(np.isfinite(books.works[0])):  # it does not begin
-        return found
-    done = int(np.flatnonzero(np.isfinite(books.works[0]))[-1])
-    for key, works in _works(solution, books).items():
-        if np.nanmax(np.abs(works)) > scales.floor("J"):
-            found.append(Figure(f"work_{key}", WORDS[key], works[done], "J"))
-    worst = float(np.nanmax(np.abs(own.residual)))
-    found.append(Figure("energy_residual", "largest error of the energy account", worst, "J"))
+    for key, work in _works(solution, course.last.works).items():
+        if abs(work[0]) > scales.floor("J"):
+            found.append(Figure(f"work_{key}", WORDS[key], float(work[0]), "J"))
+    found.append(Figure("energy_residual", "largest error of the energy account", course.worst, "J"))
     return found
 
 
-def _largest(
-    name: str, subject: str, unit: str, time: Array, rows: Array, between: tuple[float, float] = (0.0, 0.0)
-) -> Figure:
-    """What is farthest from 0 at the rows, or between them, where a value and its time, s, are given."""
-    most = int(np.nanargmax(np.abs(rows)))
-    value, when = rows[most], time[most]
-    if np.isfinite(between[0]) and abs(between[0]) > abs(value):
-        value, when = between
-    return Figure(name, subject, value, unit, "largest", _at(when))
-
-
-def _reactions(own: Found, joints: Sequence[str]) -> Iterator[Figure]:
-    """The largest reactions: of the rows and both sides of the ends of steps, where forces jump; then beside it."""
-    ends = np.array([one.end for one in own.solution.stretches])
-    ends = ends[:: max(1, len(ends) // LOOKED)]
-    time, sizes = own.books.time, _sizes(own.books)
-    time, sizes = _joined(time, sizes, own, np.append(ends, np.nextafter(ends, np.inf)))
-    loaded = [(i, int(np.nanargmax(size))) for i, size in enumerate(sizes) if np.any(size > 0)]
-    near = [(float(time[max(most - 1, 0)]), float(time[min(most + 1, len(time) - 1)])) for _, most in loaded]
-    finer = [np.linspace(low, high, 2 * PARTS + 1) for low, high in near]
-    time, sizes = _joined(time, sizes, own, np.concatenate([ends[:0], *finer]))
-    for i, _ in loaded:
-        yield _largest(f"{joints[i]}.reaction_max", f"reaction in {joints[i]}", "N", time, sizes[i])
-
-
-def _sizes(books: Books) -> Array:
-    """The sizes of the reactions, N, (joint, time)."""
-    return np.asarray(np.sqrt(np.sum(books.arrays["reaction_force"] ** 2, axis=1)))
-
-
-def _joined(time: Array, sizes: Array, own: Found, more: Array) -> tuple[Array, Array]:
-    """Times and sizes of reactions in their order, with those of more times."""
-    more = np.setdiff1d(more[(more >= time[0]) & (more <= time[-1])], time)
-    every = np.append(time, more)
-    order = np.argsort(every)
-    return every[order], np.concatenate([sizes, _sizes(own.between(more))], axis=1)[:, order] if len(more) else sizes
+def _largest(name: str, subject: str, unit: str, value: float, time: float) -> Figure:
+    """What is farthest from 0, with its time, s."""
+    return Figure(name, subject, value, unit, "largest", _at(time))
 
 
 def _at(time: float) -> str:

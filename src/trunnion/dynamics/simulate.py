@@ -28,8 +28,8 @@ from trunnion.dynamics.steady import steady as steady_result
 from trunnion.dynamics.stick_motion import StickMotion
 from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.solve.change_points import TOUCHING
 from trunnion.solve.run import Run, prepare
 
@@ -49,7 +49,7 @@ BESIDE, MASSLESS = 0.1, 1e-15  # rad, or of the size: how far from the start mor
 FINER = 2  # motions with a tenth of the tolerance of the last, at most, that are tried where it misses more
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")
 def simulate(
     mechanism: Mechanism,
@@ -90,9 +90,9 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        With the names and units of `analyse` over `time`, with works, energies and events beside them; NaN after a
-        motion that ends early. Of a steady cycle that of `analyse`, over as many positions as steps, equally spaced
-        in time.
+        With the names and units of `analyse` over `time`, with works, energies and events beside them; where the
+        motion ends early the last row is its end. Of a steady cycle that of `analyse`, over as many positions as steps,
+        equally spaced in time.
 
     Raises
     ------
@@ -143,9 +143,9 @@ def simulated(
         motion.begin(None)
         integration = integration_of(motion, known, duration, tolerance, progress, rates, evaluations)
         solution = integration.run(row.copy())
-        return Found.of(motion, solution, time, lambda when: Filling(motion, solution, when).books())
+        return Found.of(run, solution, time, lambda when: Filling(motion, solution, when).books())
 
-    return result_of(motion, _balanced(found, tolerance))
+    return result_of(motion, _balanced(found, tolerance), duration)
 
 
 def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
@@ -199,9 +199,9 @@ def _with_play(
         def between(when: Array) -> Books:
             return Filling(motion, solution, when, bare).books()
 
-        return Found.of(motion, solution, time, between, integration.finished())
+        return Found.of(run, solution, time, between, integration.finished())
 
-    return result_of(motion, _balanced(found, max(fine, FINEST)), run)
+    return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
 
 
 def _integrating(motion: FreeMotion, impact_step: float | None) -> Callable[..., ContactMotion]:
@@ -255,9 +255,9 @@ def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: i
     found = []
     if not (np.isfinite(duration) and duration > 0):
         found.append(Finding(f"a duration of {duration:g} s", "duration", "give a time above 0, such as 2 s"))
-    if not isinstance(steps, (int, np.integer)) or not 1 <= steps <= MOST_STEPS:
+    if not 1 <= steps <= MOST_STEPS:
         found.append(Finding(f"cannot give {steps} steps", "steps", f"give a whole number from 1 to {MOST_STEPS:,}"))
-    if not isinstance(evaluations, (int, np.integer)) or evaluations < 1:
+    if evaluations < 1:
         found.append(Finding(f"cannot do {evaluations} evaluations", "evaluations", "give a whole number from 1"))
     if not 1e-13 <= tolerance <= 1e-2:
         found.append(Finding(f"a tolerance of {tolerance:g}", "tolerance", "give a number from 1e-13 to 1e-2"))

@@ -86,10 +86,10 @@ class Solution:
         # the end is reached but for rounding
         time = np.where((time > self.end) & (time <= self.end * (1 + 2 * CLOSE)), self.end, time)
         number = np.searchsorted(ends, time)
-        for k in np.unique(number[number < len(ends)]):
-            lanes = number == k
-            found[:, lanes] = self.stretches[k].state(time[lanes])
-            which[lanes] = k
+        for lanes in np.split(np.arange(len(time)), np.flatnonzero(np.diff(number)) + 1) if len(time) else []:
+            if (k := number[lanes[0]]) < len(ends):
+                found[:, lanes] = self.stretches[k].state(time[lanes])
+                which[lanes] = k
         return found, which
 
 

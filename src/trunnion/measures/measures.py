@@ -6,7 +6,7 @@ more numbers, position by position, that its figure is made of (`figures`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -31,7 +31,7 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL, has_useful_work
 from trunnion.solve.system import System, Values
 
-__all__ = ["Measure", "coordinate_unit", "named", "outputs"]
+__all__ = ["Measure", "chosen", "coordinate_unit", "named", "outputs"]
 
 
 @dataclass(frozen=True)
@@ -220,6 +220,13 @@ def named(mechanism: Mechanism, names: Iterable[str], values: Values) -> list[Me
     if findings:
         raise MechanismError(findings)
     return found
+
+
+def chosen(mechanism: Mechanism, names: Sequence[str] | None, values: Values) -> list[Measure]:
+    """Measures by their names, those of the model if there are no names; MechanismError for an empty list."""
+    if names is not None and not names:
+        raise MechanismError(Finding("no measure is named", "measures", "name one, or leave measures out"))
+    return named(mechanism, mechanism.measures if names is None else names, values)
 
 
 def _meant(name: str, mechanism: Mechanism) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import Measure
+from trunnion.model.checks.angles import in_radians
 from trunnion.model.measure_kinds import place_kind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
@@ -108,6 +109,9 @@ def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
         raise MechanismError(Finding(f"'{at}' is not a position: {error.what}", "at", remedy)) from None
     except KeyError:
         raise MechanismError(Finding(f"'{at}' is no place", "at", remedy)) from None
+    meant = in_radians("at", value)
+    if kind.unit == "rad" and not isinstance(at, str) and meant.severity is Severity.WARNING:
+        raise MechanismError(replace(meant, severity=Severity.ERROR))
     return value, kind.unit == "s"
 
 

@@ -19,6 +19,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MotionLaw
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.assign import assign
 from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
@@ -28,7 +29,7 @@ from trunnion.model.findings import repair, schema_findings
 from trunnion.model.friction_override import with_law
 from trunnion.model.limit_texts import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
-from trunnion.model.names import nearest, strict_keywords
+from trunnion.model.names import nearest
 from trunnion.model.numbers import Numbers
 from trunnion.model.parameters import Location
 from trunnion.model.parts import (
@@ -71,7 +72,7 @@ _JOINT_PARTS: Mapping[str, type[Part]] = {
 }
 
 
-@strict_keywords
+@strict_arguments
 class Mechanism(Numbers):
     """A linkage: dimensions, links, joints, drivers, loads. See the sections' classes in `model.parts`.
 
@@ -116,6 +117,8 @@ class Mechanism(Numbers):
             return super().model_copy(deep=deep)
         names = {name: field.alias or name for name, field in type(self).model_fields.items()}
         return type(self)(**{names[name]: getattr(self, name) for name in self.model_fields_set} | dict(update))
+
+    copy = model_copy  # type: ignore[assignment]  # pydantic's own goes past the checks
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
@@ -480,7 +483,7 @@ def _canonical(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-@strict_keywords
+@strict_arguments
 def read_mechanism(path: str | os.PathLike[str], tables: TableFiles | None = None) -> Mechanism:
     """The mechanism of a YAML, JSON or TOML file.
 

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import json
-import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Any, TypeVar
 
-__all__ = ["FORMULA", "as_key", "check_keywords", "guarded", "nearest", "strict_keywords", "unguarded"]
-
-Public = TypeVar("Public", bound=Callable[..., Any])
+__all__ = ["FORMULA", "as_key", "guarded", "nearest", "unguarded"]
 
 SHOWN = 8
 FORMULA = frozenset("=+-@\t\r\n＝＋－＠")  # with which a cell begins that a spreadsheet executes; some are full width
@@ -26,18 +20,6 @@ MEANT = {
     "diameter": "radius",
 }
 REMARKS = {"radius": ", half the diameter"}
-# options of the command line that are methods of a mechanism in Python
-BY_METHOD = {
-    "friction": "mechanism.with_friction('off')",
-    "seat": "mechanism.with_seats('free')",
-    "set": "mechanism.with_values({NAME: VALUE})",
-    "table": "mechanism.with_table(NAME, FILE)",
-}
-# arguments that are neither a text nor a path, with what they are
-OBJECTS = {
-    "mechanism": "a Mechanism: trunnion.read(FILE) makes one",
-    "friction_method": "a FrictionMethod; mechanism.with_friction('off') leaves friction out",
-}
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off")  # and what it does not
 
 
@@ -60,49 +42,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
         return "none is defined"
     more = ", …" if len(names) > SHOWN else ""
     return "known: " + ", ".join(f"'{one}'" for one in names[:SHOWN]) + more
-
-
-def check_keywords(call: str, keywords: Iterable[str], known: Iterable[str]) -> None:
-    """TypeError that names the nearest argument if a keyword is none; call: what was called, such as `analyse()`."""
-    names = list(known)
-    for word in keywords:
-        if word not in names:
-            method = BY_METHOD.get(word)
-            remedy = f"give it {method} as the mechanism" if method and "mechanism" in names else nearest(word, names)
-            raise TypeError(f"{call} takes no argument '{word}' — {remedy}")
-
-
-def strict_keywords(public: Public) -> Public:
-    """A public function, or a class with its public methods, whose calls `check_keywords` holds to the signature."""
-    if inspect.isclass(public):
-        for name, member in list(vars(public).items()):
-            call_name = f"{public.__name__}.{name}"
-            if inspect.isfunction(member) and (name == "__init__" or not name.startswith("_")):
-                setattr(public, name, _strict(member, call_name))
-            elif isinstance(member, classmethod):
-                setattr(public, name, classmethod(_strict(member.__func__, call_name)))
-        return public
-    return _strict(public, public.__name__)  # type: ignore[return-value]
-
-
-def _strict(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    parameters = inspect.signature(function).parameters
-    if any(one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters.values()):
-        return function  # what it hands on is checked where it arrives
-    known = [key for key, one in parameters.items() if one.kind is not inspect.Parameter.POSITIONAL_ONLY]
-    call_name = f"{name.removesuffix('.__init__')}()"
-    first = next(iter(parameters), "")
-
-    @functools.wraps(function)
-    def call(*args: Any, **keywords: Any) -> Any:
-        if not keywords.keys() <= parameters.keys():
-            check_keywords(call_name, keywords, [key for key in known if key != "self"])
-        for key, value in (*([(first, args[0])] if args else []), *keywords.items()):
-            if key in OBJECTS and (isinstance(value, (str, os.PathLike)) or (value is None and key == first)):
-                raise TypeError(f"{call_name} takes {OBJECTS[key]}")
-        return function(*args, **keywords)
-
-    return call
 
 
 def guarded(text: str) -> str:

@@ -12,7 +12,7 @@ import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from trunnion.model.unit_spellings import READ, plain, remedy_for, strange_sign, words
 
@@ -26,6 +26,7 @@ __all__ = [
     "NUMBER",
     "Dimension",
     "Kind",
+    "TableUnits",
     "UnitError",
     "dimension_text",
     "fits",
@@ -35,6 +36,7 @@ __all__ = [
 ]
 
 Dimension = tuple[Fraction, Fraction, Fraction, Fraction]
+TableUnits = Literal["si", "model"]  # that tables are written in
 
 
 class UnitError(ValueError):

@@ -31,9 +31,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import xarray as xr
+
 from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
-from trunnion.model.names import guarded, strict_keywords
+from trunnion.model.arguments import strict_arguments
+from trunnion.model.names import guarded
+from trunnion.model.units import TableUnits
 from trunnion.results.attributes import KEPT
 from trunnion.results.model_units import in_model_units
 from trunnion.results.tables import KINDS, Column, kind_of, table_of
@@ -43,12 +47,10 @@ from trunnion.results.workbook import write_workbook
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
 
-__all__ = ["FORMATS", "UNITS", "check_format", "check_units", "frame", "save"]
+__all__ = ["FORMATS", "check_format", "frame", "save"]
 
-Columns = Callable[["xr.Dataset", str], list[Column]]  # of a table by name; of the file's own if that is empty
-UNITS = ("si", "model")
+Columns = Callable[[xr.Dataset, str], list[Column]]  # of a table by name; of the file's own if that is empty
 BY_ROW = ("tolerance", "allocation", "comparison", "identification", "measurement")  # no column has one unit there
 ROWS = 20_000  # written at a time, so that memory does not grow with the number of positions
 
@@ -178,21 +180,13 @@ def check_format(path: str | os.PathLike[str], others: tuple[str, ...] = ()) -> 
         raise MechanismError(Finding(f"{suffix} needs {package}", str(path), f"pip install 'trunnion[{extra}]'"))
 
 
-def check_units(units: str) -> None:
-    """MechanismError for units that tables are not written in."""
-    if units not in UNITS:
-        raise MechanismError(
-            Finding(f"tables are not written in '{units}' units", "units", f"use {' or '.join(UNITS)}")
-        )
-
-
-@strict_keywords
+@strict_arguments
 def save(
     result: xr.Dataset,
     path: str | os.PathLike[str],
     units_row: bool = False,
     columns: Sequence[str] | None = None,
-    units: str = "si",
+    units: TableUnits = "si",
 ) -> None:
     """Write a result by the file's extension, whole or not at all.
 
@@ -204,7 +198,6 @@ def save(
     units, a missing package, or a place that cannot be written.
     """
     check_format(path)
-    check_units(units)
     if units == "model" and kind_of(result) in BY_ROW:
         what = f"tables of a result of kind {kind_of(result)} name the unit in each row"
         raise MechanismError(Finding(what, "units", "write them in SI, without units='model'"))

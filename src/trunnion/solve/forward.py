@@ -398,11 +398,20 @@ class SpatialWalk(Forward):
     # ---- joints -----------------------------------------------------------------------------------------------
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
-        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does."""
+        """Turn of a joint from its elements, of a cross that of its first pin, or slide if that is all it does.
+
+        The slide of a screw tells its whole turns.
+        """
         if self.pair(joint).crossed:  # its second pin lies at (sin θ₁, −cos θ₁, 0)
             sine, cosine = dot(second.z, first.x), -dot(second.z, first.y)
             return namespace(sine, cosine).arctan2(sine, cosine)
-        return _dual_angle(first, second)[0 if self.system.turns(joint) else 1]
+        turn, slide = _dual_angle(first, second)
+        if not self.system.turns(joint):
+            return slide
+        if not self.pair(joint).threaded:
+            return turn
+        away = primal(slide) / primal(self.system.lead(self.values, joint)) - primal(turn)
+        return turn + 2 * np.pi * np.round(away / (2 * np.pi))
 
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis: θ and s of its dual angle."""

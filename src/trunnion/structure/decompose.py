@@ -160,7 +160,7 @@ def _undriven(mobility: int, drivers: int, spins: int) -> Finding:
     """The finding of drivers that are not as many as the freedoms that have an effect."""
     has = "is no driver" if drivers == 0 else "is one driver" if drivers == 1 else f"are {drivers} drivers"
     remedy = (
-        "drive a joint for each freedom left, as A: {speed: 10 rad/s}, or add a link or joint that removes it"
+        "drive a joint for each freedom left, or add a link or joint that removes it"
         if mobility > drivers
         else "remove a driver, or a joint or link that constrains twice"
     )

@@ -20,8 +20,8 @@ from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.transmission import pressure_angles
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.results.figure import Figure
 from trunnion.results.scales import EVERYWHERE, Scales
 from trunnion.solve.forward import Forward, forward
@@ -110,7 +110,7 @@ class Design:
         return self.energy_swing / (fluctuation * self.mean_speed**2) if self.mean_speed else float("nan")
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def design(mechanism: Mechanism) -> Design:
     """What a designer asks of a planar linkage: transmission, dead centres, range, shaking, balance, motor.

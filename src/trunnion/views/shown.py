@@ -7,14 +7,15 @@ from importlib import import_module
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
+import xarray as xr
+
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.arguments import check_keywords, strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import check_keywords
 from trunnion.results.attributes import whole
 from trunnion.results.tables import kind_of
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
     from trunnion.views.cycle.animation import Animation
@@ -35,6 +36,7 @@ FIGURES = {
 }  # fmt: skip
 
 
+@strict_arguments
 def plot(of: Mechanism | xr.Dataset, kind: str | None = None, **options: Any) -> Figure:
     """A matplotlib Figure of a mechanism at its start, or of a result.
 
@@ -49,6 +51,7 @@ def plot(of: Mechanism | xr.Dataset, kind: str | None = None, **options: Any) ->
     return of.plot()
 
 
+@strict_arguments
 def report(result: xr.Dataset, ideal: xr.Dataset | None = None, **options: Any) -> str:
     """The report of a result as one HTML page that needs no network.
 

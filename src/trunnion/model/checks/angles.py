@@ -16,7 +16,7 @@ from trunnion.model.units import KINDS, Dimension
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["Bare", "plain_dimensions", "radians", "unitless_angles"]
+__all__ = ["Bare", "in_radians", "plain_dimensions", "radians", "unitless_angles"]
 
 Bare = tuple[str, float, bool]  # where a number without a unit stands, its value, whether in an expression
 
@@ -51,7 +51,6 @@ def unitless_angles(
 def radians(mechanism: Numbers, found: Iterable[Bare]) -> Iterator[Finding]:
     """What these numbers mean, of the rows of a table the largest.
 
-    A whole number, or many turns, is a warning: it is likely meant in degrees; but a driver may well go through turns.
     In a model without any unit all is in SI, and only many turns are told.
     """
     with_units = any(
@@ -65,12 +64,19 @@ def radians(mechanism: Numbers, found: Iterable[Bare]) -> Iterator[Finding]:
         if one[1] and math.isfinite(one[1]) and (group not in largest or abs(one[1]) > abs(largest[group][1])):
             largest[group] = one
     for where, value, in_expression in largest.values():
-        turned, whole = abs(value) > 2 * math.pi, value.is_integer()
-        doubtful = whole or (turned and not where.startswith("drivers."))
-        if not (with_units or (doubtful and turned)):
-            continue
-        size = f"{value / (2 * math.pi):.3g} turns" if turned else f"{math.degrees(value):.3g}°"
-        verb = f"takes {value:g} for" if in_expression else "is"
-        what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
-        remedy = f"write {value:g} deg if it is in degrees, else {value:g} rad"
-        yield Finding(what, where, remedy, Severity.WARNING if doubtful else Severity.NOTE)
+        finding = in_radians(where, value, f"takes {value:g} for" if in_expression else "is")
+        if with_units or (finding.severity is Severity.WARNING and abs(value) > 2 * math.pi):
+            yield finding
+
+
+def in_radians(where: str, value: float, verb: str = "is") -> Finding:
+    """What a plain number of an angle means.
+
+    A whole number, or many turns, is a warning: it is likely meant in degrees; but a driver may well go through turns.
+    """
+    turned, whole = abs(value) > 2 * math.pi, value.is_integer() and value != 0
+    doubtful = whole or (turned and not where.startswith("drivers."))
+    size = f"{value / (2 * math.pi):.3g} turns" if turned else f"{math.degrees(value):.3g}°"
+    what = f"{verb} {value:g} rad, which is {size}: a plain number is in radians"
+    remedy = f"write {value:g} deg if it is in degrees, else {value:g} rad"
+    return Finding(what, where, remedy, Severity.WARNING if doubtful else Severity.NOTE)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import nearest, strict_keywords
+from trunnion.model.names import nearest
 from trunnion.rig.comparison.assessment import Verdict, difference, judge
 from trunnion.rig.comparison.causes import causes
 from trunnion.rig.comparison.comparison import ChannelComparison, Compared, Efficient
@@ -35,7 +36,7 @@ __all__ = ["compare"]
 Array = NDArray[np.float64]
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def compare(
     mechanism: Mechanism,

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.measures import Measure, named
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.rig.identification.blocks import EFFICIENCY, Block, blocks_of, channels_of, finite
 from trunnion.rig.identification.fit import FitProblem, fit, sensors_of
 from trunnion.rig.identification.holdout import HoldOut, held_out
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 Errors = Literal["channel", "condition"]
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def identify(
     mechanism: Mechanism,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
-from trunnion.model.names import strict_keywords
+from trunnion.model.arguments import strict_arguments
 from trunnion.rig.reading import faults
 from trunnion.rig.reading.angle import Coordinate, coordinate
 from trunnion.rig.reading.channels import (
@@ -52,7 +52,7 @@ PERIODS = 5.0  # of the cut-off of a filter, over which a reading reaches
 UNUSED = 0.5  # of the turns recorded, below which it is told how few are used
 
 
-@strict_keywords
+@strict_arguments
 def read_measured(
     mapping: str | os.PathLike[str] | Mapping[str, Any], files: Iterable[str | os.PathLike[str]] | None = None
 ) -> Measurement:

@@ -174,5 +174,5 @@ MOST_SEEDS = 1 << 128
 
 def check_seed(seed: int) -> None:
     """MechanismError for what seeds no random numbers."""
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < MOST_SEEDS:
+    if not 0 <= seed < MOST_SEEDS:
         raise MechanismError(Finding(f"the seed {seed} is no whole number from 0", "seed", "give one such as 1"))

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Severity
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.rig.reading.rig_file import Rig
 from trunnion.rig.virtual.cases import Case, case_names, case_of, channels_of, findings_of, measures_of, placed_at
 from trunnion.rig.virtual.files import mapping_of, truth_of, write
@@ -32,7 +32,7 @@ __all__ = ["observe"]
 Array = NDArray[np.float64]
 
 
-@strict_keywords
+@strict_arguments
 class Observation(Recorded):
     """What a virtual rig has recorded, with its files: data, mapping and truth."""
 
@@ -54,7 +54,7 @@ class Observation(Recorded):
         return write(self, folder, form or self.rig.format, progress)
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def observe(
     mechanism: Mechanism,

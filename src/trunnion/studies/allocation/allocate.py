@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.model.prices import Price
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import (
-    CRITERIA,
     AllocationProblem,
     Answer,
     Contribution,
@@ -33,10 +32,10 @@ from trunnion.studies.allocation.problem import (
     none,
 )
 from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
-from trunnion.studies.allocation.solve import CHOICES, solve, trade_off
 from trunnion.studies.allocation.solve import Choice as Way
+from trunnion.studies.allocation.solve import solve, trade_off
 from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, tolerance
+from trunnion.studies.tolerance.study import DEFAULT_SAMPLES, Method, tolerance
 from trunnion.studies.tolerance.targets import limits
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ MOST_FACTORS = 201
 RANGE = (0.5, 2.0)  # of the stated limits: the curve of cost over accuracy
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def allocate(
     mechanism: Mechanism,
@@ -78,7 +77,7 @@ def allocate(
     """The tolerances and plays of least cost with which measures keep their limits, and what they do then.
 
     What is to be chosen are the tolerances and plays with a cost (`Mechanism.prices`); all others stay as they are.
-    measures: those with limits that are to be kept; all of the model if not given. criterion: an entry of `CRITERIA`:
+    measures: those with limits that are to be kept; all of the model if not given. criterion: one of `Criterion`:
     worst-case, rss, or yield, of which target is the share of mechanisms within all limits, 0.9973 if not given; with
     another criterion it is an error. choice: continuous, discrete, or auto: discrete where any cost is a list of
     processes or options. steps: positions of a whole cycle; at: the place of measures that state none. samples, seed:
@@ -91,11 +90,11 @@ def allocate(
     Raises MechanismError if nothing has a cost, no measure a limit, or as `tolerance` does. That no tolerances keep the
     limits is a finding of the result.
     """
-    if target is not None and criterion in CRITERIA and criterion != "yield":
+    if target is not None and criterion != "yield":
         what = f"the criterion {criterion} does not use a yield of {target:g}"
         raise MechanismError(Finding(what, "yield", "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
-    _check(criterion, choice, share, samples, curve)
+    _check(share, samples, curve)
     asked = AllocationRequest(
         mechanism, _limited(mechanism, measures), criterion, share, choice, steps, at, samples, seed, friction_method,
         jobs, curve, exact,
@@ -104,7 +103,7 @@ def allocate(
     found = replace(found, findings=(*found.findings, *_dearer(found)))
     with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
     names = [of.measure.name for of in found.study.linear.measures]
-    methods = ["linear", "worst-case"] if found.answer.found else ["linear"]
+    methods: list[Method] = ["linear", "worst-case"] if found.answer.found else ["linear"]
     if samples and found.answer.found:
         methods.append("monte-carlo")
     known = tolerance(
@@ -122,14 +121,8 @@ def half_widths(result: xr.Dataset) -> dict[str, float]:
     return {name: t for name, there, t, was in zip(*columns, strict=True) if there and abs(t - was) > 1e-12 * t}
 
 
-def _check(criterion: str, choice: str, target: float, samples: int, curve: int) -> None:
+def _check(target: float, samples: int, curve: int) -> None:
     findings = []
-    if criterion not in CRITERIA:
-        remedy = f"use {', '.join(CRITERIA)}"
-        findings.append(Finding(f"there is no criterion '{criterion}'", "criterion", remedy))
-    if choice not in ("auto", *CHOICES):
-        remedy = f"use {', '.join(('auto', *CHOICES))}"
-        findings.append(Finding(f"there is no choice '{choice}'", "choice", remedy))
     if not 0 < target < 1:
         what = f"a yield of {target:g} is not possible"
         findings.append(Finding(what, "yield", "give a share above 0 and below 1, such as 0.9973"))

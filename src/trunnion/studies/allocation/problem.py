@@ -27,7 +27,6 @@ from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import Cost
 
 __all__ = [
-    "CRITERIA",
     "AllocationProblem",
     "Answer",
     "Contribution",
@@ -40,11 +39,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
-CRITERIA: dict[Criterion, str] = {
-    "worst-case": "every combination within the tolerances keeps every limit, linearly",
-    "rss": "the root of the sum of squares keeps every limit",
-    "yield": "the stated share of mechanisms keeps every limit",
-}
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
 PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum

@@ -18,9 +18,9 @@ from trunnion.algebra.nested import flat
 from trunnion.cycle.positions import check_steps
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
@@ -44,7 +44,7 @@ MOST_TOPS = 4
 BETWEEN, NARROWED = 9, 5  # points in the interval around a maximum, and how often it is narrowed to a quarter
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def assemble(
     mechanism: Mechanism,

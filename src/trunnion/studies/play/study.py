@@ -35,12 +35,12 @@ from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
-from trunnion.measures.measures import Measure, named, outputs
+from trunnion.measures.measures import Measure, chosen, outputs
 from trunnion.measures.motion import MOTIONS
 from trunnion.measures.positions import place_of, plan, within
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.contact import clearance
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.backward import under
@@ -137,7 +137,7 @@ def variance(loads: Sequence[Vector], radii: Sequence[Number]) -> Number:
 # ---- over the cycle -------------------------------------------------------------------------------------------
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def play(
     mechanism: Mechanism,
@@ -180,8 +180,7 @@ def play(
 
 def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
     """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
-    mechanism = run.system.mechanism
-    found = named(mechanism, mechanism.measures if names is None else names, run.values)
+    found = chosen(run.system.mechanism, names, run.values)
     others = [one.name for one in found if not _covered(run, one)]
     what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
     remedy = "use `trunnion tolerance` for other measures"

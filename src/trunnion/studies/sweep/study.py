@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.cycle.cycle_kernel import Engine
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.measured import slow_motions, unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
+from trunnion.model.arguments import strict_arguments
 from trunnion.model.checks.magnitudes import bare_number
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.names import strict_keywords
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described
 from trunnion.results.scales import Scales
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "MOST_POINTS", "Swept", "sweep"]
 
 
-@strict_keywords
+@strict_arguments
 @np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
 def sweep(
     mechanism: Mechanism,
@@ -51,7 +52,7 @@ def sweep(
     progress: Callable[[int], None] | None = None,
     margin: bool = False,
     measures: Sequence[str] | None = None,
-    engine: str = "auto",
+    engine: Engine = "auto",
 ) -> xr.Dataset:
     """Figures of the cycle over a grid of some numbers of the mechanism.
 

@@ -14,7 +14,7 @@ from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
-from trunnion.measures.measures import Measure, named, outputs
+from trunnion.measures.measures import Measure, chosen, outputs
 from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -119,11 +119,9 @@ def study(
     check_steps(steps)
     run = prepare(mechanism)
     inputs = inputs_of(run)
-    names = list(mechanism.measures) if measures is None else list(measures)
     notes: list[Finding] = []
-    if names:
-        found = named(mechanism, names, run.values)
-    else:
+    found = chosen(mechanism, measures, run.values)
+    if not found:
         found = outputs(run.system)
         note = finding_for("measure.none_stated", "measures", measures=[one.name for one in found])
         if not found:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual
 from trunnion.algebra.namespace import Number
+from trunnion.cycle.cycle_kernel import Engine
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import Curves, Kernel, NumpyKernel, where_known
@@ -75,7 +76,7 @@ class CompiledCourses:
         return found, status
 
 
-def engine_for(engine: str, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> str:
+def engine_for(engine: Engine, numpy: NumpyKernel, values: Mapping[str, Number], configurations: int) -> Engine:
     """The engine by its name; of auto the compiled one where it pays and can take the mechanism."""
     if engine != "auto":
         return engine
@@ -94,7 +95,7 @@ def batch_of(engine: str, positions: int) -> int:
 
 
 def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: FrictionMethod) -> Kernel:
-    """The kernel of an engine by its name. Raises MechanismError if there is none, or its package is missing."""
+    """The kernel of an engine by its name. Raises MechanismError if it cannot."""
     numpy = MotionKernel(run, measures, friction)
     if engine == "numpy":
         return numpy
@@ -102,9 +103,7 @@ def kernel_of(engine: str, run: Run, measures: Sequence[Measure], friction: Fric
     if timed is not None:
         what = f"the measure '{timed}' is of a motion in time"
         raise MechanismError(Finding(what, "engine", "use numpy, which has motions in time, or auto"))
-    if engine in AT_ONCE:
-        return CompiledCourses(numpy)
-    raise MechanismError(Finding(f"there is no engine '{engine}'", "engine", f"use {' or '.join(AT_ONCE)}"))
+    return CompiledCourses(numpy)
 
 
 def many_of(run: Run, measures: Sequence[Measure], inputs: Inputs, friction: FrictionMethod, engine: str) -> Many:

@@ -56,7 +56,7 @@ class Happening(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """A motion as it is shown: its rows up to where it ends, as positions; that end and the time asked for, s."""
+    """A motion as it is shown: its rows as positions; their end and the time asked for, s."""
 
     rows: xr.Dataset
     end: float
@@ -70,14 +70,9 @@ class Shown(NamedTuple):
 
 
 def shown(result: xr.Dataset) -> Shown:
-    """The motion without the rows after its end, which have no values; of one that does not begin its first row."""
-    time = result["time"].values
-    known = np.flatnonzero(np.isfinite(result["kinetic_energy"].values))
-    last = int(known[-1]) if known.size else 0
-    rows = as_positions(_resting(without_noise(result.isel(time=slice(0, last + 1)))))
-    ends = [row["figures"]["time"] for row in attribute(result, "findings") if row.get("code") in ENDS]
-    end = float(min([time[-1], *ends])) if known.size else 0.0
-    return Shown(rows, end, float(time[-1]), happenings(result))
+    """The motion as its views take it."""
+    rows = as_positions(_resting(without_noise(result)))
+    return Shown(rows, float(result["time"][-1]), float(result.attrs["duration"]), happenings(result))
 
 
 def energies(rows: xr.Dataset) -> list[tuple[str, str, Array]]:

@@ -1,0 +1,156 @@
+"""Arguments of public calls, held to their annotations: a wrong one is refused by name before anything is done."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from numbers import Integral, Real
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.model.names import nearest
+
+__all__ = ["check_keywords", "held", "strict_arguments"]
+
+Public = TypeVar("Public", bound=Callable[..., Any])
+
+# options of the command line that are methods of a mechanism in Python
+BY_METHOD = {
+    "friction": "mechanism.with_friction('off')",
+    "seat": "mechanism.with_seats('free')",
+    "set": "mechanism.with_values({NAME: VALUE})",
+    "table": "mechanism.with_table(NAME, FILE)",
+}
+REMEDIES = {
+    "Mechanism": ": trunnion.read(FILE) makes one",
+    "FrictionMethod": "; mechanism.with_friction('off') leaves friction out",
+}
+WORDS = {
+    int: "whole number",
+    float: "number",
+    str: "text",
+    os.PathLike: "path",
+    Mapping: "mapping",
+    Callable: "function",
+}
+NOUNS = {"methods": "method", "name": "method"}  # of studies, and of friction
+LISTS = (Sequence, Iterable)
+LONGEST = 60  # letters of a value that a message repeats
+
+
+def check_keywords(call: str, keywords: Iterable[str], known: Iterable[str]) -> None:
+    """TypeError that names the nearest argument if a keyword is none; call: what was called, such as `analyse`."""
+    names = list(known)
+    for word in keywords:
+        if word not in names:
+            method = BY_METHOD.get(word)
+            remedy = f"give it {method} as the mechanism" if method and "mechanism" in names else nearest(word, names)
+            raise TypeError(f"{call} takes no argument '{word}' — {remedy}")
+
+
+def strict_arguments(public: Public) -> Public:
+    """A public function, or a class with its public methods, whose calls are held to the signature.
+
+    An unknown keyword and a value of another type are a TypeError, a word that is no choice a MechanismError; one text
+    where a list is taken is a list of one.
+    """
+    if inspect.isclass(public):
+        for name, member in list(vars(public).items()):
+            call = f"{public.__name__}.{name}".removesuffix(".__init__")
+            if inspect.isfunction(member) and (name == "__init__" or not name.startswith("_")):
+                setattr(public, name, _strict(member, call))
+            elif isinstance(member, classmethod):
+                setattr(public, name, classmethod(_strict(member.__func__, call)))
+        return public
+    return _strict(public, public.__name__)  # type: ignore[return-value]
+
+
+def _strict(function: Callable[..., Any], call: str) -> Callable[..., Any]:
+    parameters = inspect.signature(function).parameters
+    names = list(parameters)
+    closed = not any(one.kind is one.VAR_KEYWORD for one in parameters.values())
+
+    @functools.cache
+    def hints() -> dict[str, Any]:
+        """What the annotations mean where the function stands; nothing said is anything."""
+        place = inspect.unwrap(function).__globals__
+        said = {name: one.annotation for name, one in parameters.items() if one.annotation is not one.empty}
+        return {name: eval(text, place) if isinstance(text, str) else text for name, text in said.items()}
+
+    @functools.wraps(function)
+    def strict(*args: Any, **keywords: Any) -> Any:
+        if closed:
+            check_keywords(f"{call}()", keywords, [name for name in names if name not in ("self", "cls")])
+        given = [held(call, name, value, hints().get(name, Any)) for name, value in zip(names, args, strict=False)]
+        named = {name: held(call, name, value, hints().get(name, Any)) for name, value in keywords.items()}
+        return function(*given, *args[len(names) :], **named)
+
+    return strict
+
+
+def held(call: str, name: str, value: Any, hint: Any) -> Any:
+    """The value of an argument as its annotation has it; TypeError or MechanismError if it cannot be."""
+    if _fits(value, hint):
+        return value
+    kinds, values = _kinds(hint), [value]
+    member = next((get_args(kind)[0] for kind in kinds if get_origin(kind) in LISTS), None)
+    if member is not None:
+        values = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else [value]
+        if all(_fits(one, member) for one in values):
+            return values
+    choices = [word for kind in (*kinds, member) if get_origin(kind) is Literal for word in get_args(kind)]
+    if choices and all(isinstance(text, str) for text in values):
+        noun, remedy = NOUNS.get(name, name), f"use {_either(choices)}"
+        wrong = [text for text in values if text not in choices]
+        raise MechanismError([Finding(f"there is no {noun} '{text}'", noun, remedy) for text in wrong])
+    words = _either(_worded(kind) for kind in kinds if kind is not NoneType)
+    remedy = next((REMEDIES[kind.__name__] for kind in kinds if getattr(kind, "__name__", "") in REMEDIES), "")
+    raise TypeError(f"{call}({name}={_short(value)}) takes {words}{remedy}")
+
+
+def _kinds(hint: Any) -> tuple[Any, ...]:
+    """The kinds of which an annotation allows any."""
+    return get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value is what an annotation says: numbers of any width, no truth value among them."""
+    origin = get_origin(hint)
+    if origin in (Union, UnionType):
+        return any(_fits(value, kind) for kind in get_args(hint))
+    if origin is Literal:
+        return isinstance(value, str) and value in get_args(hint)
+    if origin in LISTS:
+        listed = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        return listed and all(_fits(one, get_args(hint)[0]) for one in value)
+    if hint in (int, float):
+        return isinstance(value, Integral if hint is int else Real) and not isinstance(value, bool)
+    return hint is Any or isinstance(value, (bool, np.bool_) if hint is bool else origin or hint)
+
+
+def _worded(kind: Any) -> str:
+    """A kind in words: a whole number, a list of texts, a Mechanism."""
+    if kind is bool:
+        return "True or False"
+    if get_origin(kind) is Literal:
+        return _either(map(repr, get_args(kind)))
+    if get_origin(kind) in LISTS:
+        return f"a list of {_either(_worded(one).removeprefix('a ') + 's' for one in _kinds(get_args(kind)[0]))}"
+    kind = get_origin(kind) or kind
+    return f"a {WORDS.get(kind, kind.__name__)}"
+
+
+def _either(words: Iterable[str]) -> str:
+    *others, last = words
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _short(value: Any) -> str:
+    """A value as a message repeats it; of what is long its type."""
+    text = repr(value)
+    return text if len(text) <= LONGEST and "\n" not in text else f"{type(value).__name__}(…)"

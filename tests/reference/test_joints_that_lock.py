@@ -118,6 +118,7 @@ def test_a_slider_alone_jams_where_its_push_turns_round() -> None:
     assert findings(data)["simulate.several_accelerations"]["time"] == 0.0  # also T/(m (1 − κ)) obeys
 
 
+@pytest.mark.slow  # the first steps are as small as they can be
 def test_a_slider_that_jams_at_the_start_stops_at_once() -> None:
     data = simulate(slider("-1 N"), 1.0, 4)
     assert [one[:3] for one in events(data)] == [("lock", "A", 0.0), ("break-away", "A", 0.0)]

@@ -119,7 +119,7 @@ def _engine(found: ToleranceStudy, engine: Engine, samples: int, cluster: str | 
 
 
 def _check(methods: Sequence[str], samples: int, seed: int, target: float | None) -> None:
-    findings = [] if methods else [Finding("no method is asked for", "method", "name one, or leave it out for three")]
+    findings = [] if methods else [Finding("no method is chosen", "method", "name one, or leave it out for three")]
     if sum(method in SAMPLINGS for method in methods) > 1:
         findings.append(Finding("two sampling methods at once", "method", f"use one of {' and '.join(SAMPLINGS)}"))
     drawn = any(method in (*SAMPLINGS, "sobol") for method in methods)

@@ -37,7 +37,7 @@ def _table(result: xr.Dataset, name: str, unit: str, kind: str, where: str) -> T
     effects, deviations = (result[f"extreme_{key}"].values for key in ("worst_case", "deviation"))
     total, rows = float(np.sum(effects)), list[list[str]]()
     if not np.isfinite(total):
-        return TextTable(f"{name}: no answer at {where}", HEAD, [])
+        return TextTable(f"{name}: not solved at {where}", HEAD, [])
     for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
         share = f"{100 * effect / total:.1f} %" if total > 0 else "—"
         rows.append([str(joint), _play(result, j), quantity(float(effect), unit), share])

@@ -137,7 +137,7 @@ WRONG: dict[str, tuple[Callable[[trunnion.Mechanism], Any], type[Exception], str
     "a method that there is not": (
         lambda m: trunnion.tolerance(m, methods="linnear"), trunnion.MechanismError, "no method 'linnear' — use",
     ),
-    "no method": (lambda m: trunnion.tolerance(m, methods=[]), trunnion.MechanismError, "no method is asked for"),
+    "no method": (lambda m: trunnion.tolerance(m, methods=[]), trunnion.MechanismError, "no method is chosen"),
     "no measure": (lambda m: trunnion.tolerance(m, []), trunnion.MechanismError, "no measure is named"),
     "degrees without a unit": (
         lambda m: trunnion.tolerance(m, at=60), trunnion.MechanismError, "at: is 60 rad, .* write 60 deg if",

@@ -66,7 +66,7 @@ def model(path: Path, rng: Random) -> Iterator[None]:
 def _design(mechanism: Any) -> None:
     from trunnion.studies.design import report_figures
 
-    report_figures(mechanism, 8, 0.05)
+    report_figures(mechanism, 0.05)
 
 
 def _locking(mechanism: Any) -> None:

@@ -75,7 +75,7 @@ def _panel(
         axes.axhline(limit * factor, color=PALETTE[1], linewidth=1.2, linestyle=(0, (1, 1.5)), label="limit")
     if np.isfinite(there := float(np.sum(result["extreme_worst_case"].values))):
         # of an extreme the curve has the pins where they are, the figure also this place, which they may move
-        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label=plain(place), clip_on=False)
+        axes.plot([_place(result, over)], [there * factor], "o", color=INK, label=plain(place), clip_on=there > shown)
     axes.set_ylim(bottom=0.0)
     frame_peak(axes, most, shown, factor, unit)
     legend(axes)

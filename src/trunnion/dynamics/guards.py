@@ -112,8 +112,8 @@ class Guards:
         near = (ahead <= NEARLY * looks[:, 1:-1]) & np.isfinite(looks[:, 2:])
         for row, module in self._meeting:
 
-            def margin(moment: float, row: int = row) -> float:
-                return float(margins(np.array([moment]))[row, 0])
+            def margin(moments: Array, row: int = row) -> Array:
+                return np.asarray(margins(moments)[row])
 
             met = touched(margin, times, np.flatnonzero(near[row]) + 1)
             if self.motion.passes(module):
@@ -123,8 +123,8 @@ class Guards:
                         self.last = time
                 continue
             left, slope = float(looks[row, -1]), float(looks[row, -1] - looks[row, -2]) / spans[-1]
-            if left < FORESEEN and slope < 0.0 and np.isfinite(margin(stretch.end - 2.0 * left / slope)):
-                met += touched(margin, stretch.end - left / slope * np.arange(3.0), [1])
+            if left < FORESEEN and slope < 0.0 and np.isfinite(margin(np.array([stretch.end - 2.0 * left / slope]))[0]):
+                met += touched(margin, stretch.end - left / slope * np.arange(3.0), np.array([1]))
             for time in met:
                 place = float(onward.state(np.array([time]))[0, 0])
                 yield Ended("simulate.change_point", time, self.motion.change_point(module, place))

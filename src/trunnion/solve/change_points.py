@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Meeting = tuple[float, float]  # first and last time, s
 ROW = 3  # positions of the grid at which two assemblies meet: no single place
 TOUCHING = 1e-6  # of 1/condition: below it two assemblies meet
+SECTIONS, GOLDEN = 60, (np.sqrt(5) - 1) / 2
 
 
 def finding(system: System, values: Values, module: Module, at: Sequence[Meeting]) -> Finding:
@@ -54,11 +55,12 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
     group = walk.system.groups[number]
     margin = np.broadcast_to(1 / primal(group.condition(pose)), times.shape)
 
-    def margin_at(moment: float) -> float:
+    def margin_at(moments: Array) -> Array:
         trial = start(walk.system, walk.values)
         for earlier in range(number):
-            trial.stand(earlier, pose_of(trial, earlier, walk.assembly[earlier], moment))
-        return float(np.ravel(1 / primal(group.condition(pose_of(trial, number, assembly, moment))))[0])
+            trial.stand(earlier, pose_of(trial, earlier, walk.assembly[earlier], moments))
+        condition = primal(group.condition(pose_of(trial, number, assembly, moments)))
+        return np.broadcast_to(1 / condition, moments.shape)
 
     ranges = _in_a_row(margin < TOUCHING)
     near = suspects(margin)
@@ -68,27 +70,19 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
     return sorted([*((one, one) for one in moments), *((float(times[a]), float(times[b])) for a, b in ranges)])
 
 
-def touched(margin: Callable[[float], float], times: Array, places: Iterable[int]) -> list[float]:
+def touched(margin: Callable[[Array], Array], times: Array, places: NDArray[np.intp]) -> list[float]:
     """Times, s, at which 1/condition touches zero, by golden section between the neighbours of some places of a grid:
     where the slope of the neighbours would reach zero (`suspects`)."""
-
-    def margin_at(moment: float) -> float:
-        return float(np.nan_to_num(margin(moment), nan=1.0))
-
-    moments = [_lowest(margin_at, float(times[k - 1]), float(times[k + 1])) for k in places]
-    return [moment for moment in moments if margin_at(moment) < TOUCHING]
+    low, high = times[places - 1], times[places + 1]
+    for _ in range(SECTIONS if len(places) else 0):
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        before, after = np.split(np.nan_to_num(margin(np.concatenate([left, right])), nan=1.0), 2)
+        low, high = np.where(before < after, low, left), np.where(before < after, right, high)
+    moments = (low + high) / 2
+    return moments[margin(moments) < TOUCHING].tolist() if len(places) else []
 
 
 def _in_a_row(touches: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last of some positions in a row, where they are more than pass one meeting point."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(int)))
     return [(int(low), int(high) - 1) for low, high in zip(edges[::2], edges[1::2], strict=True) if high - low >= ROW]
-
-
-def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function with one minimum in an interval has it, by golden section."""
-    ratio = (np.sqrt(5) - 1) / 2
-    for _ in range(60):
-        left, right = high - ratio * (high - low), low + ratio * (high - low)
-        low, high = (low, right) if function(left) < function(right) else (left, high)
-    return float((low + high) / 2)

@@ -26,6 +26,8 @@ NEWTON_LIMIT = 12
 CLOSED = 1e-12  # of the largest unknown: residual of a solution, and about the error of a fold
 TINY = 1e-300  # where all unknowns are 0
 NEAR_AIM = 0.25  # of Newton's first step by which the corrected point may miss its aim
+ALMOST = 0.98  # of what is left to the share at which a lane seems to lock
+STRAIGHT = 1e-3  # of Newton's first step by which the corrected point misses its aim on a straight branch
 TINY_MOVE = 0.02  # of the largest unknown
 MOST_TRIALS = 200  # steps of a lane; 130 is much
 
@@ -35,9 +37,11 @@ def follow(
 ) -> tuple[list[Number], Number]:
     """The solution and the share of each lane: `most`, or the share at which its solution ceases to exist.
 
-    Steps double until one fails; from then on the share is sought by halving, and every other time all that is left is
-    tried, since it may have been a kink that smaller moves pass. A lane moves by its own numbers alone, whatever other
-    lanes are followed with it, and whether it is compiled.
+    Steps double until one fails, to any length where the branch is straight. Then the share at which det J reaches 0 is
+    guessed from its last fall: after a step that succeeds as for a solution that runs to infinity, or all that is left
+    where det J does not fall, since it may have been a kink that smaller moves pass; after one that fails as for a
+    fold, which is nearer, or half of what is left. A lane moves by its own numbers alone, whatever other lanes are
+    followed with it, and whether it is compiled.
 
     Parameters
     ----------
@@ -54,43 +58,36 @@ def follow(
     count = len(start)
 
     def trial(now: list[Number]) -> list[Number]:
-        x, (here, step, bad, eager, going) = now[:count], now[count:]
-        going, aim = going > 0, np.minimum(here + step, most)
-        moved, good = _correct(system, x, aim, going)
-        x = [np.where(going & good, new, old) for new, old in zip(moved, x, strict=True)]
-        reached = np.where(good, aim, here)
-        step_, bad_, eager_, last = _next(reached, aim, good, step, bad, eager > 0)
-        still = going & (reached < most) & ~last
-        old, new = (here, step, bad, eager), (reached, step_, bad_, np.where(eager_, 1.0, 0.0))
-        return [*x, *(np.where(going, b, a) for a, b in zip(old, new, strict=True)), np.where(still, 1.0, 0.0)]
+        x, (here, step, bad, determinant, pole, fold, going) = now[:count], now[count:]
+        aim = np.minimum(here + step, most)
+        moved, fresh, good, straight = _correct(system, x, aim, going > 0)
+        x = [np.where(good, new, old) for new, old in zip(moved, x, strict=True)]
+        last = ~good & (step <= 2 * LAST_STEP)
+        bad = np.where(good, np.where(aim >= bad, np.inf, bad), np.minimum(bad, aim))
+        ratio = np.minimum(fresh / determinant, 1.0)
+        pole = np.where(good, step * ratio / (1 - ratio), pole)
+        fold = np.where(good, pole * ratio / (1 + ratio), fold)
+        here, determinant = np.where(good, aim, here), np.where(good, fresh, determinant)
+        left = bad - here
+        growing = np.minimum(2 * step, np.where(straight, np.inf, LONGEST_STEP * np.maximum(1.0, here)))
+        # det J falls straight before solutions run to infinity, and is a square root of what is left before a fold
+        closing = np.where(good, np.minimum(ALMOST * pole, left), np.minimum(ALMOST * fold, left / 2))
+        step = np.where(np.isfinite(bad), np.maximum(closing, np.minimum(left, 2 * LAST_STEP)), growing)
+        return [*x, here, step, bad, determinant, pole, fold, np.where((going > 0) & (here < most) & ~last, 1.0, 0.0)]
 
     lanes = np.where(wanted, 1.0, 0.0)
-    first = [*start, np.where(wanted, 0.0, most), FIRST_STEP + 0.0 * lanes, np.inf + 0.0 * lanes, 0.0 * lanes, lanes]
+    begin, none = np.where(wanted, 0.0, most), 0.0 * lanes
+    first = [*start, begin, FIRST_STEP + none, np.inf + none, 1.0 + none, np.inf + none, np.inf + none, lanes]
     with np.errstate(all="ignore"):
-        *x, here, _, _, _, going = looped(trial, first, MOST_TRIALS, _ended)
+        *x, here, _, _, _, _, _, going = looped(trial, first, MOST_TRIALS, _ended)
     share = np.where(going > 0, np.nan, here)
     return [np.where(share >= most, value, np.nan) for value in x], share
 
 
-def _next(
-    here: Number, trial: Number, good: Number, step: Number, bad: Number, eager: Number
-) -> tuple[Number, Number, Number, Number]:
-    """Step, least share that failed, whether all that is left is tried next, and whether nothing is left to be tried.
-
-    here: share reached after `trial` was tried, which was `good` or not.
-    """
-    passed = good & (trial >= bad)
-    last = ~good & (trial - here <= 2 * LAST_STEP)
-    bad = np.where(passed, np.inf, np.where(good, bad, np.minimum(bad, trial)))
-    eager = good & ~eager
-    left = bad - here
-    growing = np.minimum(2 * step, LONGEST_STEP * np.maximum(1.0, here))
-    closing = np.where(eager | (left <= 2 * LAST_STEP), left, left / 2)
-    return np.where(np.isfinite(bad), closing, growing), bad, eager, last
-
-
-def _correct(system: System, start: Sequence[Number], share: Number, wanted: Number) -> tuple[list[Number], Number]:
-    """Newton from `start` at the given share, and whether it stayed on the branch.
+def _correct(
+    system: System, start: Sequence[Number], share: Number, wanted: Number
+) -> tuple[list[Number], Number, Number, Number]:
+    """Newton from `start` at the given share: the end, det J there, whether it stayed on the branch, whether straight.
 
     It did if it converged with det J > 0 all the way and ended near where its first step pointed, along the tangent
     of the branch. A tiny move need not: it may cross the kink that a guide has where its load changes ends. A move may
@@ -99,26 +96,25 @@ def _correct(system: System, start: Sequence[Number], share: Number, wanted: Num
     residual, jacobian = system(start, share)
     move, determinant = linalg.solve_and_determinant(jacobian, residual)
     aim = [value - delta for value, delta in zip(start, move, strict=True)]
-    first, calm = _largest(move), np.where(wanted & (determinant > 0), 1.0, 0.0)
-
-    def converged(x: Sequence[Number], residual: Sequence[Number]) -> Number:
-        # not by the last move, which rounding keeps from ending where the unknowns run to infinity
-        return _largest(residual) <= CLOSED * _largest(x) + TINY
+    calm = np.where(wanted & (determinant > 0), 1.0, 0.0)
 
     def correction(now: list[Number]) -> list[Number]:
-        *x, calm, going = now
+        *x, determinant, closed, going = now
         residual, jacobian = system(x, share)
-        going = ~converged(x, residual) & (calm > 0)
-        move, determinant = linalg.solve_and_determinant(jacobian, residual)
-        x = [np.where(going, value - delta, value) for value, delta in zip(x, move, strict=True)]
-        return [*x, np.where(going & ~(determinant > 0), 0.0, calm), np.where(going, 1.0, 0.0)]
+        move, fresh = linalg.solve_and_determinant(jacobian, residual)
+        # not by the last move, which rounding keeps from ending where the unknowns run to infinity
+        done = _largest(residual) <= CLOSED * _largest(x) + TINY
+        ahead = (going > 0) & ~done & (fresh > 0)
+        x = [np.where(ahead, value - delta, value) for value, delta in zip(x, move, strict=True)]
+        determinant = np.where(going > 0, fresh, determinant)
+        return [*x, determinant, np.where((going > 0) & done, 1.0, closed), np.where(ahead, 1.0, 0.0)]
 
-    *x, calm, _ = looped(correction, [*aim, calm, calm], NEWTON_LIMIT - 1, _ended)
-    residual, jacobian = system(x, share)
-    astray, size = _largest([a - b for a, b in zip(x, aim, strict=True)]), _largest(x)
+    *x, determinant, closed, _ = looped(correction, [*aim, determinant, 0.0 * calm, calm], NEWTON_LIMIT, _ended)
+    first, size = _largest(move), _largest(x)
+    astray = _largest([a - b for a, b in zip(x, aim, strict=True)])
     near = (astray <= NEAR_AIM * first) | (first + astray <= TINY_MOVE * size)
-    good = converged(x, residual) & (calm > 0) & near & (linalg.determinant(jacobian) > 0)
-    return x, good & np.isfinite(size)
+    good = (closed > 0) & (determinant > 0) & near & np.isfinite(size)
+    return x, determinant, good, astray <= STRAIGHT * first
 
 
 def _ended(now: Sequence[Number]) -> Number:

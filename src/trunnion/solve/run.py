@@ -24,7 +24,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import in_blocks, keep_pages
 from trunnion.solve.seats import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
-from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, parted, stated_bends
+from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
 __all__ = ["Run", "prepare"]
@@ -112,11 +112,6 @@ class Run:
     def seats(self) -> list[GivenSeat]:
         """Joints whose pins lie in seats that are given or follow the load."""
         return seats(self.system, self.values)
-
-    @functools.cached_property
-    def edges(self) -> NDArray[np.float64]:
-        """Times, s, from the start to the end of the cycle, between which its forces are smooth; see `switches`."""
-        return parted(np.array([one.time for one in self.bends], float), self.cycle)
 
     @functools.cached_property
     def bends(self) -> list[Bend]:

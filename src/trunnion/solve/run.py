@@ -22,7 +22,7 @@ from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import in_blocks, keep_pages
-from trunnion.solve.seats import GivenSeat, seats
+from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
 from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
@@ -111,7 +111,7 @@ class Run:
     @functools.cached_property
     def seats(self) -> list[GivenSeat]:
         """Joints whose pins lie in seats that are given or follow the load."""
-        return seats(self.system, self.values)
+        return seats(self.system.mechanism, self.values)
 
     @functools.cached_property
     def bends(self) -> list[Bend]:

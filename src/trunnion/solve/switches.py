@@ -344,7 +344,7 @@ def _dips(
     over = np.tile(least * here[at] < 0, 2)
     pairs = (low, middle), (middle, high), (before[at], least), (least, after[at])
     sides = (np.concatenate(pair)[over] for pair in pairs)
-    return _Crossing(np.tile(row, 2)[over], np.tile(function, 2)[over], np.zeros(np.sum(over)), *sides)
+    return _Crossing(np.tile(row, 2)[over], np.tile(function, 2)[over], np.zeros(int(np.sum(over))), *sides)
 
 
 def _located(every: _Crossing, number: Callable[[Array], Array], duration: Array) -> Array:

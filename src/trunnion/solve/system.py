@@ -253,8 +253,9 @@ class System:
         """
         elements = self.holes(values)
         for name, (kind, (first, second)) in self.joints.items():
-            elements[first, name] = shifts.journaled(self.mechanism.space, elements[first, name], kind, values, name)
-            elements[second, name] = shifts.seated(self.mechanism.space, elements[second, name], kind, values, name)
+            for link, carrier in ((first, shifts.PIN), (second, shifts.HOLE)):
+                element = elements[link, name]
+                elements[link, name] = shifts.seated(self.mechanism.space, element, kind, values, name, carrier)
         return elements
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:

@@ -6,6 +6,7 @@ import functools
 import operator
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -198,7 +199,7 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
         module, places, group = system.plan.modules[number], system.places[number], system.groups[number]
         if gears := gears_of(group):
             group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears))
-        reactions = walk.reacting(group).reactions(walk.poses[number], [back.loads[link] for link in module.links])
+        reactions = walk.reactions(number, [back.loads[link] for link in module.links], group)
         _pass_joints(back, number, reactions, [])
         back.module_reactions.update(
             (place.joint, reaction) for place, reaction in zip(places, reactions, strict=False) if not place.witness
@@ -288,7 +289,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
             if rub.turning is not None:
                 back.turning[joint] = contact, rub.turning
     rubbed += [(contact, None) for contact in teeth(walk, number)]
-    settled = settle(walk.reacting(group), pose, loads, [contact for contact, _ in rubbed], method)
+    settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
     back.rubbed.append(rubbed)
     if module.spinning:

@@ -13,7 +13,7 @@ happens is reported.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,12 +42,6 @@ SLOW = 1e-2  # of the miss: a round of Newton's method that leaves more has anot
 STUBBORN = 20  # rounds of Newton's method: a lane that takes more goes back and forth between the sides of a kink
 
 
-class Reacting(Protocol):
-    """A module, as far as its reactions go: flat tuples, linear in the loads on its links."""
-
-    def reactions(self, pose: Any, loads: Sequence[Any]) -> Sequence[Reaction]: ...
-
-
 class Settled(NamedTuple):
     """Reactions (friction not included) and friction forces, with the figures of the iteration.
 
@@ -71,17 +65,20 @@ class Settled(NamedTuple):
 
 
 def settle(
-    group: Reacting, pose: object, loads: Sequence[Any], contacts: Sequence[Contact], method: FrictionMethod
+    reactions: Callable[[Sequence[Any]], list[Reaction]],
+    loads: Sequence[Any],
+    contacts: Sequence[Contact],
+    method: FrictionMethod,
 ) -> Settled:
-    """Reactions and friction forces of one module under `loads`, friction not included."""
-    start = group.reactions(pose, loads)
+    """Reactions and friction forces of one module, whose reactions to loads are linear, under `loads`."""
+    start = reactions(loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
     if method.multiple is not None:
         contacts = [
             contact._replace(share=method.multiple * contact.share) if contact.rubs else contact for contact in contacts
         ]
-    influence = [with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
+    influence = [with_own(contact, reactions(contact.unit_loads)) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)
     if problem.one_way and method.name == "newton":  # no law looks at what friction changes
         forces = problem.target(problem.state([0.0] * len(contacts)).normals)

@@ -125,8 +125,8 @@ def unstated_length(joint: str, play: Play) -> list[Finding]:
     return [Finding(what, f"joints.{joint}.{part}", f"state joints.{joint}.{part}.{keys[0]}")]
 
 
-def hole(frame: space.Frame, values: Values, joint: str) -> space.Frame:
-    """The frame of the hole in space: the second element, moved along its axis by the offset of the pin."""
+def hole(frame: Any, values: Values, joint: str) -> Any:
+    """The frame of the hole: the second element, moved along its axis by the offset of the pin."""
     offset = values.get(f"joints.{joint}.pin.offset")
     return frame if offset is None else space.slid(frame, offset)
 
@@ -149,7 +149,7 @@ def misaligned(of: str, frame: Any, values: Values, joint: str) -> Any:
         return plane.compose(frame, plane.Frame(*place))
     slope = xp.sin(tilt) / xp.cos(tilt)
     local = leaning((slope * xp.cos(towards), slope * xp.sin(towards)), 0.0, place)
-    return _in_hole(of, frame, values, joint, lambda middle: space.compose(middle, local))
+    return _in_hole(frame, values, joint, lambda middle: space.compose(middle, local))
 
 
 def seated(of: str, frame: Any, kind: str, values: Values, joint: str, carrier: str = HOLE) -> Any:
@@ -164,10 +164,10 @@ def seated(of: str, frame: Any, kind: str, values: Values, joint: str, carrier: 
         return frame
     local = ALGEBRAS[of].Frame(*model.shift(offsets, length_of(model, values, joint)))
     lay = ALGEBRAS[of].compose if carrier == HOLE else ALGEBRAS[of].relative
-    return _in_hole(of, frame, values, joint, lambda middle: lay(middle, local))
+    return _in_hole(frame, values, joint, lambda middle: lay(middle, local))
 
 
-def _in_hole(of: str, frame: Any, values: Values, joint: str, move: Callable[[Any], Any]) -> Any:
-    """An element, moved at the middle of the hole; in the plane that is at its point."""
-    offset = values.get(f"joints.{joint}.pin.offset") if of == "spatial" else None
+def _in_hole(frame: Any, values: Values, joint: str, move: Callable[[Any], Any]) -> Any:
+    """An element, moved at the middle of the hole; in the plane, where no bearing has an offset, that is its point."""
+    offset = values.get(f"joints.{joint}.pin.offset")
     return move(frame) if offset is None else space.slid(move(space.slid(frame, offset)), -offset)

@@ -185,11 +185,13 @@ class Forward:
 
     def pairs(self, places: Sequence[Place]) -> list[Any]:
         """Elements of a module's joints: global on known links, local on its own."""
-        return [(self._side(place, 0), self._side(place, 1)) for place in places]
-
-    def _side(self, place: Place, i: int) -> Any:
-        link = place.links[i]
-        return self.element(link, place.joint) if place.outer[i] else self.local[link, place.joint]
+        return [
+            tuple(
+                self.element(link, place.joint) if outer else self.local[link, place.joint]
+                for link, outer in zip(place.links, place.outer, strict=True)
+            )
+            for place in places
+        ]
 
     def outside(self, place: Place) -> tuple[Any, Any]:
         """Motion of the known link of a module's joint; of a witness that of its second link against its first."""
@@ -227,16 +229,14 @@ class Forward:
 
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis, as far as it has them."""
-        first, second = self.ends(joint)
-        if self.system.turns(joint):
-            c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
-            return namespace(s, c).arctan2(s, c), 0.0
-        return 0.0, first.c * (second.x - first.x) + first.s * (second.y - first.y)
+        number = self.coordinate(joint, *self.ends(joint))
+        return (number, 0.0) if self.system.turns(joint) else (0.0, number)
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
         """Turn or slide of a joint, whichever a driver moves, from its elements."""
         if self.system.turns(joint):
-            return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
+            c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
+            return namespace(s, c).arctan2(s, c)
         return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
     def rates(self, joint: str) -> tuple[Number, Number]:

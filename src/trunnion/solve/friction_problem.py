@@ -129,16 +129,14 @@ class FrictionProblem:
     @cached_property
     def numbers(self) -> list[Number]:
         """All numbers of the problem."""
-        found: list[Number] = []
+        numbers: list[Number] = []
 
         def note(number: Number) -> Number:
-            found.append(number)
+            numbers.append(number)
             return number
 
-        for contact in self.contacts:
-            contact.load.mapped(note)
-            found += [contact.slip, contact.resting, contact.share, *contact.parameters.values()]
-        return [*found, *(n for wrenches in (self.start, *self.influence) for wrench in wrenches for n in wrench)]
+        self.mapped(note)
+        return numbers
 
     @cached_property
     def depth(self) -> int:

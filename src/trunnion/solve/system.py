@@ -107,12 +107,6 @@ class Cycle:
         """`steps` equally spaced times, s; the end is left out where it repeats the start."""
         return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
 
-    def mean(self, values: NDArray[np.float64]) -> float:
-        """Mean of values at `times`: plain over a period, by trapezoids over a range; NaN with a gap."""
-        if len(values) == 1 or self.periodic:
-            return float(np.mean(values))
-        return float(np.trapezoid(values) / (len(values) - 1))
-
 
 @dataclass(frozen=True)
 class System:

@@ -26,19 +26,9 @@ from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
-    "Backward",
-    "Given",
-    "Sense",
-    "Slip",
-    "backward",
-    "body_loads",
-    "pass_on",
-    "sense_of",
-    "solve",
-    "stated_actions",
-    "under",
-    "unloaded",
-]
+    "Backward", "Given", "Sense", "Slip", "backward", "body_loads", "pass_on", "sense_of", "solve",
+    "stated_actions", "under", "unloaded",
+]  # fmt: skip
 
 
 Sense = Share | tuple[Share, ...]

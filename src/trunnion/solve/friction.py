@@ -25,16 +25,7 @@ from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Contact, FrictionProblem, added, largest, total
 
-__all__ = [
-    "Contact",
-    "FrictionMethod",
-    "FrictionProblem",
-    "Settled",
-    "frictionless",
-    "scaled",
-    "settle",
-    "with_own",
-]
+__all__ = ["Contact", "FrictionMethod", "FrictionProblem", "Settled", "frictionless", "scaled", "settle", "with_own"]
 
 OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
 SETTLED = 1e-11  # of the largest friction: where the iteration ends

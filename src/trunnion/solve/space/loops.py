@@ -39,15 +39,20 @@ STILL = 1e-10  # step at which they end
 
 
 class End(NamedTuple):
-    """One end of a joint's play: its joint, its number, the axes of its components, the radius that is stated, m, and
-    whether it is that of a pin in its hole (not an end float, a guide or a ball).
+    """One end of a joint's play: its joint, its number, the names of its components, as "1.x", the radius that is
+    stated, m, and whether it is that of a pin in its hole (not an end float, a guide or a ball).
     """
 
     joint: str
     number: int
-    axes: tuple[str, ...]
+    keys: tuple[str, ...]
     radius: float
     pin: bool
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of its components."""
+        return tuple(key.partition(".")[2] for key in self.keys)
 
 
 class LinearLoops(NamedTuple):
@@ -71,8 +76,7 @@ def ends_of(system: System, values: Values, every_pin: bool) -> list[End]:
             radius = float(np.ravel(primal(play.radii[k]))[0]) if play else 0.0
             radial = pin and k not in model.axial
             if radius > 0 or (radial and every_pin):
-                axes = tuple(key.partition(".")[2] for key in keys)
-                ends.append(End(name, k, axes, radius, radial))
+                ends.append(End(name, k, keys, radius, radial))
     return ends
 
 
@@ -107,13 +111,7 @@ class Loops:
     @cached_property
     def components(self) -> list[str]:
         """Path of every offset among the values."""
-        models = {name: CLEARANCE_MODELS["spatial"].get(kind) for name, (kind, _) in self.system.joints.items()}
-        paths = []
-        for end in self.ends:
-            model = models[end.joint]
-            assert model is not None  # it has an end
-            paths += [f"seats.{end.joint}.{key}" for key in model.ends[end.number]]
-        return paths
+        return [f"seats.{end.joint}.{key}" for end in self.ends for key in end.keys]
 
     def at(self, lanes: NDArray[np.intp]) -> Loops:
         """The same at some of the lanes."""

@@ -537,7 +537,10 @@ def forward(
 
 
 def posed(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
-    """The walk of `forward` for what the places alone decide: every link is left at rest."""
+    """The walk of `forward` for what the places alone decide: every link is left at rest.
+
+    assembly: of the first modules at least, which are walked.
+    """
     return _walked(system, values, assembly, time, lambda walk, number, pose: walk.stand(number, pose))
 
 
@@ -547,8 +550,8 @@ def _walked(
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
-        for number in range(len(system.plan.modules)):
-            add(walk, number, pose_of(walk, number, assembly[number], time))
+        for number, own in enumerate(assembly):
+            add(walk, number, pose_of(walk, number, own, time))
     return walk
 
 

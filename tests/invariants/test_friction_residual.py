@@ -32,7 +32,7 @@ class Linear:
 
     columns: Any
 
-    def reactions(self, pose: object, loads: Sequence[Any]) -> list[Reaction]:
+    def reactions(self, loads: Sequence[Any]) -> list[Reaction]:
         found = sum(load * column for load, column in zip(loads, self.columns, strict=True))
         return [tuple(joint) for joint in found]
 
@@ -54,7 +54,7 @@ def settled(
         for k, (load, f) in enumerate(contacts)
     ]
     with np.errstate(all="ignore"):  # as in every walk: what diverges comes out as no number
-        return settle(Linear([start, *influence]), None, [1.0] + [0.0] * count, made, method)
+        return settle(Linear([start, *influence]).reactions, [1.0] + [0.0] * count, made, method)
 
 
 def missed(found: Settled, contacts: Sequence[tuple[PlanarContactLoad, Any]]) -> Array:

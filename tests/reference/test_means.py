@@ -19,7 +19,7 @@ from trunnion.results.quantities import quantity
 from trunnion.solve.loads import useful_loads
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import seating_of
-from trunnion.solve.switches import Mechanisms, edges
+from trunnion.solve.switches import Mechanisms, bends
 from trunnion.views.cycle.deviations_tables import error_rows
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -179,12 +179,12 @@ def test_a_peak_of_one_point_of_a_long_table_counts(points: int, interpolation: 
     assert float(found["efficiency_error"]) < 1e-4
 
 
-def test_edges_are_where_the_model_switches() -> None:
+def test_bends_are_where_the_model_switches() -> None:
     run = prepare(press())
-    (found,) = edges(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
+    (found,) = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [run.cycle]))
     degrees = found / run.cycle.duration * 360
-    # Q turns round where the crank is upright, S in its dead centres: sin φ = offset/(l ± r)
-    dead = [np.degrees(np.arcsin(-60 / 200)) % 360, 180 + np.degrees(np.arcsin(60 / 120))]
+    # Q turns round where the crank is upright, S in its dead centres: sin φ = −offset/(r + l), offset/(l − r)
+    dead = [np.degrees(np.arcsin(-60 / 200)) % 360, 180 - np.degrees(np.arcsin(60 / 120))]
     for place in (340, 343, 90, 270, *dead):
         assert np.min(np.abs(degrees - place)) < 1e-8
 

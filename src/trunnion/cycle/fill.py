@@ -26,7 +26,7 @@ from trunnion.solve.end_loads import loads_of
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.loads import has_useful_work, useful_powers
 from trunnion.solve.margin import locking_margin
-from trunnion.solve.seats import GivenSeat, seats
+from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.status import status_of
 from trunnion.solve.system import System, Values
 
@@ -265,7 +265,7 @@ def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
     """Seats, end forces and places of contact of one chunk."""
     walk = back.walk
     joints, axes = list(walk.system.joints), walk.system.mechanism.coordinates
-    for seat in seats(walk.system, walk.values):
+    for seat in seats(walk.system.mechanism, walk.values):
         i = joints.index(seat.joint)
         offsets = seat.play.model.offsets(walk.values, f"seats.{seat.joint}") or []
         ends = _ends(seat, offsets)

@@ -154,7 +154,7 @@ def _extremes(run: Run, measures: Sequence[Measure], method: FrictionMethod) -> 
 def _beside_switch(run: Run, time: Array, places: NDArray[np.intp]) -> bool:
     """Whether the model switches within a step of every one of some positions."""
     step, around = run.cycle.duration / len(time), run.cycle.duration if run.cycle.periodic else np.inf
-    away = np.abs(time[places, None] - run.edges[1:-1])
+    away = np.abs(time[places, None] - np.array([bend.time for bend in run.bends]))
     return bool(np.all(np.min(np.minimum(away, around - away), axis=1, initial=np.inf) <= step))
 
 

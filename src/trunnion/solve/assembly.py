@@ -345,7 +345,7 @@ def coordinate(walk: Forward, module: Module, frames: Sequence[Any], joint: str,
 
     def element(link: str) -> Any:
         if link in module.links:
-            return walk.composed(frames[module.links.index(link)], link, joint)
+            return walk.algebra.compose(frames[module.links.index(link)], walk.local[link, joint])
         outer = walk.element(link, joint)
         return outer if lane is None else each(outer, lambda n: lane_of(n, lane))
 

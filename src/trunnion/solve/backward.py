@@ -6,6 +6,7 @@ import functools
 import operator
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -25,19 +26,9 @@ from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
-    "Backward",
-    "Given",
-    "Sense",
-    "Slip",
-    "backward",
-    "body_loads",
-    "pass_on",
-    "sense_of",
-    "solve",
-    "stated_actions",
-    "under",
-    "unloaded",
-]
+    "Backward", "Given", "Sense", "Slip", "backward", "body_loads", "pass_on", "sense_of", "solve",
+    "stated_actions", "under", "unloaded",
+]  # fmt: skip
 
 
 Sense = Share | tuple[Share, ...]
@@ -92,7 +83,7 @@ class Backward:
     friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
     N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
     that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart;
-    module_reactions: reactions as their modules see them, of `under` alone. stated: loads before any joint was passed;
+    module_reactions: reactions as their modules see them. stated: loads before any joint was passed;
     rubbed: contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
     `locking_margin`, once it was asked for.
     """
@@ -192,19 +183,13 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
 
     They are what moves with the play of joints, so gear pairs pass torques alone.
     """
-    system = walk.system
     back = Backward(walk, unloaded(walk) | dict(loads))
-    for number in reversed(range(len(system.plan.modules))):
-        module, places, group = system.plan.modules[number], system.places[number], system.groups[number]
+    for number in reversed(range(len(walk.poses))):
+        module, group = walk.system.plan.modules[number], walk.system.groups[number]
         if gears := gears_of(group):
             group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears))
-        reactions = walk.reacting(group).reactions(walk.poses[number], [back.loads[link] for link in module.links])
-        _pass_joints(back, number, reactions, [])
-        back.module_reactions.update(
-            (place.joint, reaction) for place, reaction in zip(places, reactions, strict=False) if not place.witness
-        )
-        for i, (*_, torque) in enumerate(reactions[len(places) :]):  # those of gear pairs
-            _push(back, number, acting(walk, number, i, torque, parting=False))
+        reactions = walk.reactions(number, [back.loads[link] for link in module.links], group)
+        pass_on(back, number, reactions, (), (), toothed=False)
     return back
 
 
@@ -288,7 +273,7 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
             if rub.turning is not None:
                 back.turning[joint] = contact, rub.turning
     rubbed += [(contact, None) for contact in teeth(walk, number)]
-    settled = settle(walk.reacting(group), pose, loads, [contact for contact, _ in rubbed], method)
+    settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
     back.rubbed.append(rubbed)
     if module.spinning:
@@ -303,29 +288,31 @@ def pass_on(
     reactions: Sequence[Any],
     rubbed: Sequence[tuple[Contact, Rubbing | None]],
     forces: Sequence[Number],
+    toothed: bool = True,
 ) -> None:
-    """Keep the reactions of a module and the friction of its contacts, and load the links it hangs on with both."""
+    """Keep the reactions of a module and the friction of its contacts, and load the links it hangs on with both.
+
+    toothed: whether the gears press on each other, or pass torques alone.
+    """
+    walk, module, places = back.walk, back.walk.system.plan.modules[number], back.walk.system.places[number]
     parts = [(*both, force) for both, force in zip(rubbed, forces, strict=True)]
-    _pass_joints(back, number, reactions, parts)
-    parting, count = {contact.joint: force for contact, _, force in parts}, len(back.walk.system.places[number])
-    for i, name in enumerate(back.walk.system.plan.modules[number].gears):
-        k = count + i
-        back.gears[name], done = gear_load(back.walk, number, i, reactions[k][-1], parting.get(k, 0.0))
-        if back.travels:
-            back.gear_power = back.gear_power + power_of(back.walk, number, done)
-        _push(back, number, done)
-
-
-def _pass_joints(
-    back: Backward, number: int, reactions: Sequence[Any], parts: Sequence[tuple[Contact, Rubbing | None, Number]]
-) -> None:
-    """The same of the joints of a module. parts: its contacts with their friction forces."""
-    system = back.walk.system
-    for k, place in enumerate(system.places[number]):
+    for k, place in enumerate(places):
         if not place.witness:
-            own = [part for part in parts if part[0].joint == k]
-            wrench, driven = back.walk.wrench(place, reactions[k]), place.joint in system.plan.modules[number].driven
-            _record(back, place, wrench, own, driven)
+            back.module_reactions[place.joint] = reactions[k]
+            own, driven = [part for part in parts if part[0].joint == k], place.joint in module.driven
+            _record(back, place, walk.wrench(place, reactions[k]), own, driven)
+    parting = {contact.joint: force for contact, _, force in parts}
+    for i, name in enumerate(module.gears):
+        k = len(places) + i
+        if toothed:
+            back.gears[name], done = gear_load(walk, number, i, reactions[k][-1], parting.get(k, 0.0))
+        else:
+            done = acting(walk, number, i, reactions[k][-1], parting=False)
+        if back.travels:
+            back.gear_power = back.gear_power + power_of(walk, number, done)
+        for joint, side, wrench in done:
+            if places[joint].outer[side]:
+                back.add(places[joint].links[side], wrench)
 
 
 def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, given: Given, i: int) -> Contact:
@@ -387,11 +374,3 @@ def _record(
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, total if link == second else algebra.times(-1.0, total), joint))
-
-
-def _push(back: Backward, number: int, done: Sequence[Any]) -> None:
-    """Load the known links of a module with what its gear pairs do."""
-    for joint, side, wrench in done:
-        place = back.walk.system.places[number][joint]
-        if place.outer[side]:
-            back.add(place.links[side], wrench)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
+from trunnion.algebra.roots import root
 from trunnion.joints.friction import FrictionLaw
 from trunnion.solve.forward import Assembly, Forward, forward
 from trunnion.solve.system import Cycle, System, Values, law_of, rubbing
@@ -33,7 +34,7 @@ __all__ = ["History", "histories"]
 INTERVALS = 720  # of one turn of the fastest driver
 GROWN = np.linspace(0.0, 1.0, 13) ** 2  # steps on either side of a reversal, by the distance from it
 SLOWEST = 1e-30  # m/s, so that d/|v| has a value at rest
-REFINEMENTS = 6  # of the place of a reversal
+NEAR = 1e-9  # of an interval: from where one step of Newton's method gives a reversal to rounding
 PerWay = Callable[[Number], Number]  # d/|v|, 1/m, of a slip speed
 
 
@@ -65,14 +66,7 @@ class _Slip(NamedTuple):
         real = _Slip(*(primal(number) for number in self))
         v0, v1 = np.broadcast_arrays(real.v0, real.v1)
         changes = v0 * v1 < 0
-        low, high = np.zeros(v0.shape), np.ones(v0.shape)
-        s = np.where(changes, v0 / np.where(changes, v0 - v1, 1.0), 0.0)
-        for _ in range(REFINEMENTS):
-            value = real.speed(s)
-            same = value * v0 > 0
-            low, high = np.where(same, s, low), np.where(same, high, s)
-            better = s - value / np.where(changes, real.slope(s), 1.0)
-            s = np.where((better > low) & (better < high), better, (low + high) / 2)
+        s = root(real.speed, np.zeros(v0.shape), np.ones(v0.shape), v0, v1, np.where(changes, NEAR, np.inf))
         step = self.speed(s) / np.where(changes, real.slope(s), 1.0)  # 0 but for its dual part
         return namespace(step).where(changes, s - step, 0.0)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
-from trunnion.solve.forward import Forward, pose_of, start
+from trunnion.solve.forward import Forward, pose_of, posed
 from trunnion.solve.system import System, Values
 from trunnion.structure.decompose import Module
 
@@ -56,9 +56,7 @@ def find(walk: Forward, number: int, assembly: Any, times: Array, pose: Any) -> 
     margin = np.broadcast_to(1 / primal(group.condition(pose)), times.shape)
 
     def margin_at(moments: Array) -> Array:
-        trial = start(walk.system, walk.values)
-        for earlier in range(number):
-            trial.stand(earlier, pose_of(trial, earlier, walk.assembly[earlier], moments))
+        trial = posed(walk.system, walk.values, walk.assembly[:number], moments)
         condition = primal(group.condition(pose_of(trial, number, assembly, moments)))
         return np.broadcast_to(1 / condition, moments.shape)
 

@@ -9,7 +9,7 @@ ball has that bears on its great circle across that velocity, and the most for a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from trunnion.joints.spatial_load import BallLoad, BearingLoad
 from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.friction_problem import Rubbing
 
-__all__ = ["at_rest", "bearing_middle", "contacts_of"]
+__all__ = ["bearing_middle", "contacts_of"]
 
 NULL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -33,20 +33,6 @@ def bearing_middle(walk: SpatialWalk, joint: str) -> Vector3:
     second = walk.ends(joint)[1]
     offset = walk.values.get(f"joints.{joint}.pin.offset")
     return second.place if offset is None else plus(second.place, scaled(offset, second.z))
-
-
-def at_rest(walk: SpatialWalk, joint: str) -> list[Number]:
-    """Where each contact of a joint does not slip, in the order of `contacts_of`."""
-    pair, turn_scale = walk.pair(joint), walk.noise(joint, turns=True)
-    if pair.crossed:
-        return [np.abs(primal(rate)) <= turn_scale for rate in walk.pin_rates(joint)]
-    if not pair.one_axis:
-        return [walk.speed(joint) <= turn_scale]
-    turn, slide = (primal(rate) for rate in walk.rates(joint))
-    still = [np.abs(turn) <= turn_scale, np.abs(slide) <= walk.noise(joint, turns=False)]
-    if len(pair.freedoms) == 2:
-        return still if walk.system.summed(joint) else [still[0] & still[1]]
-    return still[:1] if pair.turns else still[1:]
 
 
 def contacts_of(walk: Forward, joint: str) -> Iterator[Rubbing]:
@@ -72,20 +58,20 @@ def _in_plane(walk: Forward, joint: str) -> Iterator[Rubbing]:
 
 def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
     """Of a joint in space."""
-    zero = at_rest(walk, joint)
     pair, middle = walk.pair(joint), bearing_middle(walk, joint)
     second = walk.ends(joint)[1]
     axis = second.z
     if pair.ball:
-        yield _ball(walk, joint, middle, zero[0])
+        yield _ball(walk, joint)
         return
     if pair.crossed:
-        yield from _two_pins(walk, joint, middle, zero)
+        yield from _two_pins(walk, joint, middle)
         return
     load = _bearing(walk, joint, second._replace(place=middle))
     turn, slide = walk.rates(joint)
+    turned, slid = np.abs(primal(turn)) <= walk.noise(joint, True), np.abs(primal(slide)) <= walk.noise(joint, False)
     if pair.guided:
-        yield Rubbing(load, slide, about(axis, NULL, middle), zero[0])
+        yield Rubbing(load, slide, about(axis, NULL, middle), slid)
         return
     lever = walk.values[f"joints.{joint}.pin.radius"]
     moment = Screw(NULL, scaled(lever, axis))
@@ -93,14 +79,13 @@ def _in_space(walk: SpatialWalk, joint: str) -> Iterator[Rubbing]:
         lead = walk.system.lead(walk.values, joint)
         helix = namespace(lead, lever).sqrt(lever * lever + lead * lead)
         unit = _mixed(axis, middle, lever, lever / helix, lead / helix)
-        yield Rubbing(load, helix * turn, unit, zero[0], amount=lever * lever / helix)
-    elif not pair.slides:
-        yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
-    elif walk.system.summed(joint):
-        yield Rubbing(load, lever * turn, moment, zero[0], amount=lever, turning=1.0)
-        yield Rubbing(load, slide, about(axis, NULL, middle), zero[1], amount=0.0)
+        yield Rubbing(load, helix * turn, unit, turned, amount=lever * lever / helix)
+    elif pair.slides and not walk.system.summed(joint):
+        yield _resultant(load, axis, middle, lever, (lever * turn, slide), turned & slid)
     else:
-        yield _resultant(load, axis, middle, lever, (lever * turn, slide), zero[0])
+        yield Rubbing(load, lever * turn, moment, turned, amount=lever, turning=1.0)
+        if pair.slides:
+            yield Rubbing(load, slide, about(axis, NULL, middle), slid, amount=0.0)
 
 
 def _resultant(
@@ -108,13 +93,18 @@ def _resultant(
 ) -> Rubbing:
     """Friction along the vector of the slip; where there is none, about the axis."""
     square = slip[0] * slip[0] + slip[1] * slip[1]
-    xp = namespace(square)
     moves = (primal(square) > 0) & np.logical_not(zero)
-    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
-    share = 1 / xp.where(moves, speed, 1.0)
+    speed, share, xp = *_speed(square, moves), namespace(square)
     cosine, sine = xp.where(moves, slip[0] * share, 1.0), xp.where(moves, slip[1] * share, 0.0)
     unit = _mixed(axis, middle, lever, cosine, sine)
     return Rubbing(load, speed, unit, zero, amount=lever * cosine, turning=xp.abs(cosine))
+
+
+def _speed(square: Number, moves: Number) -> tuple[Number, Number]:
+    """A speed from its square and 1 over it, where something moves; elsewhere 0 and 1."""
+    xp = namespace(square)
+    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
+    return speed, 1 / xp.where(moves, speed, 1.0)
 
 
 def _mixed(axis: Vector3, middle: Vector3, lever: Number, cosine: Number, sine: Number) -> Screw:
@@ -134,25 +124,23 @@ def _bearing(walk: SpatialWalk, joint: str, frame: Frame) -> BearingLoad:
     return BearingLoad(frame, values[f"{path}.pin.bearing"], walk.system.summed(joint), flank=flank)
 
 
-def _ball(walk: SpatialWalk, joint: str, middle: Vector3, zero: Number) -> Rubbing:
-    turn = walk.against(joint).u
-    radius = walk.values[f"joints.{joint}.pin.radius"]
+def _ball(walk: SpatialWalk, joint: str) -> Rubbing:
+    turn, radius = walk.against(joint).u, walk.values[f"joints.{joint}.pin.radius"]
     square = dot(turn, turn)
-    xp = namespace(square)
-    moves = primal(square) > 0
-    speed = xp.where(moves, xp.sqrt(xp.where(moves, square, 1.0)), 0.0)
-    direction = scaled(1 / xp.where(moves, speed, 1.0), turn)
-    unit = Screw(NULL, scaled(radius, direction))
+    speed, share = _speed(square, primal(square) > 0)
+    unit = Screw(NULL, scaled(radius, scaled(share, turn)))
+    zero = walk.speed(joint) <= walk.noise(joint, turns=True)
     return Rubbing(BallLoad(), radius * speed, unit, zero, amount=radius, turning=1.0)
 
 
-def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3, zero: Sequence[Number]) -> Iterator[Rubbing]:
+def _two_pins(walk: SpatialWalk, joint: str, middle: Vector3) -> Iterator[Rubbing]:
     """Each pin of the cross is a revolute bearing; friction of one is carried by the other as a moment across it."""
     values, path = walk.values, f"joints.{joint}"
     lever = values[f"{path}.pin.radius"]
     spin = walk.speed(joint)
     share = lever / np.where(spin > 0, spin, np.inf)  # its friction is told as a torque about the relative spin
-    for pin, rate, still in zip(walk.ends(joint), walk.pin_rates(joint), zero, strict=True):
+    for pin, rate in zip(walk.ends(joint), walk.pin_rates(joint), strict=True):
+        still = np.abs(primal(rate)) <= walk.noise(joint, turns=True)
         load = BearingLoad(pin._replace(place=middle), values[f"{path}.pin.bearing"], walk.system.summed(joint))
         unit = Screw(NULL, scaled(lever, pin.z))
         yield Rubbing(load, lever * rate, unit, still, amount=share * rate, felt=True)

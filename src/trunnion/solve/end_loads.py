@@ -26,7 +26,7 @@ from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.seats import GivenSeat
+from trunnion.solve.shifts import GivenSeat
 from trunnion.solve.status import status_of
 from trunnion.solve.system import rubbing
 

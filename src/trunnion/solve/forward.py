@@ -18,11 +18,10 @@ from trunnion.algebra import plane, space
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.literal import is_zero
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.algebra.nested import each, zipped
+from trunnion.algebra.nested import each, flat, zipped
 from trunnion.algebra.plane import Twist, Wrench
 from trunnion.algebra.space import Screw
 from trunnion.algebra.vector import Matrix3, Vector3, apply, cross, dot, minus, plus, scaled, transpose
-from trunnion.groups.spatial import SpatialGroup
 from trunnion.groups.tree import Element
 from trunnion.joints.pairs import PAIRS, Pair, Reaction
 from trunnion.joints.spatial_load import halves
@@ -94,7 +93,7 @@ class Forward:
     @cached_property
     def size(self) -> Number:
         """Length typical of the mechanism, m."""
-        return self.system.size(self.values)
+        return self.system.size(self.values, self.local)
 
     @cached_property
     def spins(self) -> dict[str, Number]:
@@ -118,10 +117,6 @@ class Forward:
         """Global frames of the two elements of a joint."""
         first, second = self.system.joints[joint][1]
         return self.element(first, joint), self.element(second, joint)
-
-    def composed(self, frame: Any, link: str, joint: str) -> Any:
-        """Element of a joint on a link that lies in a frame."""
-        return self.algebra.compose(frame, self.local[link, joint])
 
     def against(self, joint: str) -> Any:
         """Twist of the second link of a joint against the first."""
@@ -190,18 +185,13 @@ class Forward:
 
     def pairs(self, places: Sequence[Place]) -> list[Any]:
         """Elements of a module's joints: global on known links, local on its own."""
-        return [(self._side(place, 0), self._side(place, 1)) for place in places]
-
-    def _side(self, place: Place, i: int) -> Any:
-        link = place.links[i]
-        return self.element(link, place.joint) if place.outer[i] else self.local[link, place.joint]
-
-    def carried(self, travel: Mapping[str, Travel]) -> None:
-        """Let the links also move as the seats of their pins travel."""
-        for link, added in travel.items():
-            motion = self.motions[link]
-            twist, acceleration = (zipped(operator.add, *both) for both in zip(motion[1:], added, strict=True))
-            self.motions[link] = motion._replace(twist=twist, acceleration=acceleration)
+        return [
+            tuple(
+                self.element(link, place.joint) if outer else self.local[link, place.joint]
+                for link, outer in zip(place.links, place.outer, strict=True)
+            )
+            for place in places
+        ]
 
     def outside(self, place: Place) -> tuple[Any, Any]:
         """Motion of the known link of a module's joint; of a witness that of its second link against its first."""
@@ -239,16 +229,14 @@ class Forward:
 
     def coordinates(self, joint: str) -> tuple[Number, Number]:
         """Turn in (−π, π] rad and slide, m, of a joint on one axis, as far as it has them."""
-        first, second = self.ends(joint)
-        if self.system.turns(joint):
-            c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
-            return namespace(s, c).arctan2(s, c), 0.0
-        return 0.0, first.c * (second.x - first.x) + first.s * (second.y - first.y)
+        number = self.coordinate(joint, *self.ends(joint))
+        return (number, 0.0) if self.system.turns(joint) else (0.0, number)
 
     def coordinate(self, joint: str, first: Any, second: Any) -> Number:
         """Turn or slide of a joint, whichever a driver moves, from its elements."""
         if self.system.turns(joint):
-            return np.arctan2(second.s, second.c) - np.arctan2(first.s, first.c)
+            c, s = plane.turned_vector(first.c, -first.s, second.c, second.s)
+            return namespace(s, c).arctan2(s, c)
         return first.c * (second.x - first.x) + first.s * (second.y - first.y)
 
     def rates(self, joint: str) -> tuple[Number, Number]:
@@ -286,7 +274,8 @@ class Forward:
         """Global frame of the hole of a joint: in its second link, axes of the link, of a guide along its slide; in
         space z along the axis, in the middle of the bearing."""
         second = self.system.joints[joint][1][1]
-        return self.algebra.compose(self.motions[second].frame, self.holes[second, joint])
+        hole = self.algebra.compose(self.motions[second].frame, self.holes[second, joint])
+        return shifts.hole(hole, self.values, joint)
 
     def hole_spin(self, joint: str) -> Vector:
         """Angular velocity of the hole of a joint against its pin, in the hole's frame, rad/s."""
@@ -314,15 +303,18 @@ class Forward:
 
     def freedom(self, joint: str, turns: bool) -> tuple[Any, Any]:
         """The same of what a driver moves, with the slide along its thread."""
-        return self.axis(joint, turns)
+        twist, effort = self.axis(joint, turns)
+        lead = self.system.lead(self.values, joint)
+        return twist if is_zero(lead) else self.algebra.added(twist, self.algebra.times(lead, effort)), effort
 
     def on_link(self, link: str, wrench: Any, joint: str) -> Any:
         """A joint's wrench about the origin."""
         return plane.about(wrench[:2], wrench.m, plane.place_of(self.ends(joint)[1]))
 
-    def reacting(self, group: Any) -> Any:
-        """A module whose reactions are flat tuples, as `friction` has them."""
-        return group
+    def reactions(self, number: int, loads: Sequence[Any], group: Any = None) -> list[Reaction]:
+        """Reactions of a module to loads on its links, flat. group: in place of the module itself."""
+        group = self.system.groups[number] if group is None else group
+        return [tuple(flat(wrench)) for wrench in group.reactions(self.poses[number], loads)]
 
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction on a joint's second link as the file names it; a module may see it from the other."""
@@ -360,11 +352,6 @@ class SpatialWalk(Forward):
     """
 
     algebra: ClassVar[Any] = space
-
-    @cached_property
-    def size(self) -> Number:
-        """Length typical of the mechanism, m."""
-        return self.system.size(self.values, self.local)
 
     @cached_property
     def _stated(self) -> dict[tuple[str, str], Any]:
@@ -450,10 +437,6 @@ class SpatialWalk(Forward):
             return (quiet(rate, self.noise(joint, turns=True)) for rate in self.pin_rates(joint))
         return super().signed_rates(joint)
 
-    def hole(self, joint: str) -> Any:
-        """See `Forward.hole`."""
-        return shifts.hole(super().hole(joint), self.values, joint)
-
     def hole_spin(self, joint: str) -> Vector:
         """See `Forward.hole_spin`."""
         return apply(self.hole(joint)[:3], self.against(joint).u)
@@ -475,20 +458,11 @@ class SpatialWalk(Forward):
         along = Screw(space.NULL, line.u)
         return (line, along) if turns else (along, line)
 
-    def freedom(self, joint: str, turns: bool) -> tuple[Any, Any]:
-        """The same of what a driver moves, with the slide along its thread."""
-        twist, effort = self.axis(joint, turns)
-        return Screw(twist.u, plus(twist.m, scaled(self.system.lead(self.values, joint), twist.u))), effort
-
     # ---- forces -----------------------------------------------------------------------------------------------
 
     def on_link(self, link: str, wrench: Any, joint: str) -> Any:
         """A joint's wrench about the origin: the same."""
         return wrench
-
-    def reacting(self, group: Any) -> Any:
-        """A module whose reactions are flat tuples, as `friction` has them."""
-        return _Flat(group)
 
     def wrench(self, place: Place, reaction: Reaction) -> Any:
         """The reaction of a joint."""
@@ -519,16 +493,6 @@ class SpatialWalk(Forward):
             xx, yy, zz = xx - mass * (y * y + z * z), yy - mass * (x * x + z * z), zz - mass * (x * x + y * y)
             xy, xz, yz = xy + mass * x * y, xz + mass * x * z, yz + mass * y * z
         return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
-
-
-@dataclass(frozen=True)
-class _Flat:
-    """A module whose reactions are flat tuples."""
-
-    group: SpatialGroup
-
-    def reactions(self, pose: Any, loads: Sequence[Screw]) -> list[Reaction]:
-        return [(*wrench.u, *wrench.m) for wrench in self.group.reactions(pose, loads)]
 
 
 def _dual_angle(first: space.Frame, second: space.Frame) -> tuple[Number, Number]:
@@ -564,13 +528,19 @@ def forward(
     seats of pins travel.
     """
     walk = _walked(system, values, assembly, time, lambda walk, number, pose: walk.take(number, pose, time))
-    if travel:
-        walk.carried(travel)
+    for link, added in (travel or {}).items():
+        motion = walk.motions[link]
+        walk.motions[link] = Motion(
+            motion.frame, *(zipped(operator.add, *b) for b in zip(motion[1:], added, strict=True))
+        )
     return walk
 
 
 def posed(system: System, values: Values, assembly: Assembly, time: Number) -> Forward:
-    """The walk of `forward` for what the places alone decide: every link is left at rest."""
+    """The walk of `forward` for what the places alone decide: every link is left at rest.
+
+    assembly: of the first modules at least, which are walked.
+    """
     return _walked(system, values, assembly, time, lambda walk, number, pose: walk.stand(number, pose))
 
 
@@ -580,8 +550,8 @@ def _walked(
     walk = start(system, values)
     walk.time = time
     with np.errstate(all="ignore"):
-        for number in range(len(system.plan.modules)):
-            add(walk, number, pose_of(walk, number, assembly[number], time))
+        for number, own in enumerate(assembly):
+            add(walk, number, pose_of(walk, number, own, time))
     return walk
 
 

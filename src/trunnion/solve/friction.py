@@ -13,39 +13,23 @@ happens is reported.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from trunnion.algebra import linalg
-from trunnion.algebra.literal import is_zero
+from trunnion.algebra.literal import plus
 from trunnion.algebra.namespace import Number, apart, looped
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Contact, FrictionProblem, added, largest, total
 
-__all__ = [
-    "Contact",
-    "FrictionMethod",
-    "FrictionProblem",
-    "Settled",
-    "frictionless",
-    "scaled",
-    "settle",
-    "with_own",
-]
+__all__ = ["Contact", "FrictionMethod", "FrictionProblem", "Settled", "frictionless", "scaled", "settle", "with_own"]
 
 OBEYED = 1e-10  # of the largest friction: by how much a friction may miss its law where it is called settled
 SETTLED = 1e-11  # of the largest friction: where the iteration ends
-SLOW = 1e-2  # of the miss: a round of Newton's method that leaves more has another matrix after it
 STUBBORN = 20  # rounds of Newton's method: a lane that takes more goes back and forth between the sides of a kink
-
-
-class Reacting(Protocol):
-    """A module, as far as its reactions go: flat tuples, linear in the loads on its links."""
-
-    def reactions(self, pose: Any, loads: Sequence[Any]) -> Sequence[Reaction]: ...
 
 
 class Settled(NamedTuple):
@@ -71,17 +55,20 @@ class Settled(NamedTuple):
 
 
 def settle(
-    group: Reacting, pose: object, loads: Sequence[Any], contacts: Sequence[Contact], method: FrictionMethod
+    reactions: Callable[[Sequence[Any]], list[Reaction]],
+    loads: Sequence[Any],
+    contacts: Sequence[Contact],
+    method: FrictionMethod,
 ) -> Settled:
-    """Reactions and friction forces of one module under `loads`, friction not included."""
-    start = group.reactions(pose, loads)
+    """Reactions and friction forces of one module, whose reactions to loads are linear, under `loads`."""
+    start = reactions(loads)
     if not contacts:
         return Settled(start, [], 0, 0.0, 0.0, True)
     if method.multiple is not None:
         contacts = [
             contact._replace(share=method.multiple * contact.share) if contact.rubs else contact for contact in contacts
         ]
-    influence = [with_own(contact, list(group.reactions(pose, contact.unit_loads))) for contact in contacts]
+    influence = [with_own(contact, reactions(contact.unit_loads)) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)
     if problem.one_way and method.name == "newton":  # no law looks at what friction changes
         forces = problem.target(problem.state([0.0] * len(contacts)).normals)
@@ -112,28 +99,25 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
     shares: Number = 1.0
     if newton:
         rounds = min(method.limit, STUBBORN)
-        at = _round(real, at, method)
-        # one without the certificate goes no further by itself
-        at = at._replace(done=np.where(certain, at.done, 1.0), rounds=np.where(certain, 1.0, 0.0))
-        at = _rounds(real, at, rounds - 1, method)
+        # one without the certificate goes nowhere by itself
+        at = _rounds(real, at._replace(done=np.where(certain, 0.0, 1.0)), rounds, method)
         left = ~certain
         if method.limit >= STUBBORN:
             left = left | ~((at.done > 0) | _obeyed(real, at))
         if apart(left):
             *forces, shares = real.in_lanes(_followed, left, [*at.forces, 1.0])
             state = real.state(forces)
-            again, gaps = np.where(left, 1.0, 0.0), real.gaps(state, forces)
-            at = at._replace(forces=forces, normals=state.normals, gaps=gaps, excess=np.inf, slow=again, done=1 - again)
+            at = at._replace(forces=forces, normals=state.normals, gaps=real.gaps(state, forces))
+            at = at._replace(done=np.where(left, 0.0, 1.0))
             at = _rounds(real, at, rounds, method)
     else:
         at = _rounds(real, at, method.limit, method)
     converged = (at.done > 0) if method.criterion is not None else _obeyed(real, at)
     forces = at.forces
     if problem.depth:  # Newton's method at the solution gives the derivatives, one level of ε a round
-        derivative = real.map_derivative(real.state(forces, at.normals))
-        inverse = linalg.quick_inverse(_identity_minus(derivative))
+        slopes = real.map_derivative(real.state(forces, at.normals))
         for _ in range(problem.depth):
-            forces = _corrected(forces, problem.gaps(problem.state(forces), forces), inverse)
+            forces = _corrected(forces, problem.gaps(problem.state(forces), forces), slopes)
     return Settled(
         reactions=problem.reactions(forces),
         forces=forces,
@@ -151,32 +135,26 @@ def _iterated(problem: FrictionProblem, method: FrictionMethod) -> Settled:
 class _Iterate(NamedTuple):
     """Where an iteration is: forces, and normal loads and law − force under them.
 
-    inverse: (1 − A)⁻¹ as Newton's method last needed it; excess: miss of the worst law; change: of a normal load in the
-    last round, N; contraction: ∞-norm of that A, or the ratio of the last two changes; slow: 1 where the next round has
-    another A; done: 1 where there is none; rounds: so many were made.
+    change: of a normal load in the last round, N; contraction: ∞-norm of the A of Newton's last round, or the ratio of
+    the last two changes; done: 1 where there is no further round; rounds: so many were made.
     """
 
     forces: list[Number]
     normals: list[Number]
     gaps: list[Number]
-    inverse: Sequence[Sequence[Number]] = ()
-    excess: Number = 1.0  # of no friction at all
     change: Number = np.inf
     contraction: Number = 0.0
-    slow: Number = 1.0
     done: Number = np.float64(0.0)
     rounds: Number = 0.0
 
     def in_row(self) -> list[Number]:
         """Its numbers, as `looped` has them."""
-        rows = (self.forces, self.normals, self.gaps, *self.inverse)
-        return [*(number for row in rows for number in row), *self[4:]]
+        return [*self.forces, *self.normals, *self.gaps, *self[3:]]
 
     def of_row(self, row: Sequence[Number]) -> _Iterate:
         """Such a one with other numbers."""
         n = len(self.forces)
-        lists = [list(row[k : k + n]) for k in range(0, len(row) - 6, n)]
-        return _Iterate(lists[0], lists[1], lists[2], lists[3:], *row[-6:])
+        return _Iterate(list(row[:n]), list(row[n : 2 * n]), list(row[2 * n : 3 * n]), *row[3 * n :])
 
 
 def _obeyed(real: FrictionProblem, at: _Iterate) -> Number:
@@ -196,38 +174,27 @@ def _rounds(real: FrictionProblem, start: _Iterate, rounds: int, method: Frictio
 def _round(real: FrictionProblem, at: _Iterate, method: FrictionMethod) -> _Iterate:
     """One round: [D] steps 2-5, friction from the last loads, or a step of Newton's method.
 
-    Its A is that of the side of each kink on which the normal loads are. It is kept while a round leaves less than a
-    hundredth of the residual, which in all but the worst cases is always; a lane that crosses a kink leaves more and
-    gets the A of its new side. So what a lane comes to does not depend on the lanes beside it. It is done when every
-    friction is what its law says for the load, whatever the last round changed.
+    Its A is that of the side of each kink on which the normal loads are. What a lane comes to does not depend on the
+    lanes beside it. It is done when every friction is what its law says for the load, whatever the last round changed.
     """
-    inverse, contraction, stays = at.inverse, at.contraction, at.done > 0
+    goes_on = ~(at.done > 0)
     if method.name == "newton":
-        slow = at.slow > 0
-        if np.any(slow):
-            rows = real.map_derivative(real.state(at.forces, at.normals))
-            fresh = linalg.quick_inverse(_identity_minus(rows))
-            inverse = [_chosen(slow, *both) for both in zip(fresh, inverse, strict=True)] if inverse else fresh
-            norm = largest([total([np.abs(entry) for entry in row]) for row in rows])
-            (contraction,) = _chosen(slow, [norm], [contraction])
-        forces = _corrected(at.forces, at.gaps, inverse)
+        rows = real.map_derivative(real.state(at.forces, at.normals))
+        forces = _corrected(at.forces, at.gaps, rows)
+        contraction = largest([total([np.abs(entry) for entry in row]) for row in rows])
     else:
         forces = real.target(at.normals)
-    forces = _chosen(~stays, forces, at.forces)
+    forces = _chosen(goes_on, forces, at.forces)
     state = real.state(forces)
     gaps = real.gaps(state, forces)
-    excess = real.excess(gaps, forces)
     change = largest([a - b for a, b in zip(state.normals, at.normals, strict=True)])
     if method.name != "newton":
         measurable = np.isfinite(at.change) & (at.change > 0)
-        ratio = np.where(measurable, change / np.where(measurable, at.change, 1.0), 0.0)
-        (contraction,) = _chosen(~stays, [ratio], [contraction])
+        contraction = np.where(measurable, change / np.where(measurable, at.change, 1.0), 0.0)
     # a lane of NaN has nothing to wait for
-    done = stays | ~(excess > SETTLED if method.criterion is None else change > method.criterion)
-    slow = (excess > SLOW * at.excess) & ~done
-    (change,) = _chosen(~stays, [change], [at.change])
-    flags = slow + 0.0, done + 0.0, at.rounds + ~stays
-    return _Iterate(forces, state.normals, gaps, inverse, excess, change, contraction, *flags)
+    left = real.excess(gaps, forces) > SETTLED if method.criterion is None else change > method.criterion
+    change, contraction = _chosen(goes_on, [change, contraction], [at.change, at.contraction])
+    return _Iterate(forces, state.normals, gaps, change, contraction, 1.0 - (goes_on & left), at.rounds + goes_on)
 
 
 def _chosen(lanes: Number, row: Sequence[Number], others: Sequence[Number]) -> list[Number]:
@@ -235,10 +202,10 @@ def _chosen(lanes: Number, row: Sequence[Number], others: Sequence[Number]) -> l
     return list(row) if np.all(lanes) else [np.where(lanes, a, b) for a, b in zip(row, others, strict=True)]
 
 
-def _corrected(forces: Sequence[Number], gaps: Sequence[Number], inverse: Sequence[Sequence[Number]]) -> list[Number]:
+def _corrected(forces: Sequence[Number], gaps: Sequence[Number], slopes: Sequence[Sequence[Number]]) -> list[Number]:
     """φ + (1 − A)⁻¹ (law − φ)."""
-    moves = [total([entry * part for entry, part in zip(row, gaps, strict=True)]) for row in inverse]
-    return [move if is_zero(force) else force + move for force, move in zip(forces, moves, strict=True)]
+    (moves,) = linalg.solve(_identity_minus(slopes), gaps)
+    return [plus(force, move) for force, move in zip(forces, moves, strict=True)]
 
 
 def _followed(part: FrictionProblem, lanes: Number) -> list[Number]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
+from trunnion.algebra.linalg import weighted
 from trunnion.algebra.literal import is_zero, less, plus, times
 from trunnion.algebra.namespace import Number, apart, namespace
 from trunnion.algebra.nested import replaced
@@ -81,25 +82,16 @@ class Rubbing(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """What one contact feels of the frictionless reactions, and of each friction force of 1 N.
-
-    parts: of each number, what 1 N of a friction force adds to it, with that force's number; literal zeros left out.
-    """
+    """What one contact feels of the frictionless reactions, and of each friction force of 1 N."""
 
     start: Reaction
     columns: list[Reaction]
-    parts: list[list[tuple[int, Number]]]
-
-    @classmethod
-    def of(cls, start: Reaction, columns: list[Reaction]) -> Felt:
-        """With the parts of the columns."""
-        rows = zip(*columns, strict=True)
-        return cls(start, columns, [[(k, entry) for k, entry in enumerate(row) if not is_zero(entry)] for row in rows])
 
     def under(self, forces: Sequence[Number]) -> Reaction:
         """What it is under friction forces."""
-        changes = [total([entry * forces[k] for k, entry in parts]) for parts in self.parts]
-        return added(self.start, tuple(changes))
+        return tuple(
+            plus(n, weighted(row, forces)) for n, row in zip(self.start, zip(*self.columns, strict=True), strict=True)
+        )
 
 
 class State(NamedTuple):
@@ -129,16 +121,14 @@ class FrictionProblem:
     @cached_property
     def numbers(self) -> list[Number]:
         """All numbers of the problem."""
-        found: list[Number] = []
+        numbers: list[Number] = []
 
         def note(number: Number) -> Number:
-            found.append(number)
+            numbers.append(number)
             return number
 
-        for contact in self.contacts:
-            contact.load.mapped(note)
-            found += [contact.slip, contact.resting, contact.share, *contact.parameters.values()]
-        return [*found, *(n for wrenches in (self.start, *self.influence) for wrench in wrenches for n in wrench)]
+        self.mapped(note)
+        return numbers
 
     @cached_property
     def depth(self) -> int:
@@ -174,7 +164,7 @@ class FrictionProblem:
     def felt(self) -> list[Felt]:
         """What the load of each contact makes of the reactions of its joint: only that is followed in the iteration."""
         joints = [(contact.load.felt, contact.joint) for contact in self.contacts]
-        return [Felt.of(felt(self.start[k]), [felt(column[k]) for column in self.influence]) for felt, k in joints]
+        return [Felt(felt(self.start[k]), [felt(column[k]) for column in self.influence]) for felt, k in joints]
 
     @cached_property
     def one_way(self) -> bool:
@@ -190,7 +180,7 @@ class FrictionProblem:
         if all(is_zero(force) for force in forces):
             return list(self.start)
         joints = enumerate(self.start)
-        return [Felt.of(start, [column[k] for column in self.influence]).under(forces) for k, start in joints]
+        return [Felt(start, [column[k] for column in self.influence]).under(forces) for k, start in joints]
 
     def state(self, forces: Sequence[Number], normals: list[Number] | None = None) -> State:
         """Reactions and normal loads at the contacts under friction forces. normals: where they are known."""
@@ -232,13 +222,8 @@ class FrictionProblem:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
         for contact, felt, slope, *at in zip(self.contacts, self.felt, self.slopes, *state, strict=True):
-            row: list[list[Number]] = [[] for _ in self.contacts]
-            for entry, parts in zip(contact.load.gradient(*at), felt.parts, strict=True):
-                if not is_zero(entry):
-                    rate = slope * entry
-                    for k, part in parts:
-                        row[k].append(rate * part)
-            rows.append([total(summands) for summands in row])
+            rates = [times(slope, entry) for entry in contact.load.gradient(*at)]
+            rows.append([weighted(rates, column) for column in felt.columns])
         return rows
 
     def bound(self, multiples: Sequence[float] | None = None) -> Number:

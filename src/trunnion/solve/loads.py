@@ -21,24 +21,10 @@ from trunnion.solve.forward import Assembly, Forward, Vector, forward, start
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "NOTHING_USEFUL",
-    "STATE_USEFUL",
-    "LoadAction",
-    "Share",
-    "SpringState",
-    "Stated",
-    "Switch",
-    "has_useful_work",
-    "losses",
-    "placed",
-    "spring_state",
-    "springs",
-    "stated_loads",
-    "stated_walk",
-    "useful_loads",
-    "useful_powers",
+    "NOTHING_USEFUL", "STATE_USEFUL", "LoadAction", "Share", "SpringState", "Stated", "Switch", "has_useful_work",
+    "losses", "placed", "spring_state", "springs", "stated_loads", "stated_walk", "useful_loads", "useful_powers",
     "useful_springs",
-]
+]  # fmt: skip
 
 
 NOTHING_USEFUL = "there is no load, and no spring is marked useful"  # so that an efficiency is undefined

@@ -59,14 +59,14 @@ def _together(back: Backward, count: int) -> FrictionProblem:
     bare, flows = Backward(walk, dict(back.stated)), list[Backward]()  # without friction, and 1 N of each friction
     contacts, start, influence = list[Contact](), list[Reaction](), list[list[Reaction]]()
     for number, rubbed in zip(reversed(range(len(walk.poses))), back.rubbed[:count], strict=False):
-        group, links = walk.reacting(walk.system.groups[number]), walk.system.plan.modules[number].links
+        links = walk.system.plan.modules[number].links
         before = len(start)
         for total, flow in [(start, bare), *zip(influence, flows, strict=True)]:
-            reactions = group.reactions(walk.poses[number], [flow.loads[link] for link in links])
+            reactions = walk.reactions(number, [flow.loads[link] for link in links])
             total += reactions
             pass_on(flow, number, reactions, (), ())
         for contact, rub in rubbed:
-            column = with_own(contact, list(group.reactions(walk.poses[number], contact.unit_loads)))
+            column = with_own(contact, walk.reactions(number, contact.unit_loads))
             flows.append(Backward(walk, unloaded(walk)))
             pass_on(flows[-1], number, column, [(contact, rub)], [1.0])
             influence.append([(0.0,) * len(reaction) for reaction in start[:before]] + column)

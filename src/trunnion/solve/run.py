@@ -22,9 +22,9 @@ from trunnion.solve.bristles import History, histories
 from trunnion.solve.forward import Forward, Travel, forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import in_blocks, keep_pages
-from trunnion.solve.seats import GivenSeat, seats
+from trunnion.solve.shifts import GivenSeat, seats
 from trunnion.solve.space.determinacy import Determinacy, look
-from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, parted, stated_bends
+from trunnion.solve.switches import Bend, Mechanisms, accuracy_of, breaks_between, stated_bends
 from trunnion.solve.system import COMMON_TURNS, Cycle, System, Values, build
 
 __all__ = ["Run", "prepare"]
@@ -48,14 +48,19 @@ class Run:
         time: Number,
         values: Values | None = None,
         method: FrictionMethod | None = None,
-        zero_slip: Mapping[str, Sense] | None = None,
+        given: Given | None = None,
+        past: Mapping[str, History] | None = None,
     ) -> Backward:
         """Motion and forces at the given times (s), nominal or with other values; see `backward.solve`.
 
-        zero_slip: see `backward.Given`.
+        past: of the bristles of joints; that with these values if not given.
         """
         values = self.values if values is None else values
-        return self._solve(time, values, method, Given(zero_slip or {}), self._bristles(values))
+        if past is None:
+            past = self._past if values is self.values else self._histories(values)
+        deflections = {joint: history.at(time) for joint, history in past.items()}
+        given = replace(given or Given(), deflections=deflections)
+        return solve(self.system, values, self.chosen.assembly, time, method, given)
 
     def walk(self, time: Number) -> Forward:
         """Motion alone at the given times (s)."""
@@ -72,26 +77,19 @@ class Run:
     ) -> Backward:
         """Motion and forces at the given times (s) with the pins at offsets in their holes, as they travel there."""
         given = Given(zero_slip or {}, travel=travel or {}, rests=rests or {})
-        return self._solve(time, {**self.values, **offsets}, method, given, self._past)
+        return self.solve(time, {**self.values, **offsets}, method, given, self._past)
 
     def ideal(self, time: Number, method: FrictionMethod | None = None) -> Backward:
         """Motion and forces at the given times (s) without errors and with every pin in the middle of its hole."""
-        past = self.once("bristles without errors", lambda: self._bristles(self.ideal_values))
-        return self._solve(time, self.ideal_values, method, Given(), past)
-
-    def _solve(
-        self, time: Number, values: Values, method: FrictionMethod | None, given: Given, past: Mapping[str, History]
-    ) -> Backward:
-        deflections = {joint: history.at(time) for joint, history in past.items()}
-        return solve(self.system, values, self.chosen.assembly, time, method, replace(given, deflections=deflections))
-
-    def _bristles(self, values: Values) -> dict[str, History]:
-        """Histories of the bristles; those of the nominal values are found once."""
-        return self._past if values is self.values else self._histories(values)
+        return self.solve(time, self.ideal_values, method, None, self._ideal_past)
 
     @functools.cached_property
     def _past(self) -> dict[str, History]:
         return self._histories(self.values)
+
+    @functools.cached_property
+    def _ideal_past(self) -> dict[str, History]:
+        return self._past if self.ideal_values is self.values else self._histories(self.ideal_values)
 
     @np.errstate(all="ignore")
     def _histories(self, values: Values) -> dict[str, History]:
@@ -111,24 +109,20 @@ class Run:
     @functools.cached_property
     def seats(self) -> list[GivenSeat]:
         """Joints whose pins lie in seats that are given or follow the load."""
-        return seats(self.system, self.values)
-
-    @functools.cached_property
-    def edges(self) -> NDArray[np.float64]:
-        """Times, s, from the start to the end of the cycle, between which its forces are smooth; see `switches`."""
-        return parted(np.array([one.time for one in self.bends], float), self.cycle)
+        return seats(self.system.mechanism, self.values)
 
     @functools.cached_property
     def bends(self) -> list[Bend]:
         """Where in the cycle its forces may jump or bend as the model says it, in no order; see `switches`."""
-        return stated_bends(Mechanisms(self.system, self.chosen.assembly, self.values, [self.cycle]))
+        return self._bends(self.values)
 
     @functools.cached_property
     def ideal_bends(self) -> list[Bend]:
         """The same of the mechanism without errors."""
-        if self._ideal_values is None:
-            return self.bends
-        return stated_bends(Mechanisms(self.system, self.chosen.assembly, self._ideal_values, [self.cycle]))
+        return self.bends if self.ideal_values is self.values else self._bends(self.ideal_values)
+
+    def _bends(self, values: Values) -> list[Bend]:
+        return stated_bends(Mechanisms(self.system, self.chosen.assembly, values, [self.cycle]))
 
     @np.errstate(all="ignore")
     def courses(
@@ -158,22 +152,17 @@ class Run:
         in_parts = in_blocks(look if moves else lambda time: look(0.0 * time), joints or len(self.system.joints))
         return Courses.of(in_parts, breaks, like, accuracy_of(self.cycle, accuracy or Accuracy()))
 
-    @property
-    def ideal_values(self) -> Values:
-        """The numbers of the mechanism without errors."""
-        return self.values if self._ideal_values is None else self._ideal_values
-
     @functools.cached_property
-    def _ideal_values(self) -> Values | None:
-        """The numbers of the ideal mechanism; None if they are those of the mechanism itself."""
+    def ideal_values(self) -> Values:
+        """The numbers of the mechanism without errors; its own, the very same, if it has none."""
         ideal = self.system.mechanism.ideal_parameters()
         same = all(value is self.values[path] or value == self.values[path] for path, value in ideal.items())
-        return None if same else ideal
+        return self.values if same else ideal
 
     @functools.cached_property
     def erring(self) -> bool:
         """Whether it is another mechanism than the ideal one."""
-        return bool(self.seats) or self._ideal_values is not None
+        return bool(self.seats) or self.ideal_values is not self.values
 
     @functools.cached_property
     def determinacy(self) -> Determinacy | None:
@@ -198,18 +187,15 @@ def prepare(mechanism: Mechanism, free: bool = False) -> Run:
 
 def _prepared(mechanism: Mechanism, free: bool) -> Run:
     keep_pages()
-    system = build(mechanism)
-    values = mechanism.parameters()
-    cycle = system.cycle(values, None, free)
-    run = Run(system, values, cycle, choose(system, values, cycle))
-    turns = _unknown_turns(run)
-    if any(turns.values()):
-        cycle = system.cycle(values, turns, free)
-        run = Run(system, values, cycle, choose(system, values, cycle))
-    if not _comes_back(run):
-        cycle = replace(cycle, periodic=False, advances=True)
-        run = Run(system, values, cycle, choose(system, values, cycle))
-    return run
+    system, values = build(mechanism), mechanism.parameters()
+
+    def over(cycle: Cycle) -> Run:
+        return Run(system, values, cycle, choose(system, values, cycle))
+
+    run = over(system.cycle(values, None, free))
+    if any((turns := _unknown_turns(run)).values()):
+        run = over(system.cycle(values, turns, free))
+    return run if _comes_back(run) else over(replace(run.cycle, periodic=False, advances=True))
 
 
 def _comes_back(run: Run) -> bool:

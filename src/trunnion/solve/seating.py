@@ -27,10 +27,9 @@ from trunnion.algebra.namespace import Number
 from trunnion.algebra.nested import each, flat
 from trunnion.algebra.panels import FIT, ORDER, POINTS
 from trunnion.joints.clearance import pressed, turned_by_friction
-from trunnion.solve import forward as kinematics
 from trunnion.solve.backward import Backward, Sense
 from trunnion.solve.end_loads import NO_LOAD, EndLoads, end_loads, loads_of, plain, reactions
-from trunnion.solve.forward import Travel
+from trunnion.solve.forward import Travel, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.switches import accuracy_of, breaks_between
 from trunnion.solve.system import Values
@@ -408,16 +407,9 @@ def _share(back: Backward, joint: str) -> Number | None:
 
 def _added_twists(run: Run, values: Values, time: Array) -> dict[str, Any]:
     """Twist of every link by the ε parts of the values; poses alone are worked out."""
-    system = run.system
-    walk = kinematics.start(system, values)
-    walk.time = time
-    twists: dict[str, Any] = {}
-    still = walk.motions[system.mechanism.fixed_link]
-    for number, module in enumerate(system.plan.modules):
-        pose = kinematics.pose_of(walk, number, run.chosen.assembly[number], time)
-        for link, frame in zip(module.links, pose.frames, strict=True):
-            twists[link] = walk.frame_rate(frame)
-            walk.motions[link] = still._replace(frame=frame)
+    walk = posed(run.system, values, run.chosen.assembly, time)
+    links = [link for link in walk.motions if link != run.system.mechanism.fixed_link]
+    twists = {link: walk.frame_rate(walk.motions[link].frame) for link in links}
+    for number, pose in enumerate(walk.poses):
         twists.update(walk.unspun(number, pose, twists))
-        walk.poses.append(pose)
     return twists

@@ -1,4 +1,4 @@
-"""Errors of a joint as shifts of its hole: misalignment that is stated, and play where a seat is known.
+"""Errors of a joint as shifts of its hole: misalignment that is stated, and play where a seat is given or known.
 
 The second element of a joint is the hole's frame. An error moves it before the pair does, S → S Â, so modules meet
 only another local element. Where the numbers of a seat are among the values (`seats.JOINT.1.x` …, see `clearance`)
@@ -17,18 +17,19 @@ from trunnion.algebra import plane, space
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.errors import Finding
-from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, leaning
+from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, described, leaning, pressed
 from trunnion.model.contact import clearance
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
 
 __all__ = [
-    "CARRIERS", "HOLE", "Play", "carriers_of", "hole", "journaled", "misaligned", "play_of", "seated",
-    "unstated_length",
+    "CARRIERS", "HOLE", "PIN", "GivenSeat", "Play", "carriers_of", "given_offsets", "hole", "misaligned", "play_of",
+    "seated", "seats", "unstated_length",
 ]  # fmt: skip
 
 Values = Mapping[str, Number]
+Vector = tuple[Number, ...]
 ALGEBRAS: dict[str, Any] = {"planar": plane, "spatial": space}
 HOLE, PIN = "seats", "journals"
 CARRIERS = (HOLE, PIN)  # under which the numbers of a seat stand: carried by the link of the hole, or of the pin
@@ -53,6 +54,45 @@ def play_of(space: str, kind: str, values: Values, joint: str) -> Play | None:
     radius = (own if own is not None else 0.0) + values.get(f"{path}.pin.cylindricity", 0.0)
     radii = tuple(0.5 * floats if i in model.axial else radius for i in range(len(model.ends)))
     return Play(model, radii, length_of(model, values, joint))
+
+
+class GivenSeat(NamedTuple):
+    """A joint whose pin does not lie in the middle of its hole: its play, and the offsets at its ends if given."""
+
+    joint: str
+    play: Play
+    given: list[Vector] | None
+
+
+def seats(mechanism: Mechanism, values: Values) -> list[GivenSeat]:
+    """The joints whose seat is given or follows the load."""
+    plays = (
+        (joint, stated, play_of(mechanism.space, mechanism.effective_joints[joint].type, values, joint))
+        for joint, stated in mechanism.seated.items()
+    )
+    return [
+        GivenSeat(joint, play, None if isinstance(stated, str) else given_offsets(values, joint, play))
+        for joint, stated, play in plays if play is not None
+    ]  # fmt: skip
+
+
+def given_offsets(values: Values, joint: str, play: Play) -> list[Vector]:
+    """Offsets of a seat that is stated: by β and ξ of a pin, of a guide from its normal, by a direction of a ball."""
+    path = f"joints.{joint}.seat"
+    offsets: list[Vector] = []
+    for end, radius in zip(play.model.ends, play.radii, strict=True):
+        if len(end) == 3:
+            offsets.append(pressed(tuple(values[f"{path}.direction.{axis}"] for axis in "xyz"), radius))
+            continue
+        both = described(radius, values.get(f"{path}.beta", 0.0), values.get(f"{path}.xi", 0.0))
+        place = both[1 if end[0].startswith("2") else 0]
+        if len(end) == 2:
+            offsets.append(place)
+        elif end[0].startswith("3"):  # nothing is said of the end float
+            offsets.append((0.0,))
+        else:  # the guide of a plane counts ξ from its normal
+            offsets.append((place[1 if end[0].endswith("y") and len(play.model.ends) > 2 else 0],))
+    return offsets
 
 
 def carriers_of(mechanism: Mechanism, joint: str) -> tuple[str, ...]:
@@ -85,8 +125,8 @@ def unstated_length(joint: str, play: Play) -> list[Finding]:
     return [Finding(what, f"joints.{joint}.{part}", f"state joints.{joint}.{part}.{keys[0]}")]
 
 
-def hole(frame: space.Frame, values: Values, joint: str) -> space.Frame:
-    """The frame of the hole in space: the second element, moved along its axis by the offset of the pin."""
+def hole(frame: Any, values: Values, joint: str) -> Any:
+    """The frame of the hole: the second element, moved along its axis by the offset of the pin."""
     offset = values.get(f"joints.{joint}.pin.offset")
     return frame if offset is None else space.slid(frame, offset)
 
@@ -94,62 +134,40 @@ def hole(frame: space.Frame, values: Values, joint: str) -> space.Frame:
 def misaligned(of: str, frame: Any, values: Values, joint: str) -> Any:
     """The second element of a joint with the misalignment of its axis, in the plane with its offset alone.
 
-    of: "planar" or "spatial".
+    Leaned by `tilt` towards the direction `towards`, moved by `offset` along `offset_towards`, in the hole's frame. of:
+    "planar" or "spatial".
     """
-    if not _leans(values, joint):
+    path = f"joints.{joint}.misalignment"
+    tilt, offset = values.get(f"{path}.tilt", 0.0), values.get(f"{path}.offset", 0.0)
+    if all(isinstance(number, int | float) and number == 0 for number in (tilt, offset)):
         return frame
-    local = _misalignment(values, joint)
+    towards = values.get(f"{path}.towards", 0.0)
+    aside = values.get(f"{path}.offset_towards", towards)
+    xp = namespace(tilt, towards, offset, aside)
+    place = (offset * xp.cos(aside), offset * xp.sin(aside))
     if of == "planar":
-        return plane.compose(frame, plane.Frame(local.place[0], local.place[1]))
-    return _in_hole(of, frame, values, joint, lambda middle: space.compose(middle, local))
+        return plane.compose(frame, plane.Frame(*place))
+    slope = xp.sin(tilt) / xp.cos(tilt)
+    local = leaning((slope * xp.cos(towards), slope * xp.sin(towards)), 0.0, place)
+    return _in_hole(frame, values, joint, lambda middle: space.compose(middle, local))
 
 
-def seated(of: str, frame: Any, kind: str, values: Values, joint: str) -> Any:
-    """The second element of a joint where its pin lies in the hole."""
-    local = _lain(of, kind, values, HOLE, joint)
-    if local is None:
-        return frame
-    return _in_hole(of, frame, values, joint, lambda middle: ALGEBRAS[of].compose(middle, local))
+def seated(of: str, frame: Any, kind: str, values: Values, joint: str, carrier: str = HOLE) -> Any:
+    """An element of a joint where its pin lies in the hole, if the link of that element carries the seat.
 
-
-def journaled(of: str, frame: Any, kind: str, values: Values, joint: str) -> Any:
-    """The first element of a joint whose pin carries the seat: the hole lies off it the other way."""
-    local = _lain(of, kind, values, PIN, joint)
-    if local is None:
-        return frame
-    return _in_hole(of, frame, values, joint, lambda middle: ALGEBRAS[of].relative(middle, local))
-
-
-def _lain(of: str, kind: str, values: Values, carrier: str, joint: str) -> Any:
-    """The pin's frame in the hole's, of the seat that a link carries; None if it carries none."""
+    That is the second one if the link of the hole does, the first if that of the pin does: then the hole lies off it
+    the other way.
+    """
     model = CLEARANCE_MODELS[of].get(kind)
     offsets = model.offsets(values, f"{carrier}.{joint}") if model else None
     if model is None or offsets is None:
-        return None
-    return ALGEBRAS[of].Frame(*model.shift(offsets, length_of(model, values, joint)))
+        return frame
+    local = ALGEBRAS[of].Frame(*model.shift(offsets, length_of(model, values, joint)))
+    lay = ALGEBRAS[of].compose if carrier == HOLE else ALGEBRAS[of].relative
+    return _in_hole(frame, values, joint, lambda middle: lay(middle, local))
 
 
-def _in_hole(of: str, frame: Any, values: Values, joint: str, move: Callable[[Any], Any]) -> Any:
-    """An element, moved at the middle of the hole; in the plane that is at its point."""
-    offset = values.get(f"joints.{joint}.pin.offset") if of == "spatial" else None
+def _in_hole(frame: Any, values: Values, joint: str, move: Callable[[Any], Any]) -> Any:
+    """An element, moved at the middle of the hole; in the plane, where no bearing has an offset, that is its point."""
+    offset = values.get(f"joints.{joint}.pin.offset")
     return move(frame) if offset is None else space.slid(move(space.slid(frame, offset)), -offset)
-
-
-def _leans(values: Values, joint: str) -> bool:
-    """Whether a misalignment is stated that may be other than 0."""
-    path = f"joints.{joint}.misalignment"
-    numbers = (values.get(f"{path}.{key}", 0.0) for key in ("tilt", "offset"))
-    return any(not (isinstance(number, int | float) and number == 0) for number in numbers)
-
-
-def _misalignment(values: Values, joint: str) -> space.Frame:
-    """Leaned by `tilt` towards the direction `towards`, moved by `offset` along `offset_towards`, in the hole's
-    frame.
-    """
-    path = f"joints.{joint}.misalignment"
-    tilt, towards = values.get(f"{path}.tilt", 0.0), values.get(f"{path}.towards", 0.0)
-    offset, aside = values.get(f"{path}.offset", 0.0), values.get(f"{path}.offset_towards", towards)
-    xp = namespace(tilt, towards, offset, aside)
-    slope = xp.sin(tilt) / xp.cos(tilt)
-    place = (offset * xp.cos(aside), offset * xp.sin(aside))
-    return leaning((slope * xp.cos(towards), slope * xp.sin(towards)), 0.0, place)

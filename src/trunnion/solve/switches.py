@@ -9,9 +9,9 @@ two places of it - and located to rounding. What no model states, such as a guid
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +28,8 @@ from trunnion.solve.loads import Stated, Switch, placed, stated_walk
 from trunnion.solve.system import Cycle, System, Values, rubbing
 
 __all__ = [
-    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "edges", "knots_of",
-    "parted", "shifts_of", "stated_bends", "tracked",
+    "MARGINS", "SEATED", "Bend", "Mechanisms", "accuracy_of", "bends", "breaks_between", "knots_of", "shifts_of",
+    "stated_bends", "tracked",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -80,9 +80,6 @@ class Mechanisms:
         return np.broadcast_to(np.asarray(primal(number), float), (len(self.cycles), 1))[:, 0]
 
 
-Look = Callable[[Forward], Iterator[Switch]]
-
-
 class Bend(NamedTuple):
     """A time, s, at which forces may jump or bend; by which scan, which function of it passes which level there.
 
@@ -96,34 +93,51 @@ class Bend(NamedTuple):
 
 
 class _Scan(NamedTuple):
-    """How switches are worked out: a walk at the times of some mechanisms, and what is read from it."""
+    """Numbers of a walk that pass levels: what is read of it, and at how many places of a turn it is looked at."""
 
     walk: Callable[[System, Values, Assembly, Number], Forward]
-    look: Look
-    wanted: Callable[[System], bool]
+    look: Callable[[Forward], Iterator[Switch]]
     places: int
     noise: float
 
+    def switches(self, of: Mechanisms, rows: Rows, times: Array) -> list[Switch]:
+        """The switches of some mechanisms, a lane each, at times, (lane, place), s."""
+        return list(self.look(self.walk(of.system, of.picked(rows), of.assembly, of.lanes(times))))
 
-def edges(of: Mechanisms) -> list[Array]:
-    """Times, s, of every mechanism between which its forces are smooth as far as the model says it, both ends included.
+    def number(self, of: Mechanisms, rows: Rows, function: Rows, time: Array) -> Array:
+        """The number of one switch of each of some mechanisms at one time, s; (lane,)."""
+        numbers = [of.shaped(switch.number, time[:, None]) for switch in self.switches(of, rows, time[:, None])]
+        return np.asarray(np.array(numbers)[function, np.arange(len(rows)), 0])
 
-    No two are farther apart than a PANELS-th of a turn.
-    """
-    return [parted(times, cycle) for times, cycle in zip(bends(of), of.cycles, strict=True)]
+
+def _scans(system: System) -> list[_Scan]:
+    """One of the numbers that the model states by the motion, one of the motion itself, as far as there are such."""
+    scans, springs = [], system.mechanism.springs.values()
+    if any(entry.varies for entry in system.mechanism.parameter_set.entries.values()):
+        quiet = NOISE if placed(system.mechanism) else 0.0
+        scans.append(_Scan(stated_walk, lambda walk: Stated(walk).switches(), STATED_SCANNED, quiet))
+    if _followed(system) or any(_lets_go(system, spring) for spring in springs):
+        scans.append(_Scan(forward, _of_motion, SCANNED, NOISE))
+    return scans
 
 
 def bends(of: Mechanisms) -> list[Array]:
     """Times, s, of every mechanism at which its forces may jump or bend, in no order."""
-    found: list[list[float]] = [[] for _ in of.cycles]
-    for row, one in _bends(of):
-        found[row].append(one.time)
-    return [np.array(times, float) for times in found]
+    times: list[list[float]] = [[] for _ in of.cycles]
+    for row, bend in _bends(of):
+        times[row].append(bend.time)
+    return [np.array(own, float) for own in times]
 
 
 def stated_bends(of: Mechanisms) -> list[Bend]:
     """Where the forces of one mechanism may jump or bend, with what it is that does, so that it can be `tracked`."""
-    return [one for _, one in _bends(of)]
+    return [bend for _, bend in _bends(of)]
+
+
+def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
+    yield from ((row, Bend(moment)) for row, moment in knots_of(of))
+    for k, scan in enumerate(_scans(of.system)):
+        yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
 
 
 def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Array], Number]) -> Array:
@@ -131,29 +145,16 @@ def tracked(of: Mechanisms, known: Sequence[Bend], moved: Callable[[Values, Arra
 
     They are times of the one, `moved` to those of the others by their values; cycles: that of the one, for each.
     """
-    cycle, count, found = of.cycles[0], len(of.cycles), np.tile([one.time for one in known], (len(of.cycles), 1))
-    for k, scan in enumerate(_scans(of.system)):
-        own = np.flatnonzero([one.scan == k for one in known])
-        if not len(own):
-            continue
-        rows, which = np.repeat(np.arange(count), len(own)), np.tile(own, count)
-        bend = [known[i] for i in own.tolist()]
-        widths = np.array([_width(one, known, cycle) for one in bend])
-        function, level = (np.tile([one[i] for one in bend], count) for i in (2, 3))
-
-        def values(rows: Rows, times: Array, scan: _Scan = scan) -> Array:
-            times = times % cycle.duration if cycle.periodic else np.clip(times, 0.0, cycle.duration)
-            own = of.picked(rows)
-            walk = scan.walk(of.system, own, of.assembly, of.lanes(np.asarray(primal(moved(own, times)), float)))
-            return np.stack([of.shaped(switch.number, times) for switch in scan.look(walk)])
-
-        low, high = (found[rows, which] + way * np.tile(widths, count) for way in (-1.0, 1.0))
-        lanes = np.arange(len(rows))
-        ends = [values(rows, time[:, None])[function, lanes, 0] for time in (low, high)]
-        passed = (ends[0] >= level) != (ends[1] >= level)
-        crossing = _Crossing(rows, function, level, low, high, *ends)
-        found[rows, which] = np.where(passed, _located(crossing, values, np.full(len(rows), cycle.duration)), np.nan)
-    return found
+    cycle, tracks = of.cycles[0], np.tile([bend.time for bend in known], (len(of.cycles), 1))
+    widths, levels = np.array([_width(bend, known, cycle) for bend in known]), np.array([bend.level for bend in known])
+    for scan, rows, function, which in _by_scan(of, known):
+        number = partial(_moved, of, scan, moved, rows, function)
+        low, high = (tracks[rows, which] + way * widths[which] for way in (-1.0, 1.0))
+        crossing = _Crossing(rows, function, levels[which], low, high, number(low), number(high))
+        passed = (crossing.at_low >= crossing.level) != (crossing.at_high >= crossing.level)
+        times = _located(crossing, number, np.full(len(rows), cycle.duration))
+        tracks[rows, which] = np.where(passed, times, np.nan)
+    return tracks
 
 
 def shifts_of(
@@ -167,62 +168,43 @@ def shifts_of(
 
     What passes its level there goes on to do so: to first order δt = −δg/(∂g/∂t), g being its number.
     """
-    cycle, found = of.cycles[0], np.zeros(times.shape)
-    for k, scan in enumerate(_scans(of.system)):
-        own = np.flatnonzero([one.scan == k for one in known])
-        if not len(own):
-            continue
-        rows, which = np.repeat(np.arange(len(times)), len(own)), np.tile(own, len(times))
-        function, time = np.array([known[i].function for i in which]), times[rows, which][:, None]
-
-        def number(
-            values: Values, time: Array, scan: _Scan = scan, rows: Rows = rows, function: Rows = function
-        ) -> Array:
-            own = replace(of, values=values).picked(rows)
-            time = time % cycle.duration if cycle.periodic else np.clip(time, 0.0, cycle.duration)
-            walk = scan.walk(of.system, own, of.assembly, of.lanes(np.asarray(primal(moved(own, time)), float)))
-            numbers = [of.shaped(switch.number, time) for switch in scan.look(walk)]
-            return np.array([numbers[k][lane, 0] for lane, k in enumerate(function)])
-
+    shifts, step = np.zeros(times.shape), SLOPED * of.cycles[0].duration
+    for scan, rows, function, which in _by_scan(of, known):
+        time = times[rows, which]
+        below, here, above = (
+            partial(_moved, replace(of, values=own), scan, moved, rows, function)
+            for own in (sides[0], of.values, sides[1])
+        )
         # on both sides in time too, as what is noise beside its own size counts as zero
-        step = SLOPED * cycle.duration
-        change = [sum(sign * number(values, time + way) for values, sign in zip(sides, (-0.5, 0.5), strict=True))
-                  for way in (-step, step)]  # fmt: skip
-        rate = (number(of.values, time + step) - number(of.values, time - step)) / (2 * step)
-        found[rows, which] = -(change[0] + change[1]) / rate
-    return found
+        change = [above(moment) - below(moment) for moment in (time - step, time + step)]
+        rate = (here(time + step) - here(time - step)) / (2 * step)
+        shifts[rows, which] = -(change[0] + change[1]) / 2 / rate
+    return shifts
+
+
+def _by_scan(of: Mechanisms, known: Sequence[Bend]) -> Iterator[tuple[_Scan, Rows, Rows, Rows]]:
+    """Of every scan the mechanisms, lane by lane, and the functions and numbers of its bends among those known."""
+    functions = np.array([bend.function for bend in known])
+    for k, scan in enumerate(_scans(of.system)):
+        own = np.flatnonzero([bend.scan == k for bend in known])
+        which = np.tile(own, len(of.cycles))
+        if len(own):
+            yield scan, np.repeat(np.arange(len(of.cycles)), len(own)), functions[which], which
+
+
+def _moved(
+    of: Mechanisms, scan: _Scan, moved: Callable[[Values, Array], Number], rows: Rows, function: Rows, time: Array
+) -> Array:
+    """Numbers of a scan at times of the cycle of one mechanism that are moved to those of each."""
+    cycle = of.cycles[0]
+    time = time % cycle.duration if cycle.periodic else np.clip(time, 0.0, cycle.duration)
+    return scan.number(of, rows, function, np.asarray(primal(moved(of.picked(rows), time[:, None])), float)[:, 0])
 
 
 def _width(of: Bend, known: Sequence[Bend], cycle: Cycle) -> float:
     """How far to either side of a bend it is looked for in other mechanisms, s: not beyond the next one of its kind."""
-    like = [abs(one.time - of.time) / 2 for one in known if one[1:3] == of[1:3] and one is not of]
+    like = [abs(bend.time - of.time) / 2 for bend in known if bend[1:3] == of[1:3] and bend is not of]
     return min(cycle.duration / (TRACKED * max(1.0, cycle.turns)), *like, cycle.duration)
-
-
-def _scans(system: System) -> tuple[_Scan, _Scan]:
-    quiet = NOISE if placed(system.mechanism) else 0.0
-    return (
-        _Scan(stated_walk, lambda walk: Stated(walk).switches(), _varies, STATED_SCANNED, quiet),
-        _Scan(forward, _of_motion, _switches, SCANNED, NOISE),
-    )
-
-
-def _bends(of: Mechanisms) -> Iterator[tuple[int, Bend]]:
-    yield from ((row, Bend(moment)) for row, moment in knots_of(of))
-    for k, scan in enumerate(_scans(of.system)):
-        yield from ((row, Bend(time, k, function, level)) for row, time, function, level in _passages(of, scan))
-
-
-def parted(times: Array, cycle: Cycle) -> Array:
-    """Edges from the times of the bends: rising, those that are one taken once, wide gaps parted evenly."""
-    times = np.sort(np.concatenate([[0.0, cycle.duration], times[(times >= 0) & (times <= cycle.duration)]]))
-    kept = times[np.append(np.diff(times) > CLOSE * cycle.duration, True)]
-    kept[0] = 0.0
-    widest = cycle.duration / min(PANELS * max(1.0, np.ceil(cycle.turns - 1e-9)), MOST_EDGES)
-    counts = np.ceil(np.diff(kept) / widest * (1 - 1e-9)).astype(int)
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    parts = within * np.repeat(np.diff(kept) / counts, counts) + np.repeat(kept[:-1], counts)
-    return np.append(parts, kept[-1])
 
 
 def breaks_between(cycle: Cycle, times: Array, start: float = 0.0, end: float | None = None) -> Array:
@@ -272,16 +254,6 @@ def _of_motion(walk: Forward) -> Iterator[Switch]:
         yield from (Switch(elongation) for spring, elongation in elongations if _lets_go(walk.system, spring))
 
 
-def _varies(system: System) -> bool:
-    """Whether any number of the model varies with the motion."""
-    return any(entry.varies for entry in system.mechanism.parameter_set.entries.values())
-
-
-def _switches(system: System) -> bool:
-    """Whether anything in the mechanism switches as it moves."""
-    return bool(_followed(system)) or any(_lets_go(system, spring) for spring in system.mechanism.springs.values())
-
-
 def _followed(system: System) -> list[str]:
     """Joints whose sense of motion decides a friction or a load."""
     return list(dict.fromkeys([*rubbing(system), *system.resisted]))
@@ -297,7 +269,7 @@ def _lets_go(system: System, spring: Spring) -> bool:
 
 
 class _Crossing(NamedTuple):
-    """A function that passes a level between two times, with its values there; one entry each."""
+    """Functions that pass a level between two times, with their values there; one entry each."""
 
     row: Rows
     function: Rows
@@ -311,105 +283,71 @@ class _Crossing(NamedTuple):
 def _passages(of: Mechanisms, scan: _Scan) -> Iterator[tuple[int, float, int, float]]:
     """(mechanism, time, function, level) of every passage that a scan shows."""
     duration = np.array([cycle.duration for cycle in of.cycles])
-    turns = max(cycle.turns for cycle in of.cycles)
-    count = int(min(scan.places * max(1.0, np.ceil(turns - 1e-9)), MOST_SCANNED))
-    time = duration[:, None] * np.linspace(0.0, 1.0, count + 1)
-    if not scan.wanted(of.system):
-        return
-
-    def look(rows: Rows, times: Array) -> list[Switch]:
-        return list(scan.look(scan.walk(of.system, of.picked(rows), of.assembly, of.lanes(times))))
-
-    switches = look(np.arange(len(duration)), time)
+    turns = max(1.0, np.ceil(max(cycle.turns for cycle in of.cycles) - 1e-9))
+    time = duration[:, None] * np.linspace(0.0, 1.0, int(min(scan.places * turns, MOST_SCANNED)) + 1)
+    switches = scan.switches(of, np.arange(len(duration)), time)
     if not switches:
         return
-
-    def values(rows: Rows, times: Array) -> Array:
-        return np.stack([of.shaped(switch.number, times) for switch in look(rows, times)])
-
-    courses = np.stack([of.shaped(switch.number, time) for switch in switches])
+    courses = np.array([of.shaped(switch.number, time) for switch in switches])
     noise = scan.noise * np.nanmax(np.abs(np.nan_to_num(courses)), axis=-1, keepdims=True)
     courses = np.where(np.abs(courses) <= noise, 0.0, courses)
-    found: list[tuple[float, ...]] = []
+    single = np.array([len(switch.levels) == 1 for switch in switches])
+    crossings = [_dips(single, courses, time, partial(scan.number, of))]
     for k, (switch, course) in enumerate(zip(switches, courses, strict=True)):
-        if len(switch.levels) == 1 and switch.period is None:
-            found += _passed_once(course, of.row(switch.levels[0]), time, k)
-            continue
-        for row in range(len(duration)):
-            levels = _levels(of, switch, row, course[row])
-            found += [(row, k, *one) for one in _passed(course[row], levels, time[row])]
-    dips = list(_dips(switches, courses, time, values))
-    if found or dips:
-        columns = [np.array(column) for column in zip(*found, *dips, strict=True)]
-        one = _Crossing(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
-        times = _located(one, values, duration[one.row])
-        yield from zip(one.row.tolist(), times.tolist(), one.function.tolist(), one.level.tolist(), strict=True)
+        crossings += [_passed(k, course, level, time) for level in _levels(of, switch, course, turns)]
+    every = _Crossing(*(np.concatenate(parts) for parts in zip(*crossings, strict=True)))
+    if len(every.row):
+        times = _located(every, partial(scan.number, of, every.row, every.function), duration[every.row])
+        yield from zip(every.row.tolist(), times.tolist(), every.function.tolist(), every.level.tolist(), strict=True)
 
 
-def _levels(of: Mechanisms, switch: Switch, row: int, course: Array) -> Array:
-    """The levels of a switch that its course may pass, rising."""
-    levels = np.array([of.row(level)[row] for level in switch.levels])
-    known = course[np.isfinite(course)]
-    if switch.period is not None and len(known):
-        period = of.row(switch.period)[row]
-        first, last = np.floor((np.min(known) - levels[0]) / period), np.ceil((np.max(known) - levels[0]) / period)
-        levels = np.unique((levels[:-1] + period * np.arange(first, last + 1)[:, None]).ravel())
-    if len(known):
-        levels = levels[(levels >= np.min(known)) & (levels <= np.max(known))]
-    most = min(MOST_LEVELS * max(1.0, np.ceil(of.cycles[row].turns - 1e-9)), MOST_SCANNED)
-    return levels[:: max(1, int(np.ceil(len(levels) / most)))]
+def _levels(of: Mechanisms, switch: Switch, course: Array, turns: float) -> Array:
+    """The levels of a switch, (level, mechanism), that the courses of some mechanisms may pass."""
+    levels = np.array([of.row(level) for level in switch.levels])
+    if len(levels) == 1 and switch.period is None:
+        return levels
+    finite = np.isfinite(course)
+    least, most = np.min(np.where(finite, course, np.inf), 1), np.max(np.where(finite, course, -np.inf), 1)
+    if switch.period is not None and np.any(finite):
+        period = of.row(switch.period)
+        first, last = (((side - levels[0]) / period)[np.isfinite(side)] for side in (least, most))
+        again = np.arange(np.floor(np.min(first)), np.ceil(np.max(last)) + 1)
+        levels = (levels[:-1] + period * again[:, None, None]).reshape(-1, len(course))
+    levels = levels[np.any((levels >= least) & (levels <= most), axis=1)]
+    return np.asarray(levels[:: max(1, int(np.ceil(len(levels) / min(MOST_LEVELS * turns, MOST_SCANNED))))])
 
 
-def _passed_once(course: Array, level: Array, time: Array, function: int) -> Iterator[tuple[float, ...]]:
-    """What a `_Crossing` holds, wherever a function passes its only level, (mechanism,), between two places."""
-    above, there = course >= level[:, None], np.isfinite(course)
-    rows, low = np.nonzero((above[:, 1:] != above[:, :-1]) & there[:, 1:] & there[:, :-1])
-    high = low + 1
-    columns = level[rows], time[rows, low], time[rows, high], course[rows, low], course[rows, high]
-    return zip(rows, itertools.repeat(function), *columns, strict=False)
-
-
-def _passed(course: Array, levels: Array, time: Array) -> Iterator[tuple[float, ...]]:
-    """Level, time before and after, value before and after, wherever a course passes a level between two places."""
-    above = np.searchsorted(levels, course, side="right")
-    there = np.isfinite(course)
-    for k in np.flatnonzero((above[1:] != above[:-1]) & there[1:] & there[:-1]):
-        between = slice(min(above[k], above[k + 1]), max(above[k], above[k + 1]))
-        yield from ((level, time[k], time[k + 1], course[k], course[k + 1]) for level in levels[between])
+def _passed(function: int, course: Array, level: Array, time: Array) -> _Crossing:
+    """Where a function passes a level, (mechanism,), between two places."""
+    above, finite = course >= level[:, None], np.isfinite(course)
+    row, low = np.nonzero((above[:, 1:] != above[:, :-1]) & finite[:, 1:] & finite[:, :-1])
+    sides = (numbers[row, low + k] for numbers in (time, course) for k in (0, 1))
+    return _Crossing(row, np.full(len(row), function), level[row], *sides)
 
 
 def _dips(
-    switches: Sequence[Switch], courses: Array, time: Array, values: Callable[[Rows, Array], Array]
-) -> Iterator[tuple[float, ...]]:
+    single: NDArray[np.bool_], courses: Array, time: Array, number: Callable[[Rows, Rows, Array], Array]
+) -> _Crossing:
     """Where a course goes through its only level and back between two places: its parabola does, and so does itself."""
-    single = np.array([len(switch.levels) == 1 for switch in switches])
     before, here, after = courses[..., :-2], courses[..., 1:-1], courses[..., 2:]
     with np.errstate(all="ignore"):
         bend = before - 2 * here + after
         least = here - (after - before) ** 2 / (8 * bend)
+        shift = (before - after) / (2 * bend)
         inside = (np.abs(here) <= np.abs(before)) & (np.abs(here) <= np.abs(after)) & (before * after > 0)
-        dips = inside & (before * here > 0) & (least * here < 0) & single[:, None, None]
-    functions, rows, places = np.nonzero(dips)
-    if not len(rows):
-        return
-    one, two, three = (
-        np.array([time[row, place + k] for row, place in zip(rows, places, strict=True)]) for k in range(3)
-    )
-    with np.errstate(all="ignore"):
-        shift = (before - after)[dips] / (2 * bend[dips])
-    middle = two + shift * (two - one)
-    there = values(rows, middle[:, None])[functions, np.arange(len(rows)), 0]
-    for i in np.flatnonzero(there * here[dips] < 0):
-        yield rows[i], functions[i], 0.0, one[i], middle[i], before[dips][i], there[i]
-        yield rows[i], functions[i], 0.0, middle[i], three[i], there[i], after[dips][i]
+        function, row, place = np.nonzero(inside & (before * here > 0) & (least * here < 0) & single[:, None, None])
+    if not len(row):
+        return _Crossing(row, function, *np.zeros((5, 0)))
+    at, low, high = (function, row, place), time[row, place], time[row, place + 2]
+    middle = time[row, place + 1] + shift[at] * (time[row, place + 1] - low)
+    least = number(row, function, middle)
+    over = np.tile(least * here[at] < 0, 2)
+    pairs = (low, middle), (middle, high), (before[at], least), (least, after[at])
+    sides = (np.concatenate(pair)[over] for pair in pairs)
+    return _Crossing(np.tile(row, 2)[over], np.tile(function, 2)[over], np.zeros(int(np.sum(over))), *sides)
 
 
-def _located(one: _Crossing, values: Callable[[Rows, Array], Array], duration: Array) -> Array:
+def _located(every: _Crossing, number: Callable[[Array], Array], duration: Array) -> Array:
     """The times of all crossings."""
-    lanes = np.arange(len(one.row))
-
-    def off(time: Array) -> Array:
-        number: Array = values(one.row, time[:, None])[one.function, lanes, 0] - one.level
-        return number
-
-    return root(off, one.low, one.high, one.at_low - one.level, one.at_high - one.level, SETTLED * duration)
+    low, high = every.at_low - every.level, every.at_high - every.level
+    return root(lambda time: number(time) - every.level, every.low, every.high, low, high, SETTLED * duration)

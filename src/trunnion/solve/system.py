@@ -107,12 +107,6 @@ class Cycle:
         """`steps` equally spaced times, s; the end is left out where it repeats the start."""
         return np.linspace(0.0, self.duration, steps, endpoint=not self.periodic)
 
-    def mean(self, values: NDArray[np.float64]) -> float:
-        """Mean of values at `times`: plain over a period, by trapezoids over a range; NaN with a gap."""
-        if len(values) == 1 or self.periodic:
-            return float(np.mean(values))
-        return float(np.trapezoid(values) / (len(values) - 1))
-
 
 @dataclass(frozen=True)
 class System:
@@ -253,8 +247,9 @@ class System:
         """
         elements = self.holes(values)
         for name, (kind, (first, second)) in self.joints.items():
-            elements[first, name] = shifts.journaled(self.mechanism.space, elements[first, name], kind, values, name)
-            elements[second, name] = shifts.seated(self.mechanism.space, elements[second, name], kind, values, name)
+            for link, carrier in ((first, shifts.PIN), (second, shifts.HOLE)):
+                element = elements[link, name]
+                elements[link, name] = shifts.seated(self.mechanism.space, element, kind, values, name, carrier)
         return elements
 
     def holes(self, values: Values) -> dict[tuple[str, str], Any]:

@@ -21,20 +21,9 @@ from trunnion.solve.forward import Forward
 from trunnion.solve.system import System, Values
 
 __all__ = [
-    "GUESSES",
-    "SEED",
-    "Assemblies",
-    "Follower",
-    "Track",
-    "TrackClock",
-    "at",
-    "closed_at",
-    "each_once",
-    "extent",
-    "guess_reaches",
-    "key_of",
-    "lane_of",
-]
+    "GUESSES", "SEED", "Assemblies", "Follower", "Track", "TrackClock", "at", "closed_at", "each_once", "extent",
+    "guess_reaches", "key_of", "lane_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]  # positions of the grid

@@ -23,7 +23,6 @@ from trunnion.solve.forward import Forward, posed
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.seating import seating_of
-from trunnion.solve.seats import given_offsets
 from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
@@ -206,7 +205,7 @@ class Model:
             play = shifts.play_of(self.run.system.mechanism.space, self.run.system.joints[seat.joint][0], values,
                                   seat.joint)  # fmt: skip
             if play is not None:
-                values.update(play.model.paths(f"seats.{seat.joint}", given_offsets(values, seat.joint, play)))
+                values.update(play.model.paths(f"seats.{seat.joint}", shifts.given_offsets(values, seat.joint, play)))
         return values
 
     @cached_property

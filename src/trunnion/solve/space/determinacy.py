@@ -8,8 +8,7 @@ are not determined. What the joints carry in excess are the self-stresses, Jᵀ 
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, cast
 
@@ -67,27 +66,25 @@ def look(system: System, values: Values, chosen: Chosen, cycle: Cycle) -> Determ
     time = cycle.times(LOOKED) if cycle.duration else np.zeros(1)
     walk = walked(system, values, chosen.assembly, time)
     modules = (_of_module(walk, number, rubbing, len(time)) for number in range(len(system.plan.modules)))
-    return Determinacy(system, tuple(itertools.chain.from_iterable(modules)), *_spins(walk))
+    return Determinacy(system, tuple(part for part in modules if part is not None), *_spins(walk))
 
 
-def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -> Iterator[ModuleDeterminacy]:
+def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -> ModuleDeterminacy | None:
     """Of one module, nothing if it closes no loop or could not be assembled."""
     module, group = walk.system.plan.modules[number], cast(SpatialGroup, walk.system.groups[number])
-    pose: Pose | None = walk.poses[number]
-    if pose is None or not group.chords:
-        return
-    if not np.any(np.isfinite(np.asarray(pose.gap))):
+    pose: Pose | None = walk.poses[number] if group.chords else None
+    if pose is not None and not np.any(np.isfinite(np.asarray(pose.gap))):
         pose = _by_least_squares(walk, number, group)
         if pose is None and module.redundant:
-            yield from _too_many(walk, number, group)
+            return _too_many(walk, number, group)
     if pose is None or not pose.jacobian:
-        return
+        return None
     table = stacked(pose.jacobian)
     rows, columns = table.shape[1:]
     table = np.broadcast_to(table, (lanes, rows, columns))
     finite = np.asarray(np.isfinite(table).all(axis=(-2, -1)))
     if not np.any(finite):
-        return
+        return None
     left, sizes, right = np.linalg.svd(np.where(finite[:, None, None], table, 0.0))
     ranks = np.where(finite, np.sum(sizes > RANK * sizes[:, :1], axis=-1), -1)
     rank = int(np.max(ranks))
@@ -95,7 +92,7 @@ def _of_module(walk: Forward, number: int, rubbing: Sequence[str], lanes: int) -
     stresses = [_stress(group, pose, null) for null in np.moveaxis(left, -1, 0)[rank:]]
     motions = [_motion(group, pose, null) for null in np.moveaxis(right, -2, 0)[rank:]]
     normals = [_normals(walk, module.joints, rubbing, pose.size, stress) for stress in stresses]
-    yield ModuleDeterminacy(
+    return ModuleDeterminacy(
         rows - rank,
         columns - rank,
         _present(module.joints, stresses, stresses, regular),
@@ -135,15 +132,15 @@ def _largest(values: Any) -> float:
     return float(np.nanmax(np.abs(primal(values)), initial=0.0))
 
 
-def _too_many(walk: Forward, number: int, group: SpatialGroup) -> list[ModuleDeterminacy]:
+def _too_many(walk: Forward, number: int, group: SpatialGroup) -> ModuleDeterminacy | None:
     """Whether a module does not close because it has more drivers than freedoms: it is solved without any."""
     pose = _by_least_squares(walk, number, replace(group, driven=()))
     if pose is None:
-        return []
+        return None
     table = stacked(pose.jacobian)[0]
     freedoms = table.shape[1] - int(np.linalg.matrix_rank(table, rtol=RANK))
     surplus = len(group.driven) - freedoms  # without any freedom it is its dimensions that do not let it move
-    return [ModuleDeterminacy(0, 0, (), (), surplus)] if freedoms and surplus > 0 else []
+    return ModuleDeterminacy(0, 0, (), (), surplus) if freedoms and surplus > 0 else None
 
 
 def _by_least_squares(walk: Forward, number: int, group: SpatialGroup) -> Pose | None:

@@ -25,9 +25,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts
 from trunnion.solve.assembly import choose
 from trunnion.solve.forward import forward
-from trunnion.solve.space.cone import CLOSED, Ask, LeastPlay, least_play
-from trunnion.solve.space.loops import End, Loops, ends_of
-from trunnion.solve.space.starts import Start, start_of
+from trunnion.solve.space.loops import CLOSED, Ask, End, LeastPlay, Loops, Start, ends_of, least_play, start_of
 from trunnion.solve.system import Cycle, System, Values, build
 from trunnion.studies.assembly.result import ENOUGH, FIGURES, AssemblyStatus, Result, labels
 

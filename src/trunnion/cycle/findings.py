@@ -444,8 +444,9 @@ def _work(cycle: Cycle, means: Means) -> dict[str, float]:
 def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
     """Efforts that are largest next to where pins cross their play, and nearer to it are not known."""
     course = cycle.course
-    for i, name in enumerate(cycle.mechanism.drivers if course else ()):
-        assert course is not None
+    if course is None or Status.CONTACT_LOST not in course.status:
+        return
+    for i, name in enumerate(cycle.mechanism.drivers):
         largest = course.extreme("drive_effort", i, of=magnitude)
         if largest is not None and course.beside(largest, Status.CONTACT_LOST):
             yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))

@@ -269,7 +269,7 @@ _MEASURES = (
     ),
     Fault(
         "breaks-stay-in-derivatives",
-        "measures/many.py",
+        "measures/group.py",
         "return Dual(times, np.divide(shifts, 2 * step,",
         "return Dual(times, 0.0 * np.divide(shifts, 2 * step,",
         ("tests/reference/test_means_that_jump.py",),

@@ -19,7 +19,8 @@ from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.errors import Severity
-from trunnion.measures.figures import known, within_limits
+from trunnion.measures.evaluation import where_known
+from trunnion.measures.figures import within_limits
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.measures.positions import moved, plan
 from trunnion.model.measure_parts import STATISTICS
@@ -612,7 +613,10 @@ def test_known_by_status() -> None:
     codes = np.array([code.value for code in trunnion.Status], np.int8)
     motion, force = Measure("a", "angle", "rod"), Measure("T", "effort", "A")
     margin = Measure("m", "locking_margin", "mechanism")
-    count = {one.kind: int(np.count_nonzero(known(one, codes))) for one in (motion, force, margin)}
+    count = {
+        one.kind: int(np.count_nonzero(np.isfinite(where_known(one, codes, 0.0 * codes))))
+        for one in (motion, force, margin)
+    }
     assert count["effort"] < count["locking_margin"] < count["angle"] < len(codes)
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of
+from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
-from trunnion.measures.over_cycle import figures_of
 from trunnion.measures.positions import ends_by_name, plan, within
 from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
 from trunnion.results.figure import Figure

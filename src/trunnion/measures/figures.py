@@ -41,7 +41,7 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.run import Run
 
-__all__ = ["ENDLESS", "Figures", "Panels", "Reading", "combined", "known", "near", "within_limits"]
+__all__ = ["ENDLESS", "Figures", "Panels", "Reading", "combined", "near", "within_limits"]
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
@@ -407,10 +407,3 @@ def within_limits(measure: Measure, figures: Array, least: Array, most: Array) -
     if measure.at_most is not None:
         good &= figures <= measure.at_most
     return np.asarray(good)
-
-
-def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Where a course has an answer, by the status of the positions; it is to be NaN elsewhere."""
-    if measure.of_motion:
-        return status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
-    return status < (Status.LOAD_UNDEFINED if measure.wants_margin else Status.NOT_CONVERGED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -33,7 +33,8 @@ NEWTONS = 4  # steps to a time, one of which is exact at a constant speed, befor
 BISECTIONS = 60
 
 
-class Window(NamedTuple):
+@dataclass(frozen=True)
+class Window:
     """The positions of one measure.
 
     index: into the times of the plan, in order; time: theirs, s, rising (beyond the end of the cycle where the window

@@ -210,7 +210,7 @@ _CYCLE = (
     ),
     Fault(
         "efficiency-inverted",
-        "cycle/means.py",
+        "cycle/course.py",
         "return self.useful_power.net / work if work > 0 and",
         "return work / self.useful_power.net if work > 0 and",
         ("tests/reference/test_means.py", "-k", "efficiency"),

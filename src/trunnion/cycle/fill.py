@@ -39,10 +39,9 @@ Arrays = dict[str, NDArray[np.float64]]
 Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
 Vector = Sequence[Number]
 CONDITIONS = "module_condition"  # (module, …, position), beside the variables of a result where somebody asks for it
-SLIDES = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force", "reaction_moment"]
 FORCES = [
     *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
-    *("drive_effort", "drive_power", "power_residual", "friction_change"),
+    *("drive_effort", "drive_power", "useful_power", "efficiency_instant", "power_residual", "friction_change"),
     *("friction_residual", "friction_contraction"),
     *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
     *("reaction_force_change", "drive_effort_change", "friction_power_change"),
@@ -85,13 +84,9 @@ def labels(system: System) -> dict[str, list[str]]:
 def allocate(
     system: System, positions: int, parts: Sequence[str] = (), wanted: Collection[str] | None = None
 ) -> Arrays:
-    """Arrays for the variables of a system, see `results.variables.allocate`.
-
-    Of joints in the plane that all turn, slides are zero without taking memory.
-    """
-    still = system.mechanism.space == "planar" and all(system.turns(joint) for joint in system.joints)
+    """Arrays for the variables of a system, see `results.variables.allocate`."""
     names = labels(system) | ({"end": ["1", "2"]} if "seats" in parts else {})
-    return results.allocate(names, positions, SLIDES if still else [], parts, wanted)
+    return results.allocate(names, positions, parts, wanted)
 
 
 # ---- motion ---------------------------------------------------------------------------------------------------
@@ -118,13 +113,12 @@ def _angles(arrays: Into, walk: Forward, window: slice) -> None:
             arrays["link_angle_velocity"][i, window] = motion.twist.w
             arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
     for i, joint in enumerate(walk.system.joints):
-        both = walk.rates(joint), walk.second_rates(joint)
-        for name, rates in zip(("joint_rotation", "joint_slide"), zip(*both, strict=True), strict=True):
-            for suffix, rate in zip(("_velocity", "_acceleration"), rates, strict=True):
-                if arrays[name + suffix].flags.writeable:
-                    arrays[name + suffix][i, window] = rate
-        if arrays["joint_slide"].flags.writeable:
-            arrays["joint_slide"][i, window] = 0.0 if walk.system.turns(joint) else walk.coordinates(joint)[1]
+        slides = not walk.system.turns(joint)
+        name = "joint_slide" if slides else "joint_rotation"
+        arrays[f"{name}_velocity"][i, window] = walk.rates(joint)[slides]
+        arrays[f"{name}_acceleration"][i, window] = walk.second_rates(joint)[slides]
+        if slides:
+            arrays[name][i, window] = walk.coordinates(joint)[1]
 
 
 def _frames(arrays: Into, walk: SpatialWalk, window: slice) -> None:
@@ -200,11 +194,11 @@ def _planar_reactions(arrays: Into, back: Backward, window: slice) -> None:
     for i, name in enumerate(back.walk.system.joints):
         *force, moment = back.reactions[name]
         put(arrays["reaction_force"], i, force, window)
-        turns, friction = back.walk.system.turns(name), back.friction[name]
-        arrays["friction_torque"][i, window] = friction if turns else 0.0
-        if arrays["reaction_moment"].flags.writeable:  # and so is the force
+        if back.walk.system.turns(name):
+            arrays["friction_torque"][i, window] = back.friction[name]
+        else:
+            arrays["friction_force"][i, window] = back.friction[name]
             arrays["reaction_moment"][i, window] = moment
-            arrays["friction_force"][i, window] = 0.0 if turns else friction
 
 
 def _spatial_reactions(arrays: Into, back: Backward, window: slice) -> None:
@@ -393,7 +387,7 @@ def fill_lanes(
 ) -> None:
     """The same of some positions, wherever they are: their numbers in the last dims of the arrays."""
     place: Any = (..., *lanes)
-    there = {name: array for name, array in arrays.items() if array.flags.writeable and array.strides[-1]}
+    there = {name: array for name, array in arrays.items() if array.strides[-1]}
     some = {name: array[place] for name, array in arrays.items()}
     some |= {name: some[other] for name, other in results.SAME_AS.items() if name in some}
     fill_chunk(some, back, time, slice(0, len(lanes[-1])))
@@ -440,15 +434,12 @@ def blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
         (FORCES, status >= Status.NOT_CONVERGED),
         (RATES, status >= Status.SINGULAR),
         (["locking_margin"], status >= Status.LOAD_UNDEFINED),
-        (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
+        # a driver's own link is known where the rest is not; a whole position is either assembled or not
+        (POSES, status == Status.NOT_ASSEMBLED),
     ):
         for name in names:
-            if name in arrays and arrays[name].flags.writeable:
+            if name in arrays:
                 arrays[name][..., window][..., where] = np.nan
-    # a driver's own link is known where the rest is not; a whole position is either assembled or not
-    for name in POSES:
-        if name in arrays and arrays[name].flags.writeable:
-            arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
 
 
 # ---- angles that run on ---------------------------------------------------------------------------------------

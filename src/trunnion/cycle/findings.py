@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss
-from trunnion.cycle.course import CycleCourse, magnitude
+from trunnion.cycle.course import CycleCourse, Means, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
-from trunnion.cycle.means import Means
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, Status

@@ -210,7 +210,7 @@ _CYCLE = (
     ),
     Fault(
         "efficiency-inverted",
-        "cycle/means.py",
+        "cycle/course.py",
         "return self.useful_power.net / work if work > 0 and",
         "return work / self.useful_power.net if work > 0 and",
         ("tests/reference/test_means.py", "-k", "efficiency"),
@@ -269,7 +269,7 @@ _MEASURES = (
     ),
     Fault(
         "breaks-stay-in-derivatives",
-        "measures/many.py",
+        "measures/group.py",
         "return Dual(times, np.divide(shifts, 2 * step,",
         "return Dual(times, 0.0 * np.divide(shifts, 2 * step,",
         ("tests/reference/test_means_that_jump.py",),

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 import trunnion
 from measured import many, reads
+from trunnion.measures.many import figures_of
 from trunnion.measures.measures import named
-from trunnion.measures.over_cycle import figures_of
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 

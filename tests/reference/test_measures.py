@@ -19,9 +19,10 @@ from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.errors import Severity
-from trunnion.measures.figures import known, within_limits
+from trunnion.measures.evaluation import where_known
+from trunnion.measures.figures import within_limits
 from trunnion.measures.measures import Measure, coordinate_unit, named
-from trunnion.measures.positions import plan
+from trunnion.measures.positions import moved, plan
 from trunnion.model.measure_parts import STATISTICS
 from trunnion.model.measure_table import MEASURES
 from trunnion.results.attributes import summary_of
@@ -612,7 +613,10 @@ def test_known_by_status() -> None:
     codes = np.array([code.value for code in trunnion.Status], np.int8)
     motion, force = Measure("a", "angle", "rod"), Measure("T", "effort", "A")
     margin = Measure("m", "locking_margin", "mechanism")
-    count = {one.kind: int(np.count_nonzero(known(one, codes))) for one in (motion, force, margin)}
+    count = {
+        one.kind: int(np.count_nonzero(np.isfinite(where_known(one, codes, 0.0 * codes))))
+        for one in (motion, force, margin)
+    }
     assert count["effort"] < count["locking_margin"] < count["angle"] < len(codes)
 
 
@@ -651,15 +655,16 @@ def test_positions_stay_with_speeds_and_starts() -> None:
         at = Measure("at", "rotation", "A", at=1.1)
         grid = Measure("grid", "slide", "C")
         positions = plan(run, [at, grid], 36)
-        values = run.system.mechanism.parameters({path: value * change})
-        times = positions.moved(values)
+        parameters = run.system.mechanism.parameters
+        values = parameters({path: value * change})
+        times = moved(run, values, positions.times)
         assert np.shape(times) == (20, 37)
         before = run.system.drive(run.values, "A", positions.times)[0]
         np.testing.assert_allclose(
             run.system.drive(values, "A", times)[0], np.broadcast_to(before, (20, 37)), atol=1e-12
         )
-        slope = derivative(positions.moved(run.system.mechanism.parameters({path: Dual(value, 1.0)})))
-        ends = [positions.moved(run.system.mechanism.parameters({path: value + sign * 1e-6})) for sign in (1, -1)]
+        slope = derivative(moved(run, parameters({path: Dual(value, 1.0)}), positions.times))
+        ends = [moved(run, parameters({path: value + sign * 1e-6}), positions.times) for sign in (1, -1)]
         inner = slice(2, -2)
         np.testing.assert_allclose(slope[inner], ((ends[0] - ends[1]) / 2e-6)[inner], rtol=1e-5, atol=1e-7)
 

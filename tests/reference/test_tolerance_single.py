@@ -15,8 +15,8 @@ import mechanisms_space
 import trunnion
 from mechanisms_parts import Data
 from toleranced import alone, sampler, varied
+from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, coordinate_unit
-from trunnion.measures.over_cycle import figures_of
 from trunnion.measures.positions import moved
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work

@@ -1,5 +1,8 @@
 """The course of a mechanism over its cycle: efforts, reactions, powers, strokes as `Courses`, and what is read of them.
 
+Means, and the efficiency that follows from them, have the error of their integrals. One that this error, or rounding,
+may have made is 0: power that a load gives and takes back.
+
 It is found once for a run and does not depend on which positions are asked for. Breaks are those that the model states
 (`switches`); what it does not state, as a guide that tilts over or the end of what can be assembled, is located by the
 courses themselves.
@@ -10,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +21,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.panels import CANCELLED
 from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors
-from trunnion.cycle.means import MOST_SUPPOSED, RESIDUALS, SUPPOSED, Mean, Means, unknown
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
@@ -32,7 +35,8 @@ from trunnion.solve.switches import MARGINS, SEATED
 from trunnion.solve.system import System
 
 __all__ = [
-    "CycleCourse", "course_of", "followed", "like", "magnitude", "margin_of", "stacked",
+    "MOST_SUPPOSED", "CycleCourse", "Mean", "Means", "course_of", "followed", "like", "magnitude", "margin_of",
+    "stacked", "unknown",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -43,6 +47,72 @@ COMPARED_ROWS = ("point_error", "joint_rotation_error", "joint_slide_error", "dr
 SIDE = 1e-7  # of the cycle: beside a break
 NEXT = 1e-6  # of the cycle: an extreme is beside what is no farther, and said to be there
 CLOSE = 1e-10  # of the cycle: breaks that are one
+SUPPOSED = "supposed_power"  # W: by how much that through the drivers differs from what stands in for it
+MOST_SUPPOSED = 0.05  # of the power through the drivers: with more of it the means have no answer
+RESIDUALS = 4.0  # of the mean residual of the power balance: what rounding leaves of a power that cancels
+
+
+class Mean(NamedTuple):
+    """A mean, the error of its integral, the mean of the magnitude, and what may be no more than rounding."""
+
+    value: float
+    error: float
+    size: float
+    rounding: float
+
+    @property
+    def net(self) -> float:
+        """The value; 0 where it is no more than its error or rounding."""
+        return 0.0 if abs(self.value) <= max(self.error, self.rounding) else self.value
+
+
+@dataclass(frozen=True)
+class Means:
+    """Means over one cycle, W; NaN where any place of it has no answer.
+
+    drive_power: of all drivers; useful_power: that the useful loads take; friction_power: lost in all joints;
+    friction_power_mean: in each joint; drive_effort_rms: root mean square of each driver, N m or N; supposed: share
+    of the power through the drivers by which it differs from that which stands in for it (`SUPPOSED`);
+    has_useful_work: whether it is stated what work is useful.
+    """
+
+    drive_power: Mean
+    useful_power: Mean
+    friction_power: Mean
+    friction_power_mean: Array
+    drive_effort_rms: Array
+    supposed: float = 0.0
+    has_useful_work: bool = True
+
+    @property
+    def drive_power_mean(self) -> float:
+        """Of all drivers, W."""
+        return self.drive_power.net
+
+    @property
+    def useful_power_mean(self) -> float:
+        """Taken by the useful loads, W."""
+        return self.useful_power.net
+
+    @property
+    def efficiency(self) -> float:
+        """Useful work over drive work of the cycle [D 1]; NaN where the loads drive, a place has no answer, or nothing
+        is useful."""
+        work = self.drive_power.net
+        return self.useful_power.net / work if work > 0 and self.has_useful_work else float("nan")
+
+    @property
+    def efficiency_error(self) -> float:
+        """How far the errors of both integrals, and what is supposed where pins do not settle, may have moved it."""
+        work, value = self.drive_power.net, abs(self.efficiency)
+        integrals = self.useful_power.error + value * self.drive_power.error
+        return integrals / work + value * self.supposed if work > 0 else float("nan")
+
+
+def unknown(drivers: int, joints: int, supposed: float = 0.0, has_useful_work: bool = True) -> Means:
+    """Means without an answer; what share of them is supposed stays."""
+    none = Mean(np.nan, np.nan, np.nan, np.nan)
+    return Means(none, none, none, np.full(joints, np.nan), np.full(drivers, np.nan), supposed, has_useful_work)
 
 
 @dataclass(frozen=True)

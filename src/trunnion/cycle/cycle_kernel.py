@@ -5,8 +5,8 @@ What is written of one walk into the arrays of a result is recorded once and run
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -37,7 +37,7 @@ from trunnion.solve.switches import Mechanisms, accuracy_of, bends, breaks_betwe
 from trunnion.solve.system import System, Values
 from trunnion.solve.walk_kernel import Figure, WalkKernel
 
-__all__ = ["CycleKernel", "Engine", "Many", "compiles"]
+__all__ = ["CycleKernel", "Engine", "Many", "compiles", "kernel_of"]
 
 Cell = tuple[str, tuple[int, ...]]  # variable, and place in its array but for the position
 
@@ -49,18 +49,10 @@ PROBED = 64  # positions at which it is seen whether margins are followed
 UNDEFINED = ("efficiency_instant", "locking_margin", "contact_position")
 
 
-class _Flags(NamedTuple):
-    """Of one variable: whether it is there, and whether anybody reads it."""
-
-    writeable: bool
-    read: bool
-
-
 class _Row(NamedTuple):
-    """One variable of `Cells`."""
+    """One variable of `_Cells`."""
 
     name: str
-    flags: _Flags
     numbers: dict[Cell, Number]
 
     def __setitem__(self, place: Any, number: Number) -> None:
@@ -71,9 +63,9 @@ class _Row(NamedTuple):
 class _Cells(dict[str, _Row]):
     """Stands for the arrays of a result while one walk is written into them, and keeps the number of every cell."""
 
-    def __init__(self, flags: Mapping[str, _Flags]) -> None:
+    def __init__(self, names: Iterable[str]) -> None:
         self.numbers: dict[Cell, Number] = {}
-        super().__init__((name, _Row(name, own, self.numbers)) for name, own in flags.items())
+        super().__init__((name, _Row(name, self.numbers)) for name in names)
 
 
 class CycleKernel:
@@ -87,7 +79,7 @@ class CycleKernel:
         self, run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod
     ) -> None:
         # not the arrays: the kernel and its figures hold each other, so whatever they hold is freed late
-        self._flags = {name: _Flags(array.flags.writeable, bool(array.strides[-1])) for name, array in arrays.items()}
+        self._read = {name: bool(array.strides[-1]) for name, array in arrays.items()}
         self._last: tuple[Backward | None, Mapping[Cell, Number]] = None, {}
         with np.errstate(all="ignore"):
             numbers = self._cells(run.solve(np.zeros(1), values, FrictionMethod()))
@@ -128,18 +120,39 @@ class CycleKernel:
     def _wanted(self, cell: Cell, number: Number) -> bool:
         """Whether a cell is read, and not 0 whatever the values are, as most arrays are before."""
         none = isinstance(number, (int, float)) and number == 0 and VARIABLES[cell[0]].part != "seats"
-        return self._flags[cell[0]].read and not none
+        return self._read[cell[0]] and not none
 
     def _cells(self, back: Backward) -> Mapping[Cell, Number]:
         """The number of every cell, of one walk; those of the last one are remembered, for figures ask one by one."""
         if self._last[0] is not back:
-            into = _Cells(self._flags)
+            into = _Cells(self._read)
             write(into, back, back.walk.time, slice(None))
             self._last = back, into.numbers
         return self._last[1]
 
     def _figure(self, cell: Cell) -> Figure:
         return lambda back: self._cells(back)[cell]
+
+
+def kernel_of(
+    run: Run, engine: str, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod
+) -> CycleKernel | None:
+    """The compiled kernel of what is read of some arrays, made once for numbers of one kind.
+
+    None of the engine auto, MechanismError of the engine compiled, if there is none.
+    """
+
+    def made() -> CycleKernel | None:
+        try:
+            return CycleKernel(run, values, time, arrays, method)
+        except MechanismError:
+            if engine == "compiled":
+                raise
+            return None
+
+    read = tuple(name for name, array in arrays.items() if array.strides[-1])
+    known = frozenset(literals(values).items())  # what is 0 with these is left out
+    return run.once(("compiled", engine, method, read, known), made)
 
 
 def compiles(engine: str, run: Run, positions: int, method: FrictionMethod | None = None) -> bool:
@@ -187,7 +200,6 @@ class Many:
     run: Run
     engine: str = "auto"
     configurations: int = 0
-    _kernels: dict[object, CycleKernel] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.compiled = compiles(self.engine, self.run, self.configurations)
@@ -227,9 +239,9 @@ class Many:
     ) -> Arrays:
         """Variables by name, and the condition of every module."""
         arrays = _allocated(self.run.system, shape, {*wanted, "status"}, parts)
-        known = frozenset(literals(values).items())  # what is 0 with these is left out
-        kernel = self._kernel(arrays, values, time, method, (frozenset(wanted), tuple(parts), method, known))
+        kernel = kernel_of(self.run, self.engine, values, time, arrays, method) if self.compiled else None
         if kernel is None:
+            self.compiled = False
             fill_chunk(arrays, self.run.solve(time, values, method), time, slice(None))
             return arrays
         kernel.fill(arrays, values, time)
@@ -256,21 +268,6 @@ class Many:
         with np.errstate(all="ignore"):
             found = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
         return [CycleCourse(self.run, shapes, one) for one in found]
-
-    def _kernel(
-        self, arrays: Arrays, values: Values, time: NDArray[np.float64], method: FrictionMethod, key: object
-    ) -> CycleKernel | None:
-        if not self.compiled:
-            return None
-        if key not in self._kernels:
-            try:
-                self._kernels[key] = CycleKernel(self.run, values, time, arrays, method)
-            except MechanismError:
-                if self.engine == "compiled":
-                    raise
-                self.compiled = False
-                return None
-        return self._kernels[key]
 
 
 def _allocated(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:

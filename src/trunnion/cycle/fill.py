@@ -39,10 +39,9 @@ Arrays = dict[str, NDArray[np.float64]]
 Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
 Vector = Sequence[Number]
 CONDITIONS = "module_condition"  # (module, …, position), beside the variables of a result where somebody asks for it
-SLIDES = ["joint_slide", "joint_slide_velocity", "joint_slide_acceleration", "friction_force", "reaction_moment"]
 FORCES = [
     *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
-    *("drive_effort", "drive_power", "power_residual", "friction_change"),
+    *("drive_effort", "drive_power", "useful_power", "efficiency_instant", "power_residual", "friction_change"),
     *("friction_residual", "friction_contraction"),
     *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
     *("reaction_force_change", "drive_effort_change", "friction_power_change"),
@@ -85,66 +84,43 @@ def labels(system: System) -> dict[str, list[str]]:
 def allocate(
     system: System, positions: int, parts: Sequence[str] = (), wanted: Collection[str] | None = None
 ) -> Arrays:
-    """Arrays for the variables of a system, see `results.variables.allocate`.
-
-    Of joints in the plane that all turn, slides are zero without taking memory.
-    """
-    still = system.mechanism.space == "planar" and all(system.turns(joint) for joint in system.joints)
+    """Arrays for the variables of a system, see `results.variables.allocate`."""
     names = labels(system) | ({"end": ["1", "2"]} if "seats" in parts else {})
-    return results.allocate(names, positions, SLIDES if still else [], parts, wanted)
+    return results.allocate(names, positions, parts, wanted)
 
 
 # ---- motion ---------------------------------------------------------------------------------------------------
 
 
-def fill_motion(arrays: Into, back: Backward, window: slice) -> None:
+def fill_motion(arrays: Into, walk: Forward, window: slice) -> None:
     """Angles or frames of links, points and joints of one chunk."""
-    walk = back.walk
-    fill_points(arrays, walk, window)
+    system = walk.system
+    for i, (link, name) in enumerate(system.points):
+        for key, numbers in zip(("position", "velocity", "acceleration"), walk.point(link, name), strict=True):
+            put(arrays[f"point_{key}"], i, numbers, window)
     if isinstance(walk, SpatialWalk):
-        _frames(arrays, walk, window)
-        for i, joint in enumerate(walk.system.joints):
+        for i, link in enumerate(system.mechanism.effective_links):
+            frame, twist, second = walk.motions[link]
+            put(arrays["link_rotation"], i, quaternion(frame), window)
+            put(arrays["link_position"], i, frame.place, window)
+            put(arrays["link_angular_velocity"], i, twist.u, window)
+            put(arrays["link_angular_acceleration"], i, second.u, window)
+        for i, joint in enumerate(system.joints):
             fill_joint(arrays, walk, i, joint, window)
-    else:
-        _angles(arrays, walk, window)
-
-
-def _angles(arrays: Into, walk: Forward, window: slice) -> None:
-    """Angles of links and rates of joints in the plane."""
-    for i, link in enumerate(walk.system.mechanism.links):
-        if link != walk.system.mechanism.fixed_link:
+        return
+    for i, link in enumerate(system.mechanism.links):
+        if link != system.mechanism.fixed_link:
             motion = walk.motions[link]
             arrays["link_angle"][i, window] = np.arctan2(motion.frame.s, motion.frame.c)
             arrays["link_angle_velocity"][i, window] = motion.twist.w
             arrays["link_angle_acceleration"][i, window] = motion.acceleration.w
-    for i, joint in enumerate(walk.system.joints):
-        both = walk.rates(joint), walk.second_rates(joint)
-        for name, rates in zip(("joint_rotation", "joint_slide"), zip(*both, strict=True), strict=True):
-            for suffix, rate in zip(("_velocity", "_acceleration"), rates, strict=True):
-                if arrays[name + suffix].flags.writeable:
-                    arrays[name + suffix][i, window] = rate
-        if arrays["joint_slide"].flags.writeable:
-            arrays["joint_slide"][i, window] = 0.0 if walk.system.turns(joint) else walk.coordinates(joint)[1]
-
-
-def _frames(arrays: Into, walk: SpatialWalk, window: slice) -> None:
-    """Frames of links in space with their rates."""
-    for i, link in enumerate(walk.system.mechanism.effective_links):
-        frame, twist, second = walk.motions[link]
-        for name, numbers in (
-            ("link_rotation", quaternion(frame)),
-            ("link_position", frame.place),
-            ("link_angular_velocity", twist.u),
-            ("link_angular_acceleration", second.u),
-        ):
-            put(arrays[name], i, numbers, window)
-
-
-def fill_points(arrays: Into, walk: Forward, window: slice) -> None:
-    """Named points of one chunk."""
-    for i, (link, name) in enumerate(walk.system.points):
-        for key, numbers in zip(("position", "velocity", "acceleration"), walk.point(link, name), strict=True):
-            put(arrays[f"point_{key}"], i, numbers, window)
+    for i, joint in enumerate(system.joints):
+        slides = not system.turns(joint)
+        name = "joint_slide" if slides else "joint_rotation"
+        arrays[f"{name}_velocity"][i, window] = walk.rates(joint)[slides]
+        arrays[f"{name}_acceleration"][i, window] = walk.second_rates(joint)[slides]
+        if slides:
+            arrays[name][i, window] = walk.coordinates(joint)[1]
 
 
 def put(array: Any, i: int, numbers: Sequence[Number], window: slice) -> None:
@@ -182,43 +158,32 @@ def fill_joint(arrays: Into, walk: SpatialWalk, i: int, joint: str, window: slic
 
 
 def fill_forces(arrays: Into, back: Backward, window: slice) -> None:
-    """Reactions, friction, drive efforts, springs and gear pairs of one chunk."""
-    (_spatial_reactions if isinstance(back.walk, SpatialWalk) else _planar_reactions)(arrays, back, window)
-    mechanism = back.walk.system.mechanism
+    """Reactions, friction, drive efforts, springs and gear pairs of one chunk; in space about the middles of the
+    bearings."""
+    walk, mechanism = back.walk, back.walk.system.mechanism
+    for i, joint in enumerate(walk.system.joints):
+        turns = walk.system.turns(joint)
+        if turns:
+            arrays["friction_torque"][i, window] = back.friction[joint]
+        if isinstance(walk, SpatialWalk):
+            middle, friction = bearing_middle(walk, joint), back.friction_wrenches[joint]
+            put(arrays["reaction_force"], i, back.reactions[joint].u, window)
+            put(arrays["reaction_moment"], i, moment_at(back.reactions[joint], middle), window)
+            put(arrays["friction_moment"], i, moment_at(friction, middle), window)
+            arrays["friction_force"][i, window] = dot(friction.u, walk.ends(joint)[1].z)
+            continue
+        *force, moment = back.reactions[joint]
+        put(arrays["reaction_force"], i, force, window)
+        if not turns:
+            arrays["friction_force"][i, window] = back.friction[joint]
+            arrays["reaction_moment"][i, window] = moment
     for i, name in enumerate(mechanism.drivers):
         arrays["drive_effort"][i, window] = back.efforts[name]
     for i, name in enumerate(mechanism.springs):
-        for key, number in zip(("spring_force", "spring_elongation"), back.springs[name][:2], strict=True):
-            arrays[key][i, window] = number
+        arrays["spring_force"][i, window], arrays["spring_elongation"][i, window] = back.springs[name][:2]
     for i, name in enumerate(mechanism.gears):
         arrays["gear_torque"][i, window] = back.gears[name].torque
         put(arrays["gear_force"], i, back.gears[name].force, window)
-
-
-def _planar_reactions(arrays: Into, back: Backward, window: slice) -> None:
-    """Reactions and friction of one chunk."""
-    for i, name in enumerate(back.walk.system.joints):
-        *force, moment = back.reactions[name]
-        put(arrays["reaction_force"], i, force, window)
-        turns, friction = back.walk.system.turns(name), back.friction[name]
-        arrays["friction_torque"][i, window] = friction if turns else 0.0
-        if arrays["reaction_moment"].flags.writeable:  # and so is the force
-            arrays["reaction_moment"][i, window] = moment
-            arrays["friction_force"][i, window] = 0.0 if turns else friction
-
-
-def _spatial_reactions(arrays: Into, back: Backward, window: slice) -> None:
-    """Reactions about the middles of the bearings, and friction, of one chunk."""
-    walk = back.walk
-    assert isinstance(walk, SpatialWalk)
-    for i, joint in enumerate(walk.system.joints):
-        middle, reaction, friction = bearing_middle(walk, joint), back.reactions[joint], back.friction_wrenches[joint]
-        put(arrays["reaction_force"], i, reaction.u, window)
-        put(arrays["reaction_moment"], i, moment_at(reaction, middle), window)
-        put(arrays["friction_moment"], i, moment_at(friction, middle), window)
-        arrays["friction_force"][i, window] = dot(friction.u, walk.ends(joint)[1].z)
-        if walk.system.turns(joint):
-            arrays["friction_torque"][i, window] = back.friction[joint]
 
 
 def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> None:
@@ -247,15 +212,6 @@ def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> Non
     defined = np.greater(driven, 0) & has_useful_work(walk.system.mechanism)
     arrays["efficiency_instant"][window] = useful / np.where(defined, driven, np.nan)
     arrays["power_residual"][window] = total + driven
-    arrays["closure_residual"][window] = _worst(walk.system, walk.poses, "closure")
-    arrays["condition"][window] = _worst(walk.system, walk.poses, "condition")
-
-
-def _worst(system: System, poses: Sequence[Any], figure: str) -> Number:
-    worst: Number = 0.0
-    for group, pose in zip(system.groups, poses, strict=True):
-        worst = np.maximum(worst, getattr(group, figure)(pose))
-    return worst
 
 
 # ---- seats and errors -----------------------------------------------------------------------------------------------
@@ -267,14 +223,13 @@ def fill_seats(arrays: Into, back: Backward, window: slice) -> None:
     joints, axes = list(walk.system.joints), walk.system.mechanism.coordinates
     for seat in seats(walk.system.mechanism, walk.values):
         i = joints.index(seat.joint)
-        offsets = seat.play.model.offsets(walk.values, f"seats.{seat.joint}") or []
-        ends = _ends(seat, offsets)
-        for name, vectors in (("seat_offset", ends), ("end_force", _ends(seat, loads_of(back, seat), shared=True))):
+        ends = _ends(seat, seat.play.model.offsets(walk.values, f"seats.{seat.joint}") or [])
+        loads = _ends(seat, loads_of(back, seat), shared=True)
+        contacts = _contacts(walk, seat, ends)
+        for name, vectors in (("seat_offset", ends), ("end_force", loads), ("contact_position", contacts)):
             for end, vector in vectors.items():
-                for axis, number in enumerate(vector[:axes]):
-                    arrays[name][i, end, axis, window] = number
+                put(arrays[name][i], end, vector[:axes], window)
         _describe(arrays, i, window, walk, seat, ends)
-        _fill_contacts(arrays, i, window, walk, seat, ends)
 
 
 def _ends(seat: GivenSeat, vectors: Sequence[Vector], shared: bool = False) -> dict[int, list[Number]]:
@@ -305,30 +260,24 @@ def _describe(arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSea
         arrays["seat_xi_pin"][i, window] = wrapped(xi + turn)
 
 
-def _fill_contacts(
-    arrays: Into, i: int, window: slice, walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]
-) -> None:
+def _contacts(walk: Forward, seat: GivenSeat, ends: Mapping[int, Vector]) -> dict[int, Vector]:
     """B₁ and B₂: on the wall of the hole in the direction of the offset; of a guide the ends of its axis."""
-    frame = walk.hole(seat.joint)
-    own = clearance(seat.joint, walk.values)
+    own, model = clearance(seat.joint, walk.values), seat.play.model
     radius = walk.values.get(f"joints.{seat.joint}.pin.radius", np.nan) + (own if own is not None else 0.0)
-    spatial, model = walk.system.mechanism.space == "spatial", seat.play.model
     guide = model.size is not None and model.size[0] == "guide"
     half = 0.5 * seat.play.length if model.size is not None else 0.0
+    places: dict[int, Vector] = {}
     for end, offset in ends.items():
         x, y, z = offset if len(model.ends[0]) == 3 else (offset[0], offset[1], 0.0)
         size = np.sqrt(x * x + y * y + z * z)
         share = np.where(size > 0, radius / np.where(size > 0, size, 1.0), np.nan)
         along = half if end else -half
         if guide:
-            local = (0.0, 0.0, along) if spatial else (along, 0.0, 0.0)
-        elif len(model.ends[0]) == 3:
-            local = (share * x, share * y, share * z)
+            local = (0.0, 0.0, along) if isinstance(walk, SpatialWalk) else (along, 0.0, 0.0)
         else:
-            local = (share * x, share * y, along)
-        place = walk.algebra.point_of(frame, local[: len(walk.system.axes)])
-        for axis, number in enumerate(place):
-            arrays["contact_position"][i, end, axis, window] = number
+            local = (share * x, share * y, share * z if len(model.ends[0]) == 3 else along)
+        places[end] = walk.algebra.point_of(walk.hole(seat.joint), local[: len(walk.system.axes)])
+    return places
 
 
 def wrapped(angle: Number) -> Number:
@@ -393,7 +342,7 @@ def fill_lanes(
 ) -> None:
     """The same of some positions, wherever they are: their numbers in the last dims of the arrays."""
     place: Any = (..., *lanes)
-    there = {name: array for name, array in arrays.items() if array.flags.writeable and array.strides[-1]}
+    there = {name: array for name, array in arrays.items() if array.strides[-1]}
     some = {name: array[place] for name, array in arrays.items()}
     some |= {name: some[other] for name, other in results.SAME_AS.items() if name in some}
     fill_chunk(some, back, time, slice(0, len(lanes[-1])))
@@ -407,29 +356,24 @@ def fill_lanes(
 
 def write(arrays: Into, back: Backward, time: Number, window: slice) -> None:
     """Every variable but the status, of one walk."""
-    fill_motion(arrays, back, window)
+    fill_motion(arrays, back.walk, window)
     fill_forces(arrays, back, window)
-    _fill_settled(arrays, back, window)
+    for figure in ("iterations", "change", "residual", "contraction"):  # of the friction iteration
+        worst = functools.reduce(np.maximum, (getattr(settled, figure) for settled in back.settled), 0.0)
+        arrays[f"friction_{figure}"][window] = worst
+    arrays["locking_margin"][window] = locking_margin(back)
     fill_power(arrays, back, time, window)
     if "seat_offset" in arrays:
         fill_seats(arrays, back, window)
+    groups = list(zip(back.walk.system.groups, back.walk.poses, strict=True))
+    conditions = [group.condition(pose) for group, pose in groups]
+    arrays["condition"][window] = functools.reduce(np.maximum, conditions, 0.0)
+    arrays["closure_residual"][window] = functools.reduce(
+        np.maximum, (group.closure(pose) for group, pose in groups), 0.0
+    )
     if CONDITIONS in arrays:
-        for i, (group, pose) in enumerate(zip(back.walk.system.groups, back.walk.poses, strict=True)):
-            arrays[CONDITIONS][i, window] = group.condition(pose)
-
-
-def _fill_settled(arrays: Into, back: Backward, window: slice) -> None:
-    """Figures of the friction iteration."""
-    settled = back.settled
-    for key, field in (
-        ("friction_iterations", "iterations"),
-        ("friction_change", "change"),
-        ("friction_residual", "residual"),
-        ("friction_contraction", "contraction"),
-    ):
-        worst = functools.reduce(np.maximum, (getattr(one, field) for one in settled), 0.0)
-        arrays[key][window] = worst
-    arrays["locking_margin"][window] = locking_margin(back)
+        for i, condition in enumerate(conditions):
+            arrays[CONDITIONS][i, window] = condition
 
 
 def blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
@@ -440,15 +384,12 @@ def blank(arrays: Arrays, status: NDArray[np.int8], window: slice) -> None:
         (FORCES, status >= Status.NOT_CONVERGED),
         (RATES, status >= Status.SINGULAR),
         (["locking_margin"], status >= Status.LOAD_UNDEFINED),
-        (["useful_power", "efficiency_instant"], status >= Status.NOT_CONVERGED),
+        # a driver's own link is known where the rest is not; a whole position is either assembled or not
+        (POSES, status == Status.NOT_ASSEMBLED),
     ):
         for name in names:
-            if name in arrays and arrays[name].flags.writeable:
+            if name in arrays:
                 arrays[name][..., window][..., where] = np.nan
-    # a driver's own link is known where the rest is not; a whole position is either assembled or not
-    for name in POSES:
-        if name in arrays and arrays[name].flags.writeable:
-            arrays[name][..., window][..., status == Status.NOT_ASSEMBLED] = np.nan
 
 
 # ---- angles that run on ---------------------------------------------------------------------------------------

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.course import Courses, Place
 from trunnion.algebra.dual import primal
 from trunnion.cycle import contact_loss
-from trunnion.cycle.course import CycleCourse, magnitude
+from trunnion.cycle.course import CycleCourse, Means, magnitude
 from trunnion.cycle.locking_course import LockingCourse, LockingState, locking_course
-from trunnion.cycle.means import Means
 from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, Status
@@ -444,8 +443,9 @@ def _work(cycle: Cycle, means: Means) -> dict[str, float]:
 def _beside_gaps(cycle: Cycle) -> Iterator[Finding]:
     """Efforts that are largest next to where pins cross their play, and nearer to it are not known."""
     course = cycle.course
-    for i, name in enumerate(cycle.mechanism.drivers if course else ()):
-        assert course is not None
+    if course is None or Status.CONTACT_LOST not in course.status:
+        return
+    for i, name in enumerate(cycle.mechanism.drivers):
         largest = course.extreme("drive_effort", i, of=magnitude)
         if largest is not None and course.beside(largest, Status.CONTACT_LOST):
             yield finding_for("effort.beside_gap", f"drivers.{name}", at=course.told(largest).removeprefix("at "))

@@ -14,7 +14,7 @@ from trunnion.cycle.positions import positions
 from trunnion.cycle.scene import pitch_circles
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.measures import named
-from trunnion.measures.positions import plan
+from trunnion.measures.positions import ends_by_name
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
@@ -88,7 +88,7 @@ def _unplaced(run: Run) -> Iterator[Finding]:
         if measure.in_time or (measure.at is None and measure.over is None):
             continue
         try:
-            plan(run, [measure], 1)
+            ends_by_name(run, [measure])
         except MechanismError as error:
             yield from (replace(one, severity=Severity.WARNING) for one in error.findings)
 

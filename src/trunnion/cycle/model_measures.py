@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.measures.evaluation import courses_of
+from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
-from trunnion.measures.over_cycle import figures_of
-from trunnion.measures.positions import plan, within
+from trunnion.measures.positions import ends_by_name, plan, within
 from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
-from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
@@ -38,14 +37,11 @@ VARIABLES = {
     ),
 }
 SWITCHES = ", where a load begins or ends or a joint reverses, and the pins cross their play"
-# figures of single positions, and the course whose extremes these are
-OF_PLACES: dict[str, Callable[[Array], Array]] = {
-    **dict.fromkeys(
-        ("value", "maximum", "minimum", "peak-to-peak", "place-of-maximum", "place-of-minimum", "time ratio"),
-        lambda course: course,
-    ),
-    "largest": np.abs,
-}
+# figures of single positions: of one, and of two
+OF_PLACES = (
+    "value", "maximum", "minimum", "peak-to-peak", "place-of-maximum", "place-of-minimum", "time ratio", "largest",
+)  # fmt: skip
+OF_BOTH = ("peak-to-peak", "time ratio")
 TAKEN = ("time", "drive", "power_in", "power_useful", "seat_rounds", "status")  # columns of the result
 
 
@@ -97,58 +93,55 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
 
     A figure at a position where a pin loses contact is NaN: it is that of a seat which would jump.
     """
-    steps, measures, findings = len(time), [], []
-    for name in run.system.mechanism.measures:
-        try:
-            measures.append(_had(run, name, steps))
-        except MechanismError as error:
-            told = f"the measure '{name}' is left out: {error.findings[0].what}"
-            findings.append(Finding(told, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
+    measures, findings, of_cycle, extremes, why = run.once(("measures", method), lambda: _over_cycle(run, method))
     values = _values_at(run, measures, time, method)
-    stated = [one for one in measures if one.rule != "deviation"]
-    with np.errstate(all="ignore"):
-        of_cycle = figures_of(run, stated, method) if stated else {}
-        extremes = _extremes(run, [one for one in measures if one.rule == "deviation"], method)
-    figures = np.array([of_cycle.get(one.name, np.nan) for one in measures], float)
-    valid = np.ones(steps, bool) if status is None else status != Status.CONTACT_LOST
-    notes: dict[str, str] = {}
-    for measure, figure in zip(measures, figures, strict=True):
-        if measure.rule.startswith("dead centre") and not np.isfinite(figure):
-            ends = "minimum", "maximum: leave out as"
-            what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
-            notes[measure.name] = f"no {what} within the cycle; for a {other}"
-        elif measure.rule == "time ratio" and not np.isfinite(figure):
-            notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
-    if np.all(valid):
-        return Watched(run, measures, values, figures, findings, notes, extremes)
-    dial = run.system.dial(run.values, time)
-    for i, measure in enumerate(measures):
+    figures, findings, notes = np.array([of_cycle.get(one.name, np.nan) for one in measures]), [*findings], {**why}
+    lost = np.zeros(len(time), bool) if status is None else status == Status.CONTACT_LOST
+    for i, measure in enumerate(measures if np.any(lost) else ()):
         if measure.rule == "deviation":
             continue
-        there = _resting_on(run, measure, values[i], time)
-        lost = ~valid[there]
-        if measure.rule in OF_PLACES and np.any(lost):
-            at = " and ".join(dial.at(int(k)) for k in there[lost])
+        places = _resting_on(run, measure, values[i], time)
+        gone = places[lost[places]]
+        if len(gone) and measure.rule in OF_PLACES:
+            dial = run.system.dial(run.values, time)
+            at = " and ".join(dial.at(int(k)) for k in gone)
             figures[i], notes[measure.name] = np.nan, f"not valid: a pin loses contact at its place, {at}"
-            why = SWITCHES if _beside_switch(run, time, there[lost]) else ""
-            where = f"measures.{measure.name}"
-            findings.append(finding_for("measure.contact_lost", where, at=at, phrases={"why": why}))
-        elif np.any(lost):
-            notes[measure.name] = f"a pin loses contact at {np.count_nonzero(lost)} of its {len(lost)} positions"
+            phrases = {"why": SWITCHES if _beside_switch(run, time, gone) else ""}
+            findings.append(finding_for("measure.contact_lost", f"measures.{measure.name}", at=at, phrases=phrases))
+        elif len(gone):
+            notes[measure.name] = f"a pin loses contact at {len(gone)} of its {len(places)} positions"
     return Watched(run, measures, values, figures, findings, notes, extremes)
 
 
-def _extremes(run: Run, measures: Sequence[Measure], method: FrictionMethod) -> dict[str, tuple[float, float]]:
-    """Least and largest value of measures over the cycle, where no pin loses contact; of those of one number alone."""
-    single = [one for one in measures if one.single(run.system)]
-    if not single:
-        return {}
-    gaps = seating_of(run, method).gaps if run.seats else None
-    ends = [
+def _over_cycle(
+    run: Run, method: FrictionMethod
+) -> tuple[list[Measure], list[Finding], dict[str, float], dict[str, tuple[float, float]], dict[str, str]]:
+    """The measures that a cycle has, why the others are left out, the figures of those that state one, the extremes of
+    the others where no pin loses contact, and why there is no figure."""
+    measures, findings, notes = list[Measure](), list[Finding](), dict[str, str]()
+    for name in run.system.mechanism.measures:
+        try:
+            measures.append(_of_a_cycle(run, name))
+        except MechanismError as error:
+            what = f"the measure '{name}' is left out: {error.findings[0].what}"
+            findings.append(Finding(what, f"measures.{name}", error.findings[0].remedy, Severity.NOTE))
+    figures = figures_of(run, [one for one in measures if one.rule != "deviation"], method)
+    single = [one for one in measures if one.rule == "deviation" and one.single(run.system)]
+    gaps = seating_of(run, method).gaps if run.seats and single else None
+    least, most = (
         figures_of(run, [replace(one, statistic=statistic) for one in single], method, gaps)
         for statistic in ("minimum", "maximum")
-    ]
-    return {one.name: (ends[0][one.name], ends[1][one.name]) for one in single}
+    )
+    for measure in measures:
+        if np.isfinite(figures.get(measure.name, 0.0)):
+            continue
+        if measure.rule.startswith("dead centre"):
+            ends = "minimum", "maximum: leave out as"
+            what, other = ends if measure.rule.endswith("least") else ("maximum", "minimum: state as: place-of-minimum")
+            notes[measure.name] = f"no {what} within the cycle; for a {other}"
+        elif measure.rule == "time ratio":
+            notes[measure.name] = "it does not go forth and back in a cycle that repeats, or jumps back"
+    return measures, findings, figures, {name: (least[name], most[name]) for name in least}, notes
 
 
 def _beside_switch(run: Run, time: Array, places: NDArray[np.intp]) -> bool:
@@ -167,12 +160,13 @@ def _resting_on(run: Run, measure: Measure, values: Array, time: Array) -> NDArr
     course = values[index]
     if measure.rule not in OF_PLACES or not np.any(np.isfinite(course)):
         return index
-    picks = [pick(OF_PLACES[measure.rule](course)) for pick in (np.nanargmin, np.nanargmax)]
-    ends = {"minimum": picks[:1], "place-of-minimum": picks[:1], "peak-to-peak": picks, "time ratio": picks}
-    return index[ends.get(measure.rule, picks[1:])]
+    course = np.abs(course) if measure.rule == "largest" else course
+    least, most = index[np.nanargmin(course)], index[np.nanargmax(course)]
+    ends = [least] if measure.rule.endswith("minimum") else [least, most] if measure.rule in OF_BOTH else [most]
+    return np.array(ends)
 
 
-def _had(run: Run, name: str, steps: int) -> Measure:
+def _of_a_cycle(run: Run, name: str) -> Measure:
     """A measure of the model; MechanismError if this cycle has none such."""
     measure = named(run.system.mechanism, [name], run.values)[0]
     if name in TAKEN:
@@ -185,27 +179,24 @@ def _had(run: Run, name: str, steps: int) -> Measure:
         raise MechanismError(Finding("it is of a motion in time", remedy=remedy))
     if measure.of.of_forces and run.determinacy is not None:
         run.determinacy.refuse()
-    plan(run, [measure], steps)
+    ends_by_name(run, [measure])
     if measure.of_places:
-        measure.curve(forward(run.system, run.values, run.chosen.assembly, np.zeros(1)))
+        measure.curve(run.walk(np.zeros(1)))
     return measure
 
 
 def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod) -> Array:
     """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers."""
-    system = run.system
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
         return values
     with np.errstate(all="ignore"):
-        courses = courses_of(run, measures, time, method)[0]
-        walk = forward(system, run.values, run.chosen.assembly, time)
-    for i, measure in enumerate(measures):
+        courses, walk = courses_of(run, measures, time, method)[0], run.walk(time)
+    for row, measure in zip(values, measures, strict=True):
         if len(courses[measure.name]) > 1:
             continue
-        values[i] = courses[measure.name][0]
-        if measure.turning(system):
-            rate = np.broadcast_to(np.asarray(measure.coordinate(system).rate(walk), float), time.shape)
-            step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-            unwrap_row(values[i], rate, step)
+        row[:] = courses[measure.name][0]
+        if measure.turning(run.system):
+            rate = np.broadcast_to(np.asarray(measure.coordinate(run.system).rate(walk), float), time.shape)
+            unwrap_row(row, rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)
     return values

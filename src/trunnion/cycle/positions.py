@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from trunnion.cycle import contact_loss, resting_joints
 from trunnion.cycle.causes import Causes
-from trunnion.cycle.course import CycleCourse, course_of
-from trunnion.cycle.cycle_kernel import CycleKernel, compiles
+from trunnion.cycle.course import CycleCourse, Means, course_of, unknown
+from trunnion.cycle.cycle_kernel import compiles, kernel_of
 from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_errors, labels, unwrap
-from trunnion.cycle.means import Means, unknown
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.arguments import strict_arguments
@@ -24,7 +23,7 @@ from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.memory import blocks
 from trunnion.solve.run import Run
 from trunnion.solve.seating import SETTLED, seating_of
-from trunnion.solve.system import Dial, System, Values
+from trunnion.solve.system import Dial, System
 
 __all__ = ["ALL", "Arrays", "Dtype", "Kept", "Positions", "check_steps", "positions", "stretch"]
 
@@ -149,7 +148,7 @@ def stretch(
     names = labels(run.system) | ({"end": ["1", "2"]} if run.seats else {})
     parts = [part for part, has in (("seats", run.seats), ("errors", run.erring)) if has]
     arrays, causes = allocate(run.system, steps, parts, wanted), Causes(run.system)
-    compiled = compiles(engine, run, steps, method) and _compiled(arrays, run, time, method, causes, engine == "auto")
+    compiled = compiles(engine, run, steps, method) and _compiled(arrays, run, time, method, causes, engine)
     for window in blocks(0 if compiled else steps, len(run.system.joints)):
         _fill(arrays, run, time[window], window, method, causes)
         if progress:
@@ -196,25 +195,17 @@ def _fill(
 
 
 def _compiled(
-    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: Causes, or_not: bool
+    arrays: Arrays, run: Run, time: NDArray[np.float64], method: FrictionMethod, causes: Causes, engine: str
 ) -> bool:
-    """All positions by the compiled engine. or_not: False where it cannot, in place of a MechanismError."""
-    try:
-        kernel = _kernel(run, run.values, time, arrays, method)
-    except MechanismError:
-        if or_not:
-            return False
-        raise
+    """All positions by the compiled engine; False where that cannot, of the engine auto."""
+    kernel = kernel_of(run, engine, run.values, time, arrays, method)
+    if kernel is None:
+        return False
     kernel.fill(arrays, run.values, time, causes)
     if run.erring:
         meant, quick = allocate(run.system, len(time), wanted=COMPARED), replace(method, margin_up_to=0.0)
-        _kernel(run, run.ideal_values, time, meant, quick).fill(meant, run.ideal_values, time)
+        ideal = kernel_of(run, "compiled", run.ideal_values, time, meant, quick)
+        assert ideal is not None
+        ideal.fill(meant, run.ideal_values, time)
         fill_errors(arrays, meant, run.system, slice(0, len(time)))
     return True
-
-
-def _kernel(run: Run, values: Values, time: NDArray[np.float64], arrays: Arrays, method: FrictionMethod) -> CycleKernel:
-    """The compiled kernel of some variables, made once for numbers of one kind."""
-    read = tuple(name for name, array in arrays.items() if array.strides[-1])
-    key = "compiled", values is run.values, method, read
-    return run.once(key, lambda: CycleKernel(run, values, time, arrays, method))

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
-from trunnion.cycle.course import CycleCourse, magnitude
+from trunnion.cycle.course import MOST_SUPPOSED, CycleCourse, Means, magnitude
 from trunnion.cycle.findings import Cycle, effort_units, findings
 from trunnion.cycle.locking_course import critical_figure
-from trunnion.cycle.means import MOST_SUPPOSED, Means
 from trunnion.cycle.model_measures import watched
 from trunnion.cycle.positions import ALL, Kept, Positions
 from trunnion.cycle.scales import peak, scales_of

@@ -12,9 +12,9 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.cycle.model_measures import watched
 from trunnion.errors import Finding, MechanismError
+from trunnion.measures.curves import MOTIONS
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
-from trunnion.measures.motion import MOTIONS
 from trunnion.model.checks.measures import subjects
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.mechanism import Mechanism

@@ -63,7 +63,7 @@ class Filling:
                 joints.fill(back, touched, window)
         whole = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
-            if array.flags.writeable and array.dtype == np.float64:
+            if array.dtype == np.float64:
                 array[..., which < 0] = np.nan
         fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
         resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])

@@ -1,163 +1,233 @@
 """The course of every kind of measure: one number or more, position by position; SI, angles in (−π, π].
 
 `CURVES` has one function an entry of `model.measure_table.MEASURES`, of a `Backward` if that needs forces, else of a
-`Forward`. Floats, arrays or dual numbers flow through, as the values of the mechanism are.
+`Forward`. Floats, arrays or dual numbers flow through, as the values of the mechanism are. Some are numbers of the
+motion with unit loads (`MOTIONS`): a unit load does the work 1 on a unit of the number. Under these alone, the drivers
+at rest, the reactions say what every small displacement in a joint does to the number.
 """
 
 from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.measures import motion
-from trunnion.measures.motion import MotionRequest, component
-from trunnion.measures.transmission import of_joint
+from trunnion.algebra.plane import Wrench
+from trunnion.algebra.space import Screw
+from trunnion.algebra.vector import Vector3, cross, dot
+from trunnion.errors import Finding, MechanismError
+from trunnion.groups.dyad import DyadPose
 from trunnion.solve.backward import Backward
-from trunnion.solve.forward import Forward, SpatialWalk
+from trunnion.solve.forward import Forward, PointMotion, SpatialWalk
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.loads import SpringState, has_useful_work, springs, useful_powers
 from trunnion.solve.margin import locking_margin as multiple_that_locks
 
-__all__ = ["CURVES", "Course"]
+__all__ = ["AXES", "CURVES", "MOTIONS", "MotionRequest", "loads", "pressure_angles", "rate", "value"]
 
-Course = Callable[[MotionRequest, Any], tuple[Number, ...]]
-
-
-# ---- of the places --------------------------------------------------------------------------------------------
-
-
-def value(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """The number of the motion itself."""
-    return (motion.value(measure, walk),)
+AXES = ("x", "y", "z")
+NULL: Vector3 = (0.0, 0.0, 0.0)
+MOTIONS = ("point", "angle", "rotation", "slide")  # kinds of measures that have unit loads
 
 
-def of_joint_motion(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """The rotation of a joint, or the slide of one that does not turn."""
-    return (motion.value(measure, walk, "rotation" if walk.system.turns(measure.subject) else "slide"),)
+class MotionRequest(Protocol):
+    """What of a measure its course depends on; see `measures.Measure`."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def subject(self) -> str: ...
+    @property
+    def axis(self) -> str: ...
+    @property
+    def along(self) -> tuple[float, ...]: ...
 
 
-def attitude(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
+# ---- numbers with unit loads ----------------------------------------------------------------------------------
+
+
+def _direction(measure: MotionRequest, size: int) -> Any:
+    """Unit vector of the component that is asked for, of two or three numbers; empty for none: the magnitude."""
+    if measure.along:
+        length = sum(part * part for part in measure.along) ** 0.5
+        return tuple(part / length for part in measure.along)
+    return tuple(1.0 if axis == measure.axis else 0.0 for axis in AXES[:size]) if measure.axis else ()
+
+
+def _component(measure: MotionRequest, vector: Any) -> Number:
+    """The component of a vector that is asked for, or its magnitude, which has no derivative where it is 0."""
+    if measure.axis:
+        return vector[AXES.index(measure.axis)]
+    total: Number = 0.0
+    if along := _direction(measure, len(vector)):
+        for share, part in zip(along, vector, strict=True):
+            total = total + share * part
+        return total
+    for part in vector:
+        total = total + part * part
+    return namespace(total).sqrt(total)
+
+
+def _point(measure: MotionRequest, walk: Forward) -> PointMotion:
+    return walk.point(*measure.subject.split("."))
+
+
+def value(measure: MotionRequest, walk: Forward) -> Number:
+    """The number, m or rad.
+
+    The turn of a link in space is that from the real part of its frame, which has a derivative only: ½ Σ eᵢ⁰ × eᵢ along
+    the axis.
+    """
+    if measure.kind == "point":
+        return _component(measure, _point(measure, walk).place)
+    if measure.kind != "angle":
+        return walk.coordinates(measure.subject)[("rotation", "slide").index(measure.kind)]
+    frame = walk.motions[measure.subject].frame
+    if not isinstance(walk, SpatialWalk):
+        return namespace(frame.c, frame.s).arctan2(frame.s, frame.c)
+    total: Number = 0.0
+    for axis in frame[:3]:
+        before: Any = tuple(primal(number) for number in axis)
+        total = total + 0.5 * dot(cross(before, axis), _direction(measure, 3))
+    return total
+
+
+def loads(measure: MotionRequest, walk: Forward) -> dict[str, Any]:
+    """The unit loads by link, about the global origin: their power is the rate of the number.
+
+    They are equal and opposite on the two links of a joint.
+    """
+    in_space = isinstance(walk, SpatialWalk)
+    along, none = _direction(measure, 3 if in_space else 2), NULL if in_space else 0.0
+    if measure.kind == "point":
+        return {measure.subject.split(".")[0]: walk.algebra.about(along, none, _point(measure, walk).place)}
+    if measure.kind == "angle":
+        return {measure.subject: Screw(NULL, along) if in_space else Wrench(0.0, 0.0, 1.0)}
+    links, ends = walk.system.joints[measure.subject][1], walk.ends(measure.subject)
+    axis: Any = ends[1].z if in_space else (ends[0].c, ends[0].s)
+    if measure.kind == "slide":
+        load = walk.algebra.about(axis, none, walk.algebra.place_of(ends[1]))
+    else:
+        load = Screw(NULL, axis) if in_space else Wrench(0.0, 0.0, 1.0)
+    return {links[0]: walk.algebra.times(-1.0, load), links[1]: load}
+
+
+def rate(measure: MotionRequest, walk: Forward) -> Number:
+    """ẏ, by the power of the unit loads."""
+    total: Number = 0.0
+    for link, load in loads(measure, walk).items():
+        total = total + walk.algebra.power(load, walk.motions[link].twist)
+    return total
+
+
+# ---- other numbers of the motion ------------------------------------------------------------------------------
+
+
+def _attitude(measure: MotionRequest, walk: Forward) -> Number | tuple[Number, ...]:
     """The angle of a link; in space the axes of its frame, nine numbers."""
     if not isinstance(walk, SpatialWalk):
         return value(measure, walk)
     return tuple(number for axis in walk.motions[measure.subject].frame[:3] for number in axis)
 
 
-def place(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Coordinates of a point, m: two in the plane, three in space."""
-    link, point = measure.subject.split(".")
-    return tuple(walk.point(link, point).place)
+def _turn_or_slide(measure: MotionRequest, walk: Forward, pair: tuple[Number, Number]) -> Number:
+    """Of what a joint has of its rotation and of its slide the former, the latter if it does not turn."""
+    return pair[0 if walk.system.turns(measure.subject) else 1]
 
 
-def pressure_angle(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Of the dyad of a joint, rad in −π/2 … π/2."""
-    return (of_joint(walk, measure.subject),)
-
-
-def transmission_angle(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Of the dyad of a joint, rad in 0 … π/2: of an RRR the angle at its inner pin, folded to be acute."""
-    angle = of_joint(walk, measure.subject)
-    return (np.pi / 2 - namespace(angle).abs(angle),)
-
-
-# ---- of the motion --------------------------------------------------------------------------------------------
-
-
-def velocity(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Of a point, m/s."""
-    link, point = measure.subject.split(".")
-    return (component(measure, tuple(walk.point(link, point).velocity)),)
-
-
-def acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Of a point, m/s²."""
-    link, point = measure.subject.split(".")
-    return (component(measure, tuple(walk.point(link, point).acceleration)),)
-
-
-def angular_velocity(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Of a link, rad/s; in the plane counterclockwise."""
-    twist = walk.motions[measure.subject].twist
-    return (component(measure, tuple(twist.u)) if isinstance(walk, SpatialWalk) else twist.w,)
-
-
-def angular_acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Of a link, rad/s²; in the plane counterclockwise."""
-    second = walk.motions[measure.subject].acceleration
-    return (component(measure, tuple(second.u)) if isinstance(walk, SpatialWalk) else second.w,)
-
-
-def rate(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Speed of the second link of a joint against the first, rad/s about the joint's axis or m/s along it."""
-    return (walk.rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
-
-
-def joint_acceleration(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Second derivative of the rotation of a joint, rad/s², or of the slide of one that does not turn, m/s²."""
-    return (walk.second_rates(measure.subject)[0 if walk.system.turns(measure.subject) else 1],)
-
-
-def spring_elongation(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Length or angle of a spring beyond its free one, m or rad."""
-    return (_spring(measure, walk).elongation,)
+def _spin(measure: MotionRequest, twist: Any) -> Number:
+    """Of an angular velocity or its derivative; in the plane counterclockwise."""
+    return twist.w if hasattr(twist, "w") else _component(measure, twist.u)
 
 
 def _spring(measure: MotionRequest, walk: Forward) -> SpringState:
     return next(state for name, _, state in springs(walk) if name == measure.subject)
 
 
-def spring_force(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
-    """Pull of a spring and its damper, N, or torque, N m."""
-    return (_spring(measure, walk).force,)
+# ---- how well a dyad passes force on --------------------------------------------------------------------------
+
+
+def _pressure_angle(pose: DyadPose) -> Number:
+    """Pressure angle φ of a dyad from its pose, rad in −π/2 … π/2.
+
+    The angle between the force that the first link puts on the second, had the first neither friction nor loads,
+    and the velocity of the point of the second that it acts on, against the link that holds the second. But for RPP
+    it is the same the other way round. cos φ is 2 over the condition number of the dyad. With its joints B, C, D:
+
+    RRR   force along BC, velocity of C across DC: sin φ = cos(BC, DC), positive where the angle at C is acute
+    RRP   force along BC, velocity along the guide u: sin φ = p/|BC|, C being p to the left of the line along u by B
+    RPR   force across the slide, through B, velocity across BD: sin φ = e/|BD|, D being e to the left of that line
+    PRP, RPP   force across the one guide u, velocity along the other v: sin φ = cos(u, v)
+
+    Source: R. L. Norton, Design of Machinery, "Transmission angle" (π/2 less |φ|) and "Pressure angle".
+    """
+    moves = 1 / pose.area
+    xp = namespace(pose.lost, moves)
+    return xp.arctan2(pose.lost, xp.abs(moves))
+
+
+def _dyads(walk: Forward) -> Iterator[tuple[Sequence[str], DyadPose]]:
+    """The joints and the pose of every dyad."""
+    for module, pose in zip(walk.system.plan.modules, walk.poses, strict=True):
+        if isinstance(pose, DyadPose):
+            yield module.joints, pose
+
+
+@np.errstate(all="ignore")
+def pressure_angles(walk: Forward) -> dict[str, Number]:
+    """Pressure angle of every dyad along a walk in the plane, by its joints' names."""
+    return {"-".join(joints): _pressure_angle(pose) for joints, pose in _dyads(walk)}
+
+
+@np.errstate(all="ignore")
+def _pressure_at(measure: MotionRequest, walk: Forward) -> Number:
+    """Pressure angle of the dyad that a joint is of; MechanismError if it is of none."""
+    poses = {joint: pose for joints, pose in _dyads(walk) for joint in joints}
+    if measure.subject not in poses:
+        what = f"'{measure.subject}' is no joint of a dyad, which alone has a transmission angle"
+        those = f"those of a dyad are {', '.join(poses)}" if poses else "this mechanism has no dyad"
+        raise MechanismError(Finding(what, f"joints.{measure.subject}", those))
+    return _pressure_angle(poses[measure.subject])
+
+
+def _transmission_angle(measure: MotionRequest, walk: Forward) -> Number:
+    """Rad in 0 … π/2: of an RRR the angle at its inner pin, folded to be acute."""
+    angle = _pressure_at(measure, walk)
+    return np.pi / 2 - namespace(angle).abs(angle)
 
 
 # ---- of the forces --------------------------------------------------------------------------------------------
 
 
-def effort(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """Torque or force of a driver, N m or N."""
-    return (back.efforts[measure.subject],)
-
-
-def load(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """Torque or force of a load on a joint against the joint's positive sense, N m or N; NaN where the joint rests.
+def _load(measure: MotionRequest, back: Backward) -> Number:
+    """Torque or force of a load on a joint against the joint's positive sense; NaN where the joint rests.
 
     Times the speed of the joint it is the power that the load takes.
     """
     stated = back.walk.system.mechanism.loads[measure.subject]
-    joint, turns = stated.joint or "", stated.resisting_torque is not None
-    speed = back.walk.rates(joint)[0 if turns else 1]
-    moving = primal(speed) != 0
+    speed = back.walk.rates(stated.joint or "")[0 if stated.resisting_torque is not None else 1]
     xp = namespace(speed)
-    return (-back.load_powers[measure.subject] / xp.where(moving, speed, np.nan),)
+    return -back.load_powers[measure.subject] / xp.where(primal(speed) != 0, speed, np.nan)
 
 
-def reaction(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """Force in a joint without friction and drive effort, N."""
-    found: Any = back.reactions[measure.subject]
-    return (component(measure, (found.x, found.y) if hasattr(found, "x") else tuple(found.u)),)
+def _reaction(measure: MotionRequest, back: Backward) -> Number:
+    """Force in a joint without friction and drive effort."""
+    load: Any = back.reactions[measure.subject]
+    return _component(measure, (load.x, load.y) if hasattr(load, "x") else load.u)
 
 
-def power(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """What a driver, or a load, gives the mechanism, W."""
+def _power(measure: MotionRequest, back: Backward) -> Number:
+    """What a driver, or a load, gives the mechanism."""
     name = measure.subject
-    if name in back.efforts:
-        return (back.efforts[name] * back.walk.rate(name),)
-    return (back.load_powers[name],)
+    return back.efforts[name] * back.walk.rate(name) if name in back.efforts else back.load_powers[name]
 
 
-def friction_power(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
-    """Power lost to friction in a joint, W."""
-    return (back.friction_power(measure.subject),)
-
-
-def friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
+def _friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Power lost to friction in a joint, W, and how long the first driver takes for its cycle, s."""
     walk = back.walk
     driver = next(iter(walk.system.mechanism.drivers), "")
@@ -165,7 +235,7 @@ def friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...
     return back.friction_power(measure.subject), duration
 
 
-def efficiency(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
+def _efficiency(measure: MotionRequest, back: Backward) -> Number | tuple[Number, ...]:
     """Useful and drive power, W; of an instant their ratio, NaN where nothing is useful or the drivers put no power
     in."""
     walk = back.walk
@@ -177,52 +247,53 @@ def efficiency(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
         driven = driven + back.efforts[name] * walk.rate(name)
     if measure.subject == "cycle":
         return useful, driven
-    xp = namespace(driven)
-    return (useful / xp.where(driven > 0, driven, np.nan),)
+    return useful / namespace(driven).where(driven > 0, driven, np.nan)
 
 
-def locking_margin(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
+def _locking_margin(measure: MotionRequest, back: Backward) -> Number:
     """Multiple of the friction at which a module locks, MARGIN where it does not up to there.
 
     The search for it has no derivatives: they are NaN where dual numbers ask for some below MARGIN.
     """
     margin: Number = np.minimum(multiple_that_locks(back), MARGIN)
     forces: Number = functools.reduce(operator.add, (*back.friction.values(), *back.efforts.values()), 0.0)
-    if isinstance(forces, Dual):
-        return (Dual(margin, np.where(margin < MARGIN, np.nan, 0.0)),)
-    return (margin,)
+    return Dual(margin, np.where(margin < MARGIN, np.nan, 0.0)) if isinstance(forces, Dual) else margin
 
 
-def of_no_cycle(measure: MotionRequest, walk: Forward) -> tuple[Number, ...]:
+def _of_joint(measure: MotionRequest, walk: Forward) -> Number:
+    return _turn_or_slide(measure, walk, walk.coordinates(measure.subject))
+
+
+def _of_no_cycle(measure: MotionRequest, walk: Forward) -> Number:
     """None: a figure of a motion in time is no course over a cycle, see `dynamics.measured`."""
-    return (np.nan,)
+    return np.nan
 
 
-CURVES: dict[str, Course] = {
+CURVES: dict[str, Callable[[MotionRequest, Any], Number | tuple[Number, ...]]] = {
     "point": value,
-    "path_error": place,
-    "straightness": place,
-    "angle": attitude,
+    "path_error": lambda measure, walk: tuple(_point(measure, walk).place),
+    "straightness": lambda measure, walk: tuple(_point(measure, walk).place),
+    "angle": _attitude,
     "rotation": value,
     "slide": value,
-    **dict.fromkeys(("transmission_error", "stroke", "dead_centre", "time_ratio"), of_joint_motion),
-    "rate": rate,
-    "joint_acceleration": joint_acceleration,
-    "velocity": velocity,
-    "acceleration": acceleration,
-    "angular_velocity": angular_velocity,
-    "angular_acceleration": angular_acceleration,
-    "transmission_angle": transmission_angle,
-    "pressure_angle": pressure_angle,
-    "effort": effort,
-    "load": load,
-    "spring_force": spring_force,
-    "spring_elongation": spring_elongation,
-    "reaction": reaction,
-    "power": power,
-    "friction_power": friction_power,
-    "friction_energy": friction_energy,
-    "efficiency": efficiency,
-    "locking_margin": locking_margin,
-    **dict.fromkeys(("starting_time", "steady_speed", "fluctuation", "peak_effort"), of_no_cycle),
+    **dict.fromkeys(("transmission_error", "stroke", "dead_centre", "time_ratio"), _of_joint),
+    "rate": lambda measure, walk: _turn_or_slide(measure, walk, walk.rates(measure.subject)),
+    "joint_acceleration": lambda measure, walk: _turn_or_slide(measure, walk, walk.second_rates(measure.subject)),
+    "velocity": lambda measure, walk: _component(measure, _point(measure, walk).velocity),
+    "acceleration": lambda measure, walk: _component(measure, _point(measure, walk).acceleration),
+    "angular_velocity": lambda measure, walk: _spin(measure, walk.motions[measure.subject].twist),
+    "angular_acceleration": lambda measure, walk: _spin(measure, walk.motions[measure.subject].acceleration),
+    "transmission_angle": _transmission_angle,
+    "pressure_angle": _pressure_at,
+    "effort": lambda measure, back: back.efforts[measure.subject],
+    "load": _load,
+    "spring_force": lambda measure, walk: _spring(measure, walk).force,
+    "spring_elongation": lambda measure, walk: _spring(measure, walk).elongation,
+    "reaction": _reaction,
+    "power": _power,
+    "friction_power": lambda measure, back: back.friction_power(measure.subject),
+    "friction_energy": _friction_energy,
+    "efficiency": _efficiency,
+    "locking_margin": _locking_margin,
+    **dict.fromkeys(("starting_time", "steady_speed", "fluctuation", "peak_effort"), _of_no_cycle),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Status
-from trunnion.measures.figures import known
 from trunnion.measures.measures import Measure
 from trunnion.solve.backward import Backward
 from trunnion.solve.forward import Forward, forward, posed
@@ -23,7 +22,10 @@ from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 from trunnion.solve.status import pose_status, status_of
 
-__all__ = ["Curves", "Kernel", "NumpyKernel", "courses_of", "lanes_of", "picked", "shape_of", "step_of", "where_known"]
+__all__ = [
+    "Curves", "Kernel", "NumpyKernel", "SeatedKernel", "courses_of", "lanes_of", "picked", "shape_of", "step_of",
+    "where_known",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 Curves = dict[str, tuple[Number, ...]]  # the parts of the course of each measure
@@ -87,26 +89,40 @@ class NumpyKernel:
     def curves(self, solved: Backward | Forward, status: NDArray[np.int8]) -> Curves:
         """The parts of the courses of what is solved."""
         return {
-            measure.name: tuple(where_known(known(measure, status), part) for part in measure.curve(solved))
+            measure.name: tuple(where_known(measure, status, part) for part in measure.curve(solved))
             for measure in self.measures
         }
 
 
+@dataclass(frozen=True)
+class SeatedKernel(NumpyKernel):
+    """The mechanism itself at times of its cycle, s, pins in their seats. gaps: from and to, s, (2, gap), where one is
+    to have lost contact."""
+
+    gaps: Array = field(default_factory=lambda: np.zeros((2, 0)))
+
+    def courses(self, values: Mapping[str, Number], time: Number) -> tuple[Curves, NDArray[np.int8]]:
+        """As `NumpyKernel.courses`."""
+        if not self.run.seats:
+            return super().courses(values, time)
+        place = np.asarray(time)
+        with np.errstate(all="ignore"):
+            seated = seating_of(self.run, self.method).at(place, self.method)
+            status = status_of(seated.back, place.shape)
+            np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
+            curves = self.curves(seated.back, status)
+        lost = np.any((self.gaps[0] < place[:, None]) & (place[:, None] < self.gaps[1]), axis=1)
+        return curves, np.where(lost, np.maximum(status, np.int8(Status.CONTACT_LOST)), status)
+
+
 def courses_of(
-    run: Run, measures: Sequence[Measure], time: NDArray[np.float64], method: FrictionMethod
+    run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod
 ) -> tuple[Curves, NDArray[np.int8]]:
     """The course of each measure of the mechanism itself at some times, s, and their statuses; pins lie in their seats.
 
     What was asked of the method's margin is left to the measures.
     """
-    kernel = NumpyKernel(run, tuple(measures), replace(method, margin_up_to=0.0))
-    if not run.seats:
-        return kernel.courses(run.values, time)
-    with np.errstate(all="ignore"):
-        seated = seating_of(run, kernel.method).at(time, kernel.method)
-        status = status_of(seated.back, time.shape)
-        np.maximum(status, np.where(seated.sticks, np.int8(Status.ZERO_SLIP), np.int8(0)), out=status)
-        return kernel.curves(seated.back, status), status
+    return SeatedKernel(run, tuple(measures), replace(method, margin_up_to=0.0)).courses(run.values, time)
 
 
 def shape_of(values: Mapping[str, Number], time: Number) -> tuple[int, ...]:
@@ -144,10 +160,10 @@ def step_of(run: Run, values: Mapping[str, Number], count: int) -> Array:
     return step
 
 
-def where_known(known: NDArray[np.bool_], number: Number) -> Number:
-    """The number, NaN where it is not known."""
-    if np.all(known):
-        return number
-    hole = np.where(known, 0.0, np.nan)
-    assert np.ndim(primal(number)) <= hole.ndim
-    return number + hole
+def where_known(measure: Measure, status: NDArray[np.int8], number: Number) -> Number:
+    """The course of a measure, NaN where the status of the positions says that it has no answer."""
+    if measure.of_motion:
+        known = status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
+    else:
+        known = status < (Status.LOAD_UNDEFINED if measure.wants_margin else Status.NOT_CONVERGED)
+    return number if np.all(known) else number + np.where(known, 0.0, np.nan)

@@ -41,7 +41,7 @@ from trunnion.measures.measures import Measure
 from trunnion.measures.positions import gain_of, path_of
 from trunnion.solve.run import Run
 
-__all__ = ["ENDLESS", "Figures", "Panels", "Reading", "combined", "known", "near", "within_limits"]
+__all__ = ["ENDLESS", "Figures", "Panels", "Reading", "combined", "near", "within_limits"]
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
@@ -237,46 +237,54 @@ class Reading:
 
     def _of_rule(self, panels: Panels) -> tuple[Number, Number, Number, Array]:
         """Figure, deviations and time, wherever the courses have an answer."""
-        rule = self.measure.rule
-        if rule in ("deviation", "largest", "maximum", "minimum"):
-            panels, of = self.number(panels)
-            tops = [panels.top(of, sign) for sign in SIGNS.get(rule, BOTH)]
-            times = [self._beside(panels, top) for top in tops]
-            if len(tops) == 1:
-                return self._apart(tops[0].value, times[0])
-            most, least = (top.value for top in tops)
+        rule, (panels, of) = self.measure.rule, self.number(panels)
+        if rule not in ("deviation", "largest", "maximum", "minimum"):
+            figure = self._figure(panels, of)
+            return figure, figure - self.nominal, figure - self.nominal, np.full(np.shape(primal(figure)), np.nan)
+        tops = [panels.top(of, sign) for sign in SIGNS.get(rule, BOTH)]
+        times = [self._beside(panels, top) for top in tops]
+        most, least = tops[0].value, tops[-1].value
+        figure, time = most, times[0]
+        if len(tops) == 2:
             figure = namespace(most, least).maximum(-least, most)
-            if rule == "deviation":
-                return figure, least, most, times[0] * np.nan
-            return self._apart(figure, np.where(primal(most) >= -primal(least), *times))
-        figure = self._over_time(panels) if rule in (*OVER_TIME, "value") else self._of_extremes(panels)
-        return self._apart(figure, np.full(np.shape(primal(figure)), np.nan))
-
-    def _apart(self, figure: Number, time: Array) -> tuple[Number, Number, Number, Array]:
+            time = np.where(primal(most) >= -primal(least), *times)
+        if rule == "deviation":
+            return figure, least, most, time * np.nan
         return figure, figure - self.nominal, figure - self.nominal, time
+
+    def _figure(self, panels: Panels, of: Made) -> Number:
+        """The figure of a rule that is of no single place of the course."""
+        match self.measure.rule:
+            case "mean" | "value":
+                return panels.mean(of)
+            case "rms":
+                square = panels.mean(lambda rows: of(rows) * of(rows))
+                return namespace(square).sqrt(square)
+            case "work":
+                share = (self.ends[1] - self.ends[0]) / self.run.cycle.duration if self.ends else 1.0
+                return panels.mean(first) * panels.mean(lambda rows: rows[1]) * share
+            case "ratio":
+                return self._ratio(panels)
+            case "dwell":
+                return self._dwell(panels)
+            case "line" if of is length:
+                return 2.0 * panels.top(of).value
+            case "peak-to-peak" | "line":
+                return panels.top(of).value - panels.top(of, -1.0).value
+            case "time ratio":
+                return self._time_ratio(panels, of)
+            case rule:
+                place, gain = panels.time(panels.top(of, SIGNS[rule][0])), self._gain
+                dead = rule.startswith("dead")
+                figure = self._dead_centre(panels, place) if dead else self._coordinate(place)
+                return near(figure, self.nominal, abs(gain)) if gain and np.isfinite(self.nominal) else figure
 
     def _beside(self, panels: Panels, top: Top) -> Array:
         """Time of an extreme, s, within its panel; NaN of a constant."""
-        low, width = (primal(side) for side in panels.sides(top))
-        width = 2.0 * width
-        beside = np.minimum(BESIDE * self.run.cycle.duration, width / 2)
-        time = np.clip(primal(panels.time(top)), low + beside, low + width - beside)
+        low, half = (primal(side) for side in panels.sides(top))
+        beside = np.minimum(BESIDE * self.run.cycle.duration, half)
+        time = np.clip(primal(panels.time(top)), low + beside, low + 2.0 * half - beside)
         return np.where(top.constant, np.nan, time)
-
-    def _over_time(self, panels: Panels) -> Number:
-        rule = self.measure.rule
-        if rule == "ratio":
-            return self._ratio(panels)
-        if rule == "dwell":
-            return self._dwell(panels)
-        if rule == "work":
-            share = (self.ends[1] - self.ends[0]) / self.run.cycle.duration if self.ends else 1.0
-            return panels.mean(first) * panels.mean(lambda rows: rows[1]) * share
-        panels, of = self.number(panels)
-        if rule != "rms":
-            return panels.mean(of)
-        square = panels.mean(lambda rows: of(rows) * of(rows))
-        return namespace(square).sqrt(square)
 
     def _ratio(self, panels: Panels) -> Number:
         """Useful over drive work of the cycle; NaN where the loads drive.  [D 1]
@@ -302,24 +310,15 @@ class Reading:
         within, whole = (linear(number * times, lambda array: np.sum(array, -1)) for number in (share, 2.0))
         return within / whole
 
-    def _of_extremes(self, panels: Panels) -> Number:
-        rule = self.measure.rule
-        panels, of = self.number(panels)
-        if rule == "line" and of is length:
-            return 2.0 * panels.top(of).value
-        if rule in ("peak-to-peak", "line"):
-            return panels.top(of).value - panels.top(of, -1.0).value
-        gain = gain_of(self.run) if self._around else 0.0
-        if rule == "time ratio":
-            return self._time_ratio(panels, of, gain)
-        place = panels.time(panels.top(of, SIGNS[rule][0]))
-        figure = self._dead_centre(panels, place) if rule.startswith("dead") else self._coordinate(place)
-        return near(figure, self.nominal, abs(gain)) if gain and np.isfinite(self.nominal) else figure
-
     @property
     def _around(self) -> bool:
         """Whether it comes again."""
         return self.run.cycle.periodic and not self.ends
+
+    @property
+    def _gain(self) -> float:
+        """What the coordinate of the first driver gains until it comes again; 0 if it does not."""
+        return gain_of(self.run) if self._around else 0.0
 
     def _coordinate(self, time: Number) -> Number:
         """The coordinate of the first driver at times, s, which may be beyond the cycle."""
@@ -341,13 +340,13 @@ class Reading:
         at_end = np.minimum(np.abs(place - start), np.abs(place - end)) <= NARROW * (end - start)
         return selected(around | ~at_end, self._coordinate(time), np.nan)
 
-    def _time_ratio(self, panels: Panels, of: Made, gain: float) -> Number:
+    def _time_ratio(self, panels: Panels, of: Made) -> Number:
         """The longer of the two ways between the places of its largest and its least value over the shorter.
 
         NaN where the motion does not come again, is none, or jumps.
         """
         ways = [self._dead_centre(panels, panels.time(panels.top(of, sign))) for sign in BOTH]
-        share = (ways[0] - ways[1]) * (1.0 / gain if gain else np.nan)
+        share = (ways[0] - ways[1]) * (1.0 / self._gain if self._gain else np.nan)
         share = share - np.floor(primal(share))
         longer = namespace(share).maximum(share, 1.0 - share)
         return longer / selected(primal(longer) < 1 - SHORTEST, 1.0 - longer, np.nan)
@@ -407,10 +406,3 @@ def within_limits(measure: Measure, figures: Array, least: Array, most: Array) -
     if measure.at_most is not None:
         good &= figures <= measure.at_most
     return np.asarray(good)
-
-
-def known(measure: Measure, status: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Where a course has an answer, by the status of the positions; it is to be NaN elsewhere."""
-    if measure.of_motion:
-        return status < (Status.NOT_ASSEMBLED if measure.of_places else Status.SINGULAR)
-    return status < (Status.LOAD_UNDEFINED if measure.wants_margin else Status.NOT_CONVERGED)

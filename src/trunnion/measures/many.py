@@ -1,89 +1,64 @@
-"""Figures of many mechanisms that differ in their numbers from a nominal one.
-
-The panels of the nominal mechanism's courses, found once, serve all of them: their edges go along with the places at
-which each mechanism switches, so that every one has its courses between its own breaks, at a few Chebyshev points a
-panel. What the polynomials do not resolve, as a load that the nominal mechanism only just does not meet, has its own
-`Courses`. With dual numbers the edges move too: d/dp ∫ y dt has the part of the jumps (Leibniz), and an extreme at a
-break that of its place.
-"""
+"""Figures of measures: of one mechanism as it is, and of many that differ in their numbers from a nominal one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.course import Accuracy, Courses
-from trunnion.algebra.dual import Dual, derivative, primal
-from trunnion.algebra.namespace import Number
-from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
-from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
-from trunnion.measures.figures import ENDLESS, Panels, Reading, combined, near
-from trunnion.measures.lines import turn
+from trunnion.algebra.course import Accuracy
+from trunnion.measures.evaluation import Kernel, SeatedKernel
+from trunnion.measures.group import MOTION, Group, Read, matters
 from trunnion.measures.measures import Measure
-from trunnion.measures.over_cycle import MOTION, Followed, alike, followed, matters, together
-from trunnion.measures.positions import moved, within
+from trunnion.measures.positions import ends_by_name
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
-from trunnion.solve.switches import (
-    MARGINS,
-    Bend,
-    Mechanisms,
-    accuracy_of,
-    bends,
-    breaks_between,
-    shifts_of,
-    stated_bends,
-    tracked,
-)
+from trunnion.solve.seating import seating_of
+from trunnion.solve.switches import MARGINS, SEATED
 from trunnion.solve.system import Values
 
-__all__ = ["Many", "Read"]
+__all__ = ["Many", "Read", "figures_of"]
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Lanes = NDArray[np.intp]
-TURN = 2 * np.pi
-READ = 512  # mechanisms whose courses are read at a time: their arrays stay in cache
-ALONE = 64  # the same of courses of their own
-FINE, FINE_MOTION = 1e-8, 1e-12  # of the size of a course: how far figures may be off, of forces and of the motion
-FINE_PLACE = 1e-11  # and where a place of forces is read
-NONE = 1e-9  # of the largest derivative: less is none
-FINE_CHANGE = 1e-6  # of the size of derivatives: how far those of figures may be off
-FIRM = 0.3  # of that: where panels are tuned
-FIRST = Accuracy(1e-4, 1e-5, rounds=2)  # of the courses whose panels are tuned
-OWN = Accuracy(1e-7, 1e-8, rounds=20)  # of courses of mechanisms by themselves
-GAP, GROSS = 1 / 360, 1e-3  # of the courses: panels that hide nothing; of their size: what tells of a gap
-PARTED, MOST_PANELS = 7, 60  # rounds in which panels are halved; of panels that serve all
-ROUNDING = 1e-6  # of what numbers are like: courses that are much smaller
-CLOSE, LOCATED = 1e-9, 3e-10  # of the cycle: times that are one, and bends but for the error of their location
-LOOKED = np.linspace(-1.0, 1.0, 25)
-LOOKED[[0, -1]] *= 1 - 1e-6
-SHORT = 1e-2  # of the step of a difference: what moves bends is smooth
 
 
-class Read(NamedTuple):
-    """What is read of the courses of a measure, (lane,) each.
+@np.errstate(all="ignore")
+def figures_of(
+    run: Run, measures: Sequence[Measure], method: FrictionMethod, gaps: Array | None = None
+) -> dict[str, float]:
+    """The figures of measures of one mechanism, SI, by name; NaN where a place that one needs has no answer.
 
-    figure; least, most: its signed deviations from the nominal mechanism, over the courses of a largest |deviation|;
-    shown: one number at the times asked for, (lane, time), none where the edges have derivatives; time: of an extreme,
-    s, else NaN; status: the gravest of their places.
+    gaps: times, s, from and to, (2, gap), which extremes leave out.
+    Raises MechanismError for places and windows that are not in the cycle.
     """
+    figures: dict[str, float] = {}
+    gaps = np.zeros((2, 0)) if gaps is None else gaps
+    for ends, some in together(run, measures):
+        kernel = SeatedKernel(run, some, replace(method, margin_up_to=0.0), gaps)
+        group = Group(run, some, ends, run.values, kernel, {})
+        breaks = [bend.time for bend in run.bends if run.seats or matters(bend, some)]
+        breaks += [*(seating_of(run, method).breaks if run.seats else ()), *gaps.ravel()]
+        motion = MOTION if group.of_motion else Accuracy()
+        accuracy = MARGINS if some[0].wants_margin else SEATED if run.seats else motion
+        figures |= group.own_figures(np.array(breaks), accuracy)
+    return {measure.name: figures[measure.name] for measure in measures}
 
-    figure: Number
-    least: Number
-    most: Number
-    shown: Number
-    time: Array
-    status: NDArray[np.int8]
 
-    @classmethod
-    def of(cls, function: Callable[..., Array], *reads: Read) -> Read:
-        """A linear function of arrays of some reads, for each of their parts."""
-        return cls(*(combined(function, *parts) for parts in zip(*reads, strict=True)))
+def together(run: Run, measures: Sequence[Measure]) -> list[tuple[tuple[float, ...], tuple[Measure, ...]]]:
+    """Measures whose courses have the same panels, with the place or the ends of their window, s, (0,) at rest.
+
+    Raises MechanismError for places and windows that are not in the cycle.
+    """
+    groups: dict[tuple[object, ...], list[Measure]] = {}
+    every = ends_by_name(run, measures)
+    for measure in measures:
+        ends = every[measure.name]
+        against = measure.of.against or measure.rule == "deviation"
+        key = (ends, measure.wants_margin, measure.of_motion, against and not measure.of_motion)
+        groups.setdefault(key if len(ends) != 1 else (ends,), []).append(measure)
+    return [(every[group[0].name], tuple(group)) for group in groups.values()]
 
 
 class Many:
@@ -100,8 +75,7 @@ class Many:
         self.figures: dict[str, float] = {}
         self.times: dict[str, float] = {}
         self._groups = [
-            _Group(run, tuple(group), ends, values, kernels(group), self.figures)
-            for ends, group in together(run, measures)
+            Group(run, group, ends, values, kernels(group), self.figures) for ends, group in together(run, measures)
         ]
         self.tune(values)
 
@@ -140,491 +114,3 @@ class Many:
             for group in self._groups:
                 reads |= group.read(values, times or {})
         return {measure.name: reads[measure.name] for measure in self.measures}
-
-
-class _Piece(NamedTuple):
-    """The courses of a measure of some mechanisms, their rows at the nodes, and the gravest statuses."""
-
-    measure: Measure
-    lanes: Lanes
-    panels: Panels
-    rows: Array
-    status: NDArray[np.int8]
-
-
-@dataclass(eq=False)
-class _Group:
-    """Measures whose courses have the same panels. ends: times, s, of a place, a window, or none; figures: nominal."""
-
-    run: Run
-    measures: tuple[Measure, ...]
-    ends: tuple[float, ...]
-    values: Values
-    kernel: Kernel
-    figures: dict[str, float]
-
-    # ---- the nominal mechanism ----------------------------------------------------------------------------
-
-    @property
-    def at_place(self) -> bool:
-        return len(self.ends) == 1
-
-    @cached_property
-    def of_motion(self) -> bool:
-        """Whether the motion alone decides the courses."""
-        return all(measure.of_motion for measure in self.measures)
-
-    @cached_property
-    def against(self) -> tuple[Measure, ...]:
-        """Measures that are judged against the nominal mechanism."""
-        return tuple(measure for measure in self.measures if measure.against_nominal(self.run.system))
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Both ends, s."""
-        return (self.ends[0], self.ends[-1]) if self.ends else (0.0, self.run.cycle.duration)
-
-    @cached_property
-    def bends(self) -> list[Bend]:
-        """Where the nominal mechanism switches, within its cycle."""
-        run = self.run
-        alone = Mechanisms(run.system, run.chosen.assembly, self.values, [run.cycle])
-        every = run.bends if self.values is run.values else stated_bends(alone)
-        return [bend for bend in every if matters(bend, self.measures)]
-
-    @cached_property
-    def course(self) -> Followed:
-        """The courses of the nominal mechanism, whose panels are tuned."""
-        times = np.array([bend.time for bend in self.bends])
-        accuracy = MARGINS if self.measures[0].wants_margin else FIRST
-
-        def evaluate(time: Array) -> tuple[dict[str, tuple[Number, ...]], NDArray[np.int8]]:
-            """What matters of the states is whether they have a value."""
-            curves, status = self.kernel.courses(self.values, time)
-            return curves, np.zeros_like(status)
-
-        return followed(self.run, self.measures, self.ends, evaluate, times, accuracy)
-
-    @cached_property
-    def edges(self) -> Array:
-        """Of the panels that serve all, s, those of the stated breaks among them; see `tune`."""
-        return np.array(self.ends if self.at_place else self.course.courses.edges)
-
-    @property
-    def spots(self) -> Array:
-        """Places of all panels, s, rising, the first and the last beside their edges."""
-        low, half = self.edges[:-1], np.diff(self.edges) / 2
-        return np.unique(low + half * (1.0 + LOOKED[:, None]))
-
-    @cached_property
-    def angles(self) -> Mapping[str, tuple[Array, Array]]:
-        """Of measures that turn: times, s, and the angle of the nominal mechanism there, without jumps."""
-        if not self.at_place:
-            return self.course.angles
-        parts = self._evaluated(self.values, self.edges[:, None, None])[0]
-        return {measure.name: (self.edges, np.ravel(primal(parts[measure.name][0]))) for measure in self.measures}
-
-    @cached_property
-    def _scales(self) -> dict[str, float]:
-        """What the numbers of each measure are like."""
-        return {measure.name: float(alike(self.run, measure)) for measure in self.measures}
-
-    @cached_property
-    def _sizes(self) -> dict[str, float]:
-        """The largest magnitude of the courses of the nominal mechanism, or of what is like them but for rounding."""
-        sizes = {}
-        for measure in self.measures:
-            own = np.max(self.course.courses.sizes[self.course.rows[measure.name]])
-            attitude = measure.of_attitude(self.run.system)
-            sizes[measure.name] = 1.0 if attitude else float(max(own, ROUNDING * self._scales[measure.name]))
-        return sizes
-
-    def tune(self, values: Values) -> None:
-        """Part the panels until they resolve the courses of some mechanisms as far as their figures need it."""
-        own, lost = self._own_bends(values)
-        for _ in range(0 if self.at_place else PARTED):
-            edges = self._own_edges(own)
-            panels = np.any(self._on(values, edges, {}, FIRM)[1][~lost], axis=0)
-            count = len(self.edges) - 1
-            if len(panels) != count:  # the bends of each are edges besides
-                middle = np.median((primal(edges)[:, 1:] + primal(edges)[:, :-1]) / 2, axis=0)
-                panels = np.bincount(np.searchsorted(self.edges, middle[panels], side="right") - 1, minlength=count) > 0
-            if not np.any(panels) or count > MOST_PANELS:
-                break
-            self.edges = np.sort(np.append(self.edges, _middles(self.edges[None], panels)))
-
-    # ---- edges of others ----------------------------------------------------------------------------------
-
-    def _own_bends(self, values: Values) -> tuple[Number | None, Flags]:
-        """Times of the nominal mechanism, s, (lane, bend), at which each switches, None if they are its own; where they
-        are lost."""
-        none = np.zeros(lanes_of(values), bool)
-        if self.at_place or values is self.values or not self.bends:
-            return None, none
-        own, end = self._tracked(values), self.span[1]
-        times = np.array([bend.time for bend in self.bends])
-        lost = np.any(np.isnan(primal(own)), axis=1)
-        close = np.abs(primal(own) - times) <= LOCATED * end  # so that the same mechanism has the same edges
-        own = own + np.where(close, times - primal(own), 0.0)
-        same = np.all(close, axis=1) & ~np.any(derivative(own) + 0.0 * times, axis=1)
-        if np.all(same | lost):
-            return None, lost
-        own = linear(own, lambda array: np.where(lost[:, None], 0.0, array)) + np.where(lost[:, None], times, 0.0)
-        return own, lost
-
-    def _tracked(self, values: Values) -> Number:
-        """Times of the nominal mechanism, s, (lane, bend), at which each switches; NaN where it is far off."""
-        run, count = self.run, lanes_of(values)
-        plain, slopes = _parts_of(values)
-
-        def at(own: Values, time: Array) -> Number:
-            return moved(run, own, time)
-
-        of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * count)
-        times = tracked(of, self.bends, at)
-        if not slopes:
-            return times
-        if not any(np.any(slope) for slope in slopes.values()):
-            return Dual(times, np.zeros_like(times))
-        step = SHORT * step_of(run, values, count)
-        below, above = ({**plain, **_beside(plain, slopes, sign * step)} for sign in (-1.0, 1.0))
-        shifts = shifts_of(of, self.bends, times, at, (below, above))
-        return Dual(times, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
-
-    def _own_edges(self, own: Number | None) -> Number:
-        """Edges of the panels of each, (lane, edge), or (1, edge) if they are those of all: the nominal ones go along
-        with the bends next to them. What is taken less the nominal mechanism jumps at the bends of that too."""
-        if own is None:
-            return self.edges[None]
-        times = np.array([bend.time for bend in self.bends])
-        (start, end), cycle, count = self.span, self.run.cycle, np.shape(primal(own))[0]
-        close, laps = CLOSE * end, np.zeros(1)
-        if cycle.periodic:  # all periods that the span touches
-            laps = np.arange(np.floor(start / cycle.duration) - 1, np.ceil(end / cycle.duration) + 1) * cycle.duration
-        nominal = (times + laps[:, None]).ravel()
-        order = np.argsort(nominal, kind="stable")
-        nominal = nominal[order]
-        others = linear(own, lambda array: np.tile(array, len(laps))[:, order]) + np.repeat(laps, len(times))[order]
-        fixed = np.unique(nominal[(nominal >= start - close) & (nominal <= end + close)] if self.against else [])
-        if self.ends or not cycle.periodic:  # the ends of a window stay
-            inner = (nominal > start + close) & (nominal < end - close)
-            others = _clipped(linear(others, lambda array: array[:, inner]), start, end)
-            others = _joined(np.full((count, 1), start), others, np.full((count, 1), end))
-            nominal = np.concatenate([[start], nominal[inner], [end]])
-        others = _sorted(others)
-        place = np.clip(np.searchsorted(nominal, self.edges + close, side="right") - 1, 0, len(nominal) - 2)
-        after = self.edges - nominal[place]
-        share = np.clip(after / np.maximum(nominal[place + 1] - nominal[place], close), 0.0, 1.0)
-        share[after <= close] = 0.0
-        edges = linear(others, lambda array: array[:, place] * (1.0 - share) + array[:, place + 1] * share)
-        ones = np.flatnonzero(np.diff(nominal) <= close)  # bends that are one of the nominal mechanism alone
-        ones = ones[(nominal[ones] >= start - close) & (nominal[ones] <= end + close)]
-        if not len(ones) and not len(fixed):
-            return edges
-        more = _joined(linear(others, lambda array: array[:, ones]), np.tile(fixed, (count, 1)))
-        return _sorted(_joined(edges, _clipped(more, primal(edges)[:, :1], primal(edges)[:, -1:])))
-
-    # ---- courses of others --------------------------------------------------------------------------------
-
-    def read(self, values: Values, times: Mapping[str, Array]) -> dict[str, Read]:
-        """What the courses of mechanisms with other numbers say.
-
-        Panels that do not resolve the course of one as far as its figures need it are parted; what jumps within one has
-        courses of its own.
-        """
-        own, lost = self._own_bends(values)
-        edges = self._own_edges(own)
-        reads, offending, gone = self._on(values, edges, times)
-        left = np.flatnonzero(np.any(offending, axis=1) & ~lost & ~gone)
-        edges = linear(edges, lambda array: np.broadcast_to(array, (len(lost), array.shape[1]))[left])
-        for _ in range(PARTED):
-            if not len(left):
-                break
-            parted = np.any(offending[np.any(offending, axis=1)], axis=0)
-            edges = _sorted(_joined(edges, _middles(edges, parted)))
-            parts, offending, _ = self._on(picked(values, left), edges, times)
-            reads = {name: _put(read, left, parts[name]) for name, read in reads.items()}
-            more = np.flatnonzero(np.any(offending, axis=1))
-            left, edges = left[more], _taken(edges, more)
-        alone = np.union1d(left, np.flatnonzero(lost & ~gone)).astype(np.intp)
-        return self._alone(reads, values, alone, times) if len(alone) else reads
-
-    def _on(
-        self, values: Values, edges: Number, times: Mapping[str, Array], share: float = 1.0
-    ) -> tuple[dict[str, Read], Flags, Flags]:
-        """What the courses between some edges say; panels that do not resolve them, (lane, panel), to a share of what
-        figures may be off; mechanisms with places without an answer."""
-        count, panels = lanes_of(values), np.shape(primal(edges))[1] - 1
-        reads: dict[str, list[Read]] = {measure.name: [] for measure in self.measures}
-        offending, gone = np.zeros((count, panels), bool), np.zeros(count, bool)
-        for lanes in _blocks(count, max(1, self.kernel.at_once // (len(POINTS) * max(1, panels)))):
-            some = picked(values, lanes) if count > len(lanes) else values
-            for piece in self._pieces(some, _taken(edges, lanes)):
-                own = lanes[piece.lanes]
-                gone[own] |= np.any(np.isnan(piece.rows), axis=(0, 2, 3))
-                offending[own] |= self._offending(piece, share)
-                reads[piece.measure.name].append(self._read(piece.measure, piece.panels, piece.status, times))
-        return {name: Read.of(_after, *parts) for name, parts in reads.items()}, offending, gone
-
-    def _pieces(self, values: Values, edges: Number) -> Iterator[_Piece]:
-        """The courses of every measure of some mechanisms between some edges, so many of them at a time."""
-        low, half = linear(edges, lambda array: array[:, :-1]), linear(edges, lambda array: np.diff(array) / 2)
-        time = _wide(edges) if self.at_place else _wide(low) + _wide(half) * (1.0 + POINTS)
-        parts, status, own = self._evaluated(values, time)
-        nominal, weights = self._nominal(time), _wide(half)
-        if own is not None and not self.at_place:  # how much time of each mechanism the Gauss nodes count
-            weights = linear(own, lambda array: array @ FIT.T @ RATE @ ON_GAUSS)
-        gravest = np.max(status, axis=(1, 2))
-        for measure in self.measures:
-            every = self._rows(measure, parts, nominal, time)
-            for lanes in _blocks(len(status), READ):
-                rows, none = _taken_of(every, lanes), np.zeros((len(lanes), status.shape[1]), bool)
-                if self.at_place:
-                    panels = Panels.constant(linear(rows, lambda array: array[..., 0, 0]))
-                else:
-                    sides = [_taken(part, lanes) for part in (low, half, weights)]
-                    coefficients = linear(rows, lambda array: array @ FIT.T)
-                    panels = Panels(sides[0], sides[1], coefficients, sides[2], none, none)
-                yield _Piece(measure, lanes, panels, primal(rows), gravest[lanes])
-
-    def _evaluated(
-        self, values: Values, time: Number
-    ) -> tuple[dict[str, list[Number]], NDArray[np.int8], Number | None]:
-        """The parts at times of the nominal mechanism, s, (lane, panel, node), the statuses, and the times of each, if
-        they are others."""
-        run, flat = self.run, linear(time, lambda array: array.reshape(len(array), -1))
-        place = within(run, flat)
-        own = moved(run, values, place)
-        alone = len(primal(own)) == 1
-        curves, status = self.kernel.courses(values, linear(own, lambda array: array[0]) if alone else own)
-        full = (max(lanes_of(values), len(primal(own))), *np.shape(primal(time))[1:])
-
-        def shaped(array: Any) -> Any:
-            array = np.asarray(array)
-            if array.size != np.prod(full):
-                array = np.broadcast_to(array, (full[0], np.prod(full[1:])))
-            return array.reshape(full)
-
-        parts = {measure.name: [linear(part, shaped) for part in curves[measure.name]] for measure in self.measures}
-        if own is place:
-            return parts, shaped(status), None
-        laps = np.rint((primal(flat) - primal(place)) / run.cycle.duration)
-        own = own + moved(run, values, np.array([run.cycle.duration])) * laps
-        return parts, shaped(status), linear(own, lambda array: array.reshape(-1, *full[1:]))
-
-    def _nominal(self, time: Number) -> dict[str, list[Number]]:
-        """The parts of the nominal mechanism at times, s, of measures that are judged against it."""
-        if not self.against:
-            return {}
-        real = np.asarray(primal(time))
-        once = bool(np.all(real == real[:1]))  # as of mechanisms that differ in their derivatives alone
-        at = (Dual(real[:1], np.ones_like(real[:1])) if isinstance(time, Dual) else real[:1]) if once else time
-        parts = self._evaluated(self.values, at)[0]
-        if once and isinstance(time, Dual):
-            parts = {name: [Dual(primal(p), derivative(p) * time.dual) for p in own] for name, own in parts.items()}
-        return {measure.name: parts[measure.name] for measure in self.against}
-
-    def _rows(
-        self,
-        measure: Measure,
-        parts: Mapping[str, list[Number]],
-        nominal: Mapping[str, list[Number]],
-        time: Number,
-    ) -> Number:
-        """The rows that the figure is read of, (row, lane, panel, node)."""
-        own, before = parts[measure.name], nominal.get(measure.name)
-        if measure.turning(self.run.system):
-            own = [near(own[0], np.interp(primal(time), *self.angles[measure.name]), TURN)]
-            before = before and [near(before[0], primal(own[0]), TURN)]
-        if before and measure.of_attitude(self.run.system):
-            own = [turn(own, before, measure.axis)]
-        elif before:
-            own = [part - was for part, was in zip(own, before, strict=True)]
-        return combined(lambda *arrays: np.stack(np.broadcast_arrays(*arrays)), *own)
-
-    def _fine(self, measure: Measure) -> float:
-        """Of the size of courses: how far figures may be off; a place is off by the root of that."""
-        if measure.wants_margin:
-            return 100.0 * MARGINS.tolerance
-        return FINE_MOTION if self.of_motion else FINE_PLACE if measure.of_place else FINE
-
-    def _offending(self, piece: _Piece, share: float) -> Flags:
-        """Panels that do not resolve the courses as far as the figure needs it, or whose numbers are infinite; of dual
-        numbers those too that do not resolve the derivatives. Wide ones that hardly resolve them at all are parted
-        wherever they are, as they may hide places without an answer."""
-        measure, panels, rows = piece.measure, piece.panels, piece.rows
-        if self.at_place:
-            return np.zeros((rows.shape[1], 0), bool)
-        tails = panels.tails()
-        sizes = np.maximum(self._sizes[measure.name], np.max(np.abs(rows), axis=(0, 2, 3)))[:, None]
-        excess = tails / np.where(sizes > 0.0, share * self._fine(measure) * sizes, np.inf)
-        if isinstance(panels.coefficients, Dual):
-            changes = np.abs(np.broadcast_to(panels.coefficients.dual, panels.coefficients.shape))
-            most = np.max(changes, axis=(0, 2, 3))[:, None]
-            most = np.maximum(most, NONE * np.max(np.nan_to_num(most)))  # what has no effect has rounding for one
-            last = np.max(changes[..., -2:], axis=(0, 3))
-            excess = np.maximum(excess, last / np.where(most > 0.0, share * FINE_CHANGE * most, np.inf))
-        offending = np.any(np.isinf(rows), axis=(0, 3))
-        if np.any(excess > 1.0):
-            answered = np.all(np.isfinite(tails), axis=1, keepdims=True)
-            wide = primal(panels.half) > GAP * np.sum(primal(panels.half), axis=1, keepdims=True)
-            rough = self._reading(measure).offending(panels, excess) | (wide & (tails > GROSS * sizes))
-            offending |= rough & answered
-        return np.asarray(offending)
-
-    def _reading(self, measure: Measure) -> Reading:
-        return Reading(self.run, measure, self.ends[: 2 * (len(self.ends) > 1)], self.figures.get(measure.name, np.nan))
-
-    def _read(self, measure: Measure, panels: Panels, status: NDArray[np.int8], times: Mapping[str, Array]) -> Read:
-        reading, time = self._reading(measure), times.get(measure.name)
-        figure, least, most, top = reading.read(panels)
-        shown: Number = np.zeros((len(status), 0))
-        if self.at_place:
-            shown = np.asarray(primal(figure))[:, None]
-        elif time is not None and not isinstance(panels.low, Dual):
-            shown = linear(reading.shown(panels, time), lambda array: np.broadcast_to(array, (len(status), len(time))))
-        top = np.full(len(status), np.nan) if measure in self.against else top
-        return Read(figure, least, most, shown, top, status)
-
-    # ---- mechanisms by themselves -------------------------------------------------------------------------
-
-    def _alone(
-        self, reads: dict[str, Read], values: Values, lanes: Lanes, times: Mapping[str, Array]
-    ) -> dict[str, Read]:
-        """The same with some mechanisms read of courses of their own; derivatives are differences of them."""
-        plain, slopes = _parts_of(values)
-        own = self._of_their_own(picked(plain, lanes), times)
-        if slopes:
-            step = step_of(self.run, values, lanes_of(values))
-            sides = [{**plain, **_beside(plain, slopes, sign * step)} for sign in (-1.0, 1.0)]
-            below, above = (self._of_their_own(picked(side, lanes), {}) for side in sides)
-            width = 2 * step[lanes, 0]
-            for name, read in own.items():
-                numbers = [
-                    Dual(middle, np.divide(high - low, width, out=np.zeros_like(width), where=width > 0))
-                    for middle, low, high in zip(read[:3], below[name], above[name], strict=False)
-                ]
-                own[name] = Read(numbers[0], numbers[1], numbers[2], *read[3:])
-        return {name: _put(read, lanes, own[name]) for name, read in reads.items()}
-
-    def _of_their_own(self, values: Values, times: Mapping[str, Array]) -> dict[str, Read]:
-        """What courses of their own say of some mechanisms."""
-        reads: dict[str, list[Read]] = {measure.name: [] for measure in self.measures}
-        for lanes in _blocks(lanes_of(values), ALONE):
-            for course in self._courses(picked(values, lanes)):
-                status, row = np.array([np.max(course.states % ENDLESS)], np.int8), 0
-                for measure in self.measures:
-                    panels = Panels.of(course, slice(row, row := row + self._row_counts[measure.name]))
-                    reads[measure.name].append(self._read(measure, panels, status, times))
-        return {name: Read.of(_after, *parts) for name, parts in reads.items()}
-
-    @cached_property
-    def _row_counts(self) -> dict[str, int]:
-        """How many rows the figure of each measure is read of."""
-        system, rows = self.run.system, self.course.rows
-        return {
-            measure.name: 1 if measure.of_attitude(system) else rows[measure.name].stop - rows[measure.name].start
-            for measure in self.measures
-        }
-
-    def _courses(self, values: Values) -> list[Courses]:
-        """Courses of some mechanisms, each with the places where it switches looked for over its cycle."""
-        run, count = self.run, lanes_of(values)
-        lengths = np.ravel(primal(moved(run, values, np.array([run.cycle.duration])))) / run.cycle.duration
-        ratio = np.broadcast_to(lengths, count)
-        switching = [np.zeros(0)] * count
-        if self.bends or not self.of_motion:
-            cycles = [replace(run.cycle, duration=run.cycle.duration * float(length)) for length in ratio]
-            switching = bends(Mechanisms(run.system, run.chosen.assembly, values, cycles))
-        more = np.array([bend.time for bend in self.bends if self.against])
-        breaks = [
-            breaks_between(run.cycle, np.concatenate([own / length, more]), *self.span)
-            for own, length in zip(switching, ratio, strict=True)
-        ]
-
-        def solve(lanes: Lanes, time: Array) -> tuple[Array, NDArray[np.integer]]:
-            panels = time[:, None]
-            parts, status, _ = self._evaluated(picked(values, lanes), panels)
-            nominal = self._nominal(panels)
-            rows = [np.asarray(self._rows(measure, parts, nominal, panels))[:, :, 0] for measure in self.measures]
-            numbers = np.concatenate(rows)
-            endless = np.any(np.isinf(numbers), axis=0)
-            numbers[np.isinf(numbers)] = np.nan
-            return numbers, np.where(endless, ENDLESS, 0) + status[:, 0]
-
-        scales = np.repeat([self._scales[name] for name in self._row_counts], list(self._row_counts.values()))
-        accuracy = MARGINS if self.measures[0].wants_margin else MOTION if self.of_motion else OWN
-        return Courses.many(solve, breaks, lambda sizes: np.maximum(sizes, scales), accuracy_of(run.cycle, accuracy))
-
-
-# ---- lanes ----------------------------------------------------------------------------------------------------
-
-
-def _parts_of(values: Values) -> tuple[dict[str, Number], dict[str, Array]]:
-    """The numbers of mechanisms without derivatives, and the derivatives of those that have some."""
-    slopes = {path: derivative(value) for path, value in values.items() if isinstance(value, Dual)}
-    return {path: primal(value) for path, value in values.items()}, slopes
-
-
-def _beside(plain: Values, slopes: Mapping[str, Array], step: Array) -> dict[str, Number]:
-    """Numbers moved along their derivatives."""
-    return {path: plain[path] + step * slope for path, slope in slopes.items()}
-
-
-def _blocks(count: int, size: int) -> Iterator[Lanes]:
-    """Numbers of mechanisms, so many at a time."""
-    yield from (np.arange(first, min(first + size, count)) for first in range(0, count, size))
-
-
-def _taken_of(rows: Number, lanes: Lanes) -> Number:
-    """Rows of some lanes."""
-    return linear(rows, lambda array: array[:, lanes[0] : lanes[-1] + 1])
-
-
-def _middles(edges: Number, panels: Flags) -> Number:
-    """Middles of some panels."""
-    return linear(edges, lambda array: (array[:, 1:] + array[:, :-1])[:, panels] / 2)
-
-
-def _taken(number: Number, lanes: Lanes) -> Number:
-    """Some lanes of a number, which may be one for all."""
-    return linear(number, lambda array: array if len(array) == 1 else array[lanes])
-
-
-def _wide(number: Number) -> Number:
-    return linear(number, lambda array: array[..., None])
-
-
-def _sorted(number: Number) -> Number:
-    """Rising along the last axis."""
-    order = np.argsort(primal(number), axis=-1, kind="stable")
-    return linear(number, lambda array: np.take_along_axis(np.broadcast_to(array, order.shape), order, axis=-1))
-
-
-def _joined(*parts: Number) -> Number:
-    """Edges beside each other."""
-    return combined(lambda *arrays: np.concatenate(arrays, 1), *parts)
-
-
-def _clipped(number: Number, low: float | Array, high: float | Array) -> Number:
-    """A number between two others, where it has no derivative."""
-    inside = (primal(number) > low) & (primal(number) < high)
-    clipped = np.clip(primal(number), low, high)
-    return Dual(clipped, np.where(inside, number.dual, 0.0)) if isinstance(number, Dual) else clipped
-
-
-def _after(*arrays: Array) -> Array:
-    """Lanes one after another."""
-    return np.concatenate(arrays)
-
-
-def _put(read: Read, lanes: Lanes, own: Read) -> Read:
-    """What is read of all lanes, with others in place of some."""
-
-    def replaced(every: Array, part: Array) -> Array:
-        changed = np.array(every)
-        if np.shape(every)[1:] == np.shape(part)[1:]:  # there may be nothing to show
-            changed[lanes] = part
-        return changed
-
-    return Read.of(replaced, read, own)

@@ -1,6 +1,6 @@
 """Measures: numbers that follow from the motion of a mechanism, or from its forces.
 
-`model.measure_table.MEASURES` is the vocabulary, one entry a kind, `courses.CURVES` the course of each: the one or
+`model.measure_table.MEASURES` is the vocabulary, one entry a kind, `curves.CURVES` the course of each: the one or
 more numbers, position by position, that its figure is made of (`figures`).
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -16,9 +16,8 @@ from pydantic import ValidationError
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures import motion
-from trunnion.measures.curves import CURVES
-from trunnion.measures.motion import AXES, MOTIONS
+from trunnion.measures import curves
+from trunnion.measures.curves import AXES, CURVES, MOTIONS
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.contact import motions
 from trunnion.model.measure_parts import STATISTICS
@@ -162,7 +161,8 @@ class Measure:
         Floats, arrays or dual numbers, as the values were.
         """
         walk = back if isinstance(back, Forward) else back.walk
-        return CURVES[self.kind](self, cast(Any, back if self.of.of_forces else walk))
+        numbers = CURVES[self.kind](self, back if self.of.of_forces else walk)
+        return numbers if isinstance(numbers, tuple) else (numbers,)
 
     def coordinate(self, system: System) -> Measure:
         """The rotation or slide of a joint that a stroke, a dead centre or a transmission error is of."""
@@ -172,15 +172,15 @@ class Measure:
 
     def value(self, walk: Forward) -> Number:
         """The measure of the motion, m or rad; the turn of a link in space is from where it lies without errors: 0."""
-        return motion.value(self, walk)
+        return curves.value(self, walk)
 
     def loads(self, walk: Forward) -> dict[str, Any]:
-        """The unit loads by link: their power is the rate of the measure; see `motion.loads`."""
-        return motion.loads(self, walk)
+        """The unit loads by link: their power is the rate of the measure; see `curves.loads`."""
+        return curves.loads(self, walk)
 
     def rate(self, walk: Forward) -> Number:
         """ẏ, by the power of the unit loads."""
-        return motion.rate(self, walk)
+        return curves.rate(self, walk)
 
 
 def coordinate_unit(system: System, values: Values) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,8 @@ __all__ = ["PositionPlan", "Window", "ends_by_name", "gain_of", "moved", "path_o
 Array = NDArray[np.float64]
 
 CLOSE = 0.25  # of a step: a position of the grid that is closer to the end of a window gives way to it
-NEWTONS = 4  # steps to a time, one of which is exact at a constant speed, before it is looked for by bisection
+SAME = 1e-9  # of a step: times that are one
+NEWTONS = 4  # steps to a time, one of which is exact at a constant speed, before bisections
 BISECTIONS = 60
 
 
@@ -44,17 +45,11 @@ class Window:
     time: Array
 
 
-@dataclass(frozen=True)
-class PositionPlan:
+class PositionPlan(NamedTuple):
     """Times to evaluate, s, rising, (position,), and the window of each measure, by name."""
 
-    run: Run
     times: Array
     windows: Mapping[str, Window]
-
-    def moved(self, values: Values) -> Number:
-        """The times with other numbers of the drivers; see `moved`."""
-        return moved(self.run, values, self.times)
 
 
 def moved(run: Run, values: Values, times: Number) -> Number:
@@ -64,8 +59,11 @@ def moved(run: Run, values: Values, times: Number) -> Number:
     numbers give derivatives of the times, of a law that runs one way.
     """
     system, before = run.system, run.values
-    paths = [path for path in before if path.startswith("drivers.")]
-    if all(values[path] is before[path] or _same(values[path], before[path]) for path in paths):
+
+    def changed(number: Number, was: Number) -> bool:
+        return number is not was and (isinstance(number, Dual) or bool(np.any(np.asarray(number) != np.asarray(was))))
+
+    if not any(changed(values[path], before[path]) for path in before if path.startswith("drivers.")):
         return times
     name = next(iter(system.mechanism.drivers))
     before_span, span = system.span(before, name), system.span(values, name)
@@ -83,7 +81,7 @@ def plan(run: Run, measures: Sequence[Measure], steps: int) -> PositionPlan:
     ends = ends_by_name(run, measures)
     grid = run.cycle.times(steps) if any(len(own) != 1 for own in ends.values()) else np.zeros(0)
     times = np.unique(np.concatenate([grid, *(within(run, np.array(own)) for own in ends.values())]))
-    return PositionPlan(run, times, {name: _window(run, own, times, grid) for name, own in ends.items()})
+    return PositionPlan(times, {name: _window(run, own, times, grid) for name, own in ends.items()})
 
 
 def within(run: Run, times: Number) -> Number:
@@ -117,22 +115,13 @@ def place_of(mechanism: Mechanism, at: float | str) -> tuple[float, bool]:
 
 def _window(run: Run, ends: tuple[float, ...], times: Array, grid: Array) -> Window:
     """The positions of one measure: a place, a window between two times, or all of the grid."""
-    duration = run.cycle.duration
-    if not ends:
-        return Window(np.searchsorted(times, grid), grid)
-    laps = [np.floor(moment / duration) if run.cycle.periodic else 0.0 for moment in ends]
-    found = [np.searchsorted(times, moment - lap * duration) for moment, lap in zip(ends, laps, strict=True)]
-    between, between_laps = np.zeros(0, np.intp), np.zeros(0)
-    if len(ends) == 2:
-        step = duration / max(1, len(grid) - (0 if run.cycle.periodic else 1))
-        reach = np.arange(laps[0], laps[1] + 1)
-        inner = (grid[None, :] + reach[:, None] * duration).ravel()
-        inside = (inner > ends[0] + CLOSE * step) & (inner < ends[1] - CLOSE * step)
-        between = np.tile(np.searchsorted(times, grid), len(reach))[inside]
-        between_laps = np.repeat(reach, len(grid))[inside]
-    index = np.concatenate([found[:1], between, found[1:]]).astype(np.intp)
-    lap = np.concatenate([laps[:1], between_laps, laps[1:]])
-    return Window(index, times[index] + lap * duration)
+    duration, time = run.cycle.duration, grid
+    step = duration / max(1, len(grid) - (0 if run.cycle.periodic else 1))
+    if ends:  # a window may run on into the next cycle
+        inner = np.concatenate([grid, grid + duration])
+        inner = inner[(inner > ends[0] + CLOSE * step) & (inner < ends[-1] - CLOSE * step)]
+        time = np.concatenate([ends[:1], inner, ends[1:]])
+    return Window(np.searchsorted(times, within(run, time) - SAME * step) % len(times), time)
 
 
 # ---- places and windows as they are stated --------------------------------------------------------------------
@@ -169,62 +158,48 @@ def _ends_of(run: Run, measure: Measure) -> tuple[float, ...]:
         return (0.0,)
     if measure.at is not None:
         return (_time(run, measure, measure.at, f"{where}.at"),)
-    if measure.over is None:
-        return ()
-    first, last = (_time(run, measure, place, f"{where}.over") for place in measure.over)
-    duration = run.cycle.duration
+    return () if measure.over is None else _window_ends(run, measure, measure.over, f"{where}.over")
+
+
+def _window_ends(run: Run, measure: Measure, over: tuple[float, float], where: str) -> tuple[float, ...]:
+    """Both ends of a window, s; none of a window as wide as the cycle."""
+    duration, (first, last) = run.cycle.duration, (_time(run, measure, place, where) for place in over)
     if run.cycle.periodic:
-        first, last = (first, last) if _forward(run, measure) else (last, first)
-        stated = abs(measure.over[1] - measure.over[0])
-        whole = duration if measure.timed else abs(gain_of(run))
-        if abs(stated - whole) <= 1e-9 * whole:
+        stated, whole = over[1] - over[0], duration if measure.timed else abs(gain_of(run))
+        # [300, 60] and [-60, 60] deg are the same of a driver that turns on: from the first place to the second; one
+        # that turns backward passes the upper end first
+        if not measure.timed and stated >= 0 and gain_of(run) < 0:
+            first, last = last, first
+        if abs(abs(stated) - whole) <= 1e-9 * whole:
             return ()
-        if stated > whole:
-            what = f"the window is {stated:g} wide, the cycle {whole:g} (SI)"
-            raise MechanismError(Finding(what, f"{where}.over", "state a window within one cycle"))
+        if abs(stated) > whole:
+            what = f"the window is {abs(stated):g} wide, the cycle {whole:g} (SI)"
+            raise MechanismError(Finding(what, where, "state a window within one cycle"))
         first %= duration
         last = first + (last - first) % duration
     elif last < first:
         first, last = last, first
     if not last > first:
-        raise MechanismError(Finding("the window is empty", f"{where}.over", "state two places apart, or at: one"))
+        raise MechanismError(Finding("the window is empty", where, "state two places apart, or at: one"))
     return first, last
 
 
-def _forward(run: Run, measure: Measure) -> bool:
-    """Whether a window is stated in the sense in which the cycle runs; one that goes down is told from its upper end.
-
-    [300, 60] and [-60, 60] deg are the same of a driver that turns on: from the first place to the second.
-    """
-    if measure.timed or measure.over is None:
-        return True
-    return bool(gain_of(run) > 0) or measure.over[1] < measure.over[0]
-
-
 def _time(run: Run, measure: Measure, place: float, where: str) -> float:
-    """The time of a place, s."""
-    duration = run.cycle.duration
+    """The time, s, of a place: a time itself, or a coordinate of a driver that runs one way."""
+    duration, periodic, system, values = run.cycle.duration, run.cycle.periodic, run.system, run.values
     if measure.timed:
-        if not run.cycle.periodic and not -1e-12 * duration <= place <= duration * (1 + 1e-12):
+        if not periodic and not -1e-12 * duration <= place <= duration * (1 + 1e-12):
             what = f"{place:g} s is not in the cycle, which lasts {duration:g} s"
             raise MechanismError(Finding(what, where, "state a time within it"))
-        return place % duration if run.cycle.periodic else min(max(place, 0.0), duration)
-    system = run.system
-    name = next(iter(system.mechanism.drivers), "")
-    span = system.span(run.values, name) if name else None
-    if span is None or not span.one_way:
-        what = f"the coordinate of '{name}' is not unique: it moves back and forth" if name else "no driver"
+        return place % duration if periodic else min(max(place, 0.0), duration)
+    name = next(iter(system.mechanism.drivers))
+    if not system.span(values, name).one_way:
+        what = f"the coordinate of '{name}' is not unique: it moves back and forth"
         raise MechanismError(Finding(what, where, "state a time, such as 0.2 s"))
-    return _moment(run, name, place, where)
-
-
-def _moment(run: Run, name: str, place: float, where: str) -> float:
-    """The time, s, at which a driver that runs one way has a coordinate."""
-    duration, values, system = run.cycle.duration, run.values, run.system
-    ends = [float(np.ravel(primal(system.drive(values, name, time)[0]))[0]) for time in (0.0, duration)]
-    low, high = min(ends), max(ends)
+    start, end = (float(np.ravel(primal(system.drive(values, name, time)[0]))[0]) for time in (0.0, duration))
+    low, high = min(start, end), max(start, end)
     slack = 1e-9 * (high - low)
-    if run.cycle.periodic:
+    if periodic:
         turn = 2 * np.pi if system.turns(name) else high - low
         place += turn * np.ceil((low - slack - place) / turn)
         place -= turn * max(0.0, np.ceil((place - high - slack) / turn))
@@ -234,39 +209,32 @@ def _moment(run: Run, name: str, place: float, where: str) -> float:
         what += f"{factor * low:.6g} to {factor * high:.6g} {unit}"
         raise MechanismError(Finding(what, where, "state a place within the range"))
     target = np.array(min(max(place, low), high))
-    guess = np.array(duration * (float(target) - ends[0]) / (ends[1] - ends[0]))
-    return float(_reached(system, values, name, target, guess, duration))
+    return float(_reached(system, values, name, target, duration * (target - start) / (end - start), duration))
 
 
 def _reached(system: System, values: Values, name: str, target: Number, guess: Number, duration: Number) -> Number:
-    """Times, s, at which a driver that runs one way has the target coordinates; by bisection where the guess has not.
+    """Times, s, at which a driver that runs one way has the target coordinates: by Newton's method, then by bisection.
 
     With the derivatives that the numbers carry: t = t₀ − (q(t₀) − target)/q̇.
     """
-    wanted = primal(target)
-
-    def error(time: Number) -> tuple[Number, Number]:
-        value, rate, _ = system.drive(values, name, time)
-        return np.asarray(primal(value)) - wanted, np.asarray(primal(rate))
-
-    first, last = error(0.0 * guess)[0], error(0.0 * guess + duration)[0]
-    exact = 4e-15 * (np.max(np.abs(last - first)) + np.max(np.abs(wanted)))
+    low, high = 0.0 * guess, 0.0 * guess + duration
+    first, last = (np.asarray(primal(system.drive(values, name, time)[0])) for time in (low, high))
+    exact = 4e-15 * (np.max(np.abs(last - first)) + np.max(np.abs(primal(target))))
     time = guess
-    for _ in range(NEWTONS):
-        off, rate = error(time)
+    for k in range(NEWTONS + BISECTIONS):
+        off, rate = (np.asarray(primal(number)) for number in system.drive(values, name, time)[:2])
+        off = off - primal(target)
         if np.all(np.abs(off) <= exact):
             break
-        time = time - off / np.where(rate == 0, np.inf, rate)
-    if not np.all(np.abs(error(time)[0]) <= exact):
-        way, shape = np.sign(last - first), np.shape(first + guess)
-        low, high = np.zeros(shape), np.zeros(shape) + duration
-        for _ in range(BISECTIONS):
-            time = (low + high) / 2
-            late = way * error(time)[0] > 0
-            low, high = np.where(late, low, time), np.where(late, time, high)
+        if k < NEWTONS:
+            time = time - off / np.where(rate == 0, np.inf, rate)
+            continue
+        late, place = np.sign(last - first) * off > 0, np.clip(time, low, high)
+        low, high = np.where(late, low, place), np.where(late, place, high)
+        time = (low + high) / 2
     value, rate, _ = system.drive(values, name, time)
-    if isinstance(value - target, Dual):
-        off = value - target
+    off = value - target
+    if isinstance(off, Dual):
         return time - Dual(np.zeros(off.shape), off.dual) / primal(rate)
     return np.asarray(time)
 
@@ -282,9 +250,5 @@ def path_of(run: Run, times: Number) -> Number:
     name = next(iter(run.system.mechanism.drivers), "")
     if not name or not run.system.span(run.values, name).one_way:
         return times
-    found = run.system.drive(run.values, name, times)[0]
-    return found if isinstance(found, Dual) else np.array(np.broadcast_to(np.asarray(found, float), np.shape(times)))
-
-
-def _same(number: Number, other: Number) -> bool:
-    return not isinstance(number, Dual) and bool(np.all(np.asarray(number) == np.asarray(other)))
+    place = run.system.drive(run.values, name, times)[0]
+    return place if isinstance(place, Dual) else np.array(np.broadcast_to(np.asarray(place, float), np.shape(times)))

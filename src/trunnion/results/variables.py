@@ -188,11 +188,10 @@ def _space(labels: Labels) -> str:
 def allocate(
     labels: Labels,
     positions: int,
-    absent: Sequence[str] = (),
     parts: Sequence[str] = (),
     wanted: Collection[str] | None = None,
 ) -> dict[str, NDArray[np.float64]]:
-    """Arrays for every variable, to be filled, position last; those in `absent` are zero and take no memory.
+    """Arrays for every variable, to be filled, position last.
 
     parts: of those variables that not every result has. wanted: what will be read, all if not given; of the others
     every entry is one cell, so that filling them costs next to nothing.
@@ -204,26 +203,17 @@ def allocate(
         if variable.part and variable.part not in parts:
             continue
         shape = (*(len(labels[dim]) for dim in variable.dims), positions)
-        if name in absent:
-            arrays[name] = np.broadcast_to(np.zeros(()), shape)
-        elif wanted is not None and name not in wanted:
+        if wanted is not None and name not in wanted:
             cell = np.zeros(1, variable.dtype)
             arrays[name] = np.lib.stride_tricks.as_strided(cell, shape, (0,) * len(shape))
         else:
-            # zeroed pages take no memory until something is written: rows of the ground never are
+            # zeroed pages take no memory until something is written: rows of the ground and slides of pins never are
             arrays[name] = np.zeros(shape, variable.dtype)
             if variable.part == "seats" and variable.dtype is np.float64:
                 arrays[name][:] = np.nan  # of joints and ends that have none
     for name, other in SAME_AS.items():
         arrays[name] = arrays[other]
     return arrays
-
-
-def _as(array: NDArray[Any], dtype: str) -> NDArray[Any]:
-    """The array with floats of some kind; what takes no memory takes none."""
-    if array.dtype != np.float64:
-        return array
-    return array.astype(dtype) if array.flags.writeable else np.broadcast_to(np.zeros((), dtype), array.shape)
 
 
 def dataset(
@@ -243,7 +233,8 @@ def dataset(
     """
     known = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]
-    own = {name: arrays[name] if dtype == "float64" else _as(arrays.pop(name), dtype) for name in names}
+    other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
+    own = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
     found = described(own, known, units)
     found |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:

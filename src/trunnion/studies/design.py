@@ -19,7 +19,7 @@ from trunnion.cycle.course import magnitude
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.joints.pairs import PAIRS
-from trunnion.measures.transmission import pressure_angles
+from trunnion.measures.curves import pressure_angles
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.figure import Figure

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.panels import CANCELLED, INTEGRAL
-from trunnion.cycle.course import course_of, magnitude
-from trunnion.cycle.means import Mean
+from trunnion.cycle.course import Mean, course_of, magnitude
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from trunnion.algebra.dual import primal
+from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, coordinate_unit, outputs
-from trunnion.measures.over_cycle import figures_of
 from trunnion.results.quantities import number, quantity
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity, Status
+from trunnion.measures.curves import MOTIONS
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
-from trunnion.measures.motion import MOTIONS
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod

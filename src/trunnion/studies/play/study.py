@@ -33,10 +33,10 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
+from trunnion.measures.curves import MOTIONS
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, chosen, outputs
-from trunnion.measures.motion import MOTIONS
 from trunnion.measures.positions import place_of, plan, within
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.contact import clearance

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.course import Place
-from trunnion.cycle.course import CycleCourse, magnitude
-from trunnion.cycle.means import Means
+from trunnion.cycle.course import CycleCourse, Means, magnitude
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
 from trunnion.results.dataset import Variable

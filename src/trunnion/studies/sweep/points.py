@@ -19,15 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
-from trunnion.cycle.course import CycleCourse
+from trunnion.cycle.course import CycleCourse, Means
 from trunnion.cycle.cycle_kernel import Many
 from trunnion.cycle.fill import CONDITIONS
 from trunnion.cycle.findings import model_notes
-from trunnion.cycle.means import Means
 from trunnion.cycle.positions import check_steps, positions
 from trunnion.dynamics.measured import courses_in_time
 from trunnion.errors import Finding, MechanismError, Severity, Status
-from trunnion.measures.over_cycle import figures_of
+from trunnion.measures.many import figures_of
 from trunnion.model.checks.values import check_values
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import ParameterSet

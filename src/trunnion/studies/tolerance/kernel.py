@@ -15,7 +15,6 @@ from trunnion.cycle.cycle_kernel import Engine
 from trunnion.dynamics.measured import MotionKernel
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.evaluation import Curves, Kernel, NumpyKernel, where_known
-from trunnion.measures.figures import known
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
 from trunnion.solve.backward import Backward
@@ -72,7 +71,7 @@ class CompiledCourses:
         curves, status = self._compiled.curves(values, np.asarray(time, float))
         found: Curves = {measure.name: () for measure in self.numpy.measures}
         for name, (measure, _) in self._parts.items():
-            found[measure.name] += (where_known(known(measure, status), curves[name]),)
+            found[measure.name] += (where_known(measure, status, curves[name]),)
         return found, status
 
 

@@ -132,7 +132,7 @@ def _courses(
     kernel: NumpyKernel, plan: PositionPlan, effects: Effects, values: Mapping[str, Number]
 ) -> tuple[dict[str, Course], NDArray[np.int8]]:
     """Every course over all positions with its derivatives, a part of the positions at a time."""
-    rows, times = len(effects.rows), plan.moved(values)
+    rows, times = len(effects.rows), moved(kernel.run, values, plan.times)
     count = len(plan.times)
     step = max(1, AT_ONCE // rows)
     found: dict[str, Course] = {}

@@ -16,10 +16,10 @@ from trunnion.measures.measures import Measure, named
 from trunnion.measures.over_cycle import figures_of
 from trunnion.measures.positions import plan, within
 from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
-from trunnion.results.figure import Figure
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.forward import forward
-from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 
@@ -84,8 +84,9 @@ class Watched:
             name, subject, unit = measure.name, f"measure {measure.name}", measure.unit(self.run.system)
             if measure.rule != "deviation":
                 own = measure.figure_unit(self.run.system, self.run.values)
-                aspect = measure.statistic.replace("-", " ")
-                yield Figure(name, subject, figure, own, aspect, note=self.notes.get(name, ""))
+                aspect, note = measure.statistic.replace("-", " "), self.notes.get(name, "")
+                figure, aspect = (MARGIN, MORE_THAN) if np.isinf(figure) else (figure, aspect)
+                yield Figure(name, subject, figure, own, aspect, note=note)
             elif name in self.extremes:
                 least, most = self.extremes[name]
                 yield Figure(f"{name}.min", subject, least, unit, "minimum")
@@ -204,6 +205,8 @@ def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: Frict
         if len(courses[measure.name]) > 1:
             continue
         values[i] = courses[measure.name][0]
+        if measure.wants_margin:
+            values[i][values[i] >= MARGIN] = np.inf
         if measure.turning(system):
             rate = np.broadcast_to(np.asarray(measure.coordinate(system).rate(walk), float), time.shape)
             step = float(time[1] - time[0]) if len(time) > 1 else 0.0

@@ -22,7 +22,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
-from trunnion.measures.figures import ENDLESS, Panels, Reading, combined, near
+from trunnion.measures.figures import Panels, Reading, combined, near
 from trunnion.measures.lines import turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.over_cycle import MOTION, Followed, alike, followed, matters, together
@@ -384,7 +384,7 @@ class _Group:
                 else:
                     sides = [_taken(part, lanes) for part in (low, half, weights)]
                     coefficients = linear(rows, lambda array: array @ FIT.T)
-                    panels = Panels(sides[0], sides[1], coefficients, sides[2], none, none)
+                    panels = Panels(sides[0], sides[1], coefficients, sides[2], none)
                 yield _Piece(measure, lanes, panels, primal(rows), gravest[lanes])
 
     def _evaluated(
@@ -464,7 +464,7 @@ class _Group:
             most = np.maximum(most, NONE * np.max(np.nan_to_num(most)))  # what has no effect has rounding for one
             last = np.max(changes[..., -2:], axis=(0, 3))
             excess = np.maximum(excess, last / np.where(most > 0.0, share * FINE_CHANGE * most, np.inf))
-        offending = np.any(np.isinf(rows), axis=(0, 3))
+        offending = np.zeros(tails.shape, bool)
         if np.any(excess > 1.0):
             answered = np.all(np.isfinite(tails), axis=1, keepdims=True)
             wide = primal(panels.half) > GAP * np.sum(primal(panels.half), axis=1, keepdims=True)
@@ -512,7 +512,7 @@ class _Group:
         reads: dict[str, list[Read]] = {measure.name: [] for measure in self.measures}
         for lanes in _blocks(lanes_of(values), ALONE):
             for course in self._courses(picked(values, lanes)):
-                status, row = np.array([np.max(course.states % ENDLESS)], np.int8), 0
+                status, row = np.array([np.max(course.states)], np.int8), 0
                 for measure in self.measures:
                     panels = Panels.of(course, slice(row, row := row + self._row_counts[measure.name]))
                     reads[measure.name].append(self._read(measure, panels, status, times))
@@ -547,10 +547,7 @@ class _Group:
             parts, status, _ = self._evaluated(picked(values, lanes), panels)
             nominal = self._nominal(panels)
             rows = [np.asarray(self._rows(measure, parts, nominal, panels))[:, :, 0] for measure in self.measures]
-            numbers = np.concatenate(rows)
-            endless = np.any(np.isinf(numbers), axis=0)
-            numbers[np.isinf(numbers)] = np.nan
-            return numbers, np.where(endless, ENDLESS, 0) + status[:, 0]
+            return np.concatenate(rows), status[:, 0]
 
         scales = np.repeat([self._scales[name] for name in self._row_counts], list(self._row_counts.values()))
         accuracy = MARGINS if self.measures[0].wants_margin else MOTION if self.of_motion else OWN

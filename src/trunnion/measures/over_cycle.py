@@ -13,7 +13,7 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import primal
 from trunnion.errors import Status
 from trunnion.measures.evaluation import Curves, courses_of
-from trunnion.measures.figures import ENDLESS, Panels, Reading, near
+from trunnion.measures.figures import Panels, Reading, near
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import ends_by_name, within
 from trunnion.results.scales import ROUNDING, Scales
@@ -123,11 +123,9 @@ def followed(
         numbers = np.array([np.broadcast_to(np.ravel(primal(part)), time.shape) for part in each])
         for name, (grid, angle) in angles.items():
             numbers[rows[name]] = near(numbers[rows[name]], np.interp(time, grid, angle), TURN)
-        endless = np.any(np.isinf(numbers), axis=0)
-        numbers[np.isinf(numbers)] = np.nan
         lost = np.any((gaps[0] < place[:, None]) & (place[:, None] < gaps[1]), axis=1)
         states = np.where(lost, np.maximum(status.ravel(), Status.CONTACT_LOST), status.ravel())
-        return numbers, states.astype(np.intp) + ENDLESS * endless
+        return numbers, states.astype(np.intp)
 
     scales = np.concatenate([np.full(len(parts[measure.name]), alike(run, measure)) for measure in measures])
     between = breaks_between(run.cycle, np.concatenate([breaks, gaps.ravel()]), start, end)

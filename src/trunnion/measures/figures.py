@@ -232,7 +232,7 @@ class Reading:
         return of(panels.at(time, period))
 
     def _to_the_end(self, panels: Panels, figure: Number) -> Number:
-        """A figure of the locking margin, ∞ where it is of places beyond which that is not looked for; NaN if a place."""
+        """A figure of the locking margin, ∞ where it is of places at which that is not looked for; NaN of a place."""
         rule = self.measure.rule
         highest = primal(panels.top(first, -1.0 if rule.endswith("minimum") else 1.0).value)
         within = (highest < MARGIN * (1 - NARROW)) | (rule == "dwell")

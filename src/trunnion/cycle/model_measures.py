@@ -31,7 +31,7 @@ __all__ = ["VARIABLES", "Watched", "watched"]
 Array = NDArray[np.float64]
 VARIABLES = {
     "measure_value": Variable(
-        ("measure", "position"), "measure", "the model's measure; NaN of one that has several numbers"
+        ("measure", "position"), "measure", "the model's measure; NaN of one that is no number of a position"
     ),
     "measure_figure": Variable(
         ("measure",), "measure_figure", "figure of the measure over the cycle; NaN of one that states none"
@@ -193,7 +193,8 @@ def _had(run: Run, name: str, steps: int) -> Measure:
 
 
 def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod) -> Array:
-    """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers."""
+    """The measures, (measure, position), at some times in a row, s; NaN of one that is no number of a
+    position, but of several, or of the whole cycle."""
     system = run.system
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
@@ -202,7 +203,7 @@ def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: Frict
         courses = courses_of(run, measures, time, method)[0]
         walk = forward(system, run.values, run.chosen.assembly, time)
     for i, measure in enumerate(measures):
-        if len(courses[measure.name]) > 1:
+        if len(courses[measure.name]) > 1 or measure.of.reduced:
             continue
         values[i] = courses[measure.name][0]
         if measure.wants_margin:

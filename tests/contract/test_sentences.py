@@ -43,7 +43,7 @@ def test_a_finding_is_told_by_its_figures() -> None:
 
 def test_lists_counts_and_the_infinite_are_told_in_words() -> None:
     assert finding_for("model.point_mass", links=["a", "b"]).what.startswith("a, b have a mass")
-    choice = finding_for("assembly.choice", links=["a"], ways=2, phrases={"why": "", "remedy": ""})
+    choice = finding_for("assembly.choice", links=["a"], ways=2, phrases={"why": "", "remedy": "", "used": ""})
     assert "have 2 assembly modes" in choice.what
     endless = finding_for("position.near_singular", at="at 3°", condition=float("inf"))
     assert endless.what.endswith("up to ∞")

@@ -11,6 +11,7 @@ import pytest
 
 import trunnion
 from mechanisms import Array, Data, findings, four_bar, prismatic, revolute, slide, slider_crank
+from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.algebra.table import look_up
@@ -171,8 +172,18 @@ def test_resistance_that_varies_and_one_that_drives() -> None:
     np.testing.assert_allclose(result["useful_power"].values, 100 * (1 + np.cos(FULL_TURN)) * speed, atol=1e-9)
     data["loads"]["cut"]["resisting_force"] = "100 N * cos(drive)"
     assert any(row["code"] == "load.drives" for row in findings(run(data)))
+    for touching in ("abs(sin(2 * drive + 0.5))", "(1 + sin(3 * drive)) ^ 3"):
+        data["loads"]["cut"]["resisting_force"] = f"100 N * {touching}"
+        assert not any(row["code"] == "load.drives" for row in findings(run(data)))
     data["loads"]["cut"]["resisting_force"] = "-3 N"
     assert "loads.cut.resisting_force: is -3, which is negative" in refused(**data)
+
+
+def test_a_resistance_in_space_that_only_touches_0_does_not_drive() -> None:
+    laws = {"abs(sin(2 * drive + 0.5))": 0, "(cos(drive)^2 + sin(drive)^2 - 1)": 0, "sin(2 * drive + 0.5)": 1}
+    for law, count in laws.items():
+        loads = {"brake": {"joint": "D", "resisting_torque": f"2 N m * {law}"}}
+        assert [row["code"] for row in findings(run({**rssr().data, "loads": loads}))].count("load.drives") == count
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------

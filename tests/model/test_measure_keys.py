@@ -192,6 +192,8 @@ CASES = [
     ("{angle: rocker, limit: ±0.1 deg}", "{angle: rocker, limit: ±(AB - BC)/AB}", M, "error.limit", "above the", "±"),
     ("{angle: rocker, limit: ±0.1 deg}", "{angle: rocker, at_least: 2, at_most: 1}", M, "at_least", "at least 2",
      "exch"),
+    ("{angle: rocker, limit: ±0.1 deg}", "{locking_margin: mechanism, at_least: 12}", M, "at_least", "up to 10",
+     "below"),
     ("{angle: rocker, at: 60 deg,", "{angle: rocker, at: 60 deg, over: [0, 1],", M + 1, "theta", "both a position",
      "keep"),
     ("{angle: rocker, at: 60 deg,", "{angle: rocker, at: 60 deg, as: rms,", M + 1, "theta.as", "of a range", "over: ["),

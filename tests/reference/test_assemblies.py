@@ -280,6 +280,34 @@ def selected_by_what_is_printed(mechanism: Mechanism) -> int:
     return count
 
 
+def test_a_turn_that_two_assemblies_share_does_not_choose_in_silence() -> None:
+    """A rod with a hinge across it, which lies flat in both of the two assemblies with the links extended."""
+    axis, x = [0, 0, 1], [1, 0, 0]
+
+    def point(*at: float, along: list[int] = axis) -> dict[str, Any]:
+        return {"at": list(at), "axis": along, "x": x}
+
+    links = {
+        "ground": {"A": point(0, 0, 0), "D": point(1, 0, 0)},
+        "crank": {"A": point(0, 0, 0), "B": point(0.3, 0, 0)},
+        "rod": {"B": point(0, 0, 0), "H": point(0.4, 0, 0, along=[0, 1, 0])},
+        "fork": {"H": point(0, 0, 0, along=[0, 1, 0]), "C": [0.5, 0, 0]},
+        "rocker": {"D": point(0, 0, 0), "C": [0.7, 0, 0]},
+    }
+    sides = {"A": ["ground", "crank"], "B": ["crank", "rod"], "H": ["rod", "fork"], "C": ["fork", "rocker"],
+             "D": ["ground", "rocker"]}  # fmt: skip
+    data: dict[str, Any] = {
+        "space": "spatial", "drivers": {"A": {"speed": 1.0}},
+        "links": {name: {"points": points} for name, points in links.items()},
+        "joints": {name: {"type": "spherical" if name == "C" else "revolute", "links": pair}
+                   for name, pair in sides.items()},
+    }  # fmt: skip
+    for hint in (0.0, 0.1):
+        (finding,) = prepare(Mechanism(**data, assembly={"H": hint})).chosen.findings
+        assert re.search(r"does not distinguish way-\d and way-\d: B is at −?49.99° in way-\d, ", finding.what)
+    assert not prepare(Mechanism(**data, assembly={"H": 0.0, "D": 1.5})).chosen.findings
+
+
 @pytest.mark.spread(1)
 @pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.yaml")), ids=lambda file: file.stem)
 def test_the_printed_places_of_a_way_of_an_example_select_it(file: Path) -> None:

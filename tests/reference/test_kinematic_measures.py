@@ -235,8 +235,8 @@ def test_the_models_measures_in_the_result_of_a_cycle(tmp_path: Path) -> None:
     assert [one["severity"] for one in left] == ["note"]
     trunnion.save(result, tmp_path / "cycle.csv")
     head, *rows = [line.split(",") for line in (tmp_path / "cycle.csv").read_text("utf-8").splitlines()]
-    assert head[-4:] == ["speed", "mu", "swing", "rest"]
-    np.testing.assert_allclose([float(row[-4]) for row in rows], speed, rtol=1e-6)
+    assert head[-4:] == ["status", "speed", "mu", "rest"]  # a stroke is of no position
+    np.testing.assert_allclose([float(row[-3]) for row in rows], speed, rtol=1e-6)
 
 
 def test_play_of_a_speed() -> None:

@@ -9,9 +9,11 @@ import pytest
 import test_newton_euler as oracle
 
 import trunnion
-from mechanisms import MODELS, Array, Data, build, findings, four_bar, model, prismatic, revolute, slide
+from mechanisms import MODELS, Array, Data, build, findings, four_bar, model, prismatic, revolute, slide, slider_crank
+from mechanisms_space import rssr
 from reference import newton_euler
 from trunnion import FrictionMethod, Mechanism, Status
+from trunnion.results.attributes import summary_of
 from trunnion.solve.run import prepare
 
 ARM, GUIDE, LOAD = 0.15, 0.12, 40.0
@@ -216,3 +218,42 @@ def test_some_positions_lock_and_the_others_keep_their_numbers() -> None:
     residual, peak = np.nanmax(np.abs(result["power_residual"])), np.nanmax(np.abs(result["drive_power"]))
     assert residual < 1e-12 * peak
     assert any(row["code"] == "friction.locked" for row in findings(result))
+
+
+def jamming_piston() -> Mechanism:
+    """A short rod that presses a piston with friction aside."""
+    data = slider_crank(0.3, 0.5, 0.0)
+    data["joints"]["C"]["friction"] = 1.6
+    data["loads"] = {"press": {"joint": "C", "resisting_force": "100 N"}}
+    data["drivers"] = {"A": {"speed": 6.0}}
+    return build(data, friction=None)
+
+
+def toward_its_dead_centre() -> Mechanism:
+    """A piston that turns its crank against a torque, up to where rod and crank are in line."""
+    data = slider_crank(offset=0.0)
+    data["drivers"] = {"C": {"speed": 0.1, "range": [1.1, 1.35]}}
+    data["loads"] = {"brake": {"joint": "A", "resisting_torque": "10 N m"}}
+    return build({**data, "assembly": {"B": [0.1, 0.28]}}, friction=0.1)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "note"),
+    [
+        (jamming_piston(), "no bound: it locks there"),
+        (Mechanism(**rssr(friction=3.0).data), "no bound: it locks there"),
+        (toward_its_dead_centre(), "no bound"),
+    ],
+    ids=["plane", "space", "dead centre"],
+)
+def test_efforts_and_reactions_have_no_maximum_where_they_grow_without_bound(mechanism: Mechanism, note: str) -> None:
+    figures = {figure.name: figure for figure in summary_of(trunnion.analyse(mechanism, 12))}
+    driver = next(iter(mechanism.drivers))
+    for name in (f"{driver}.effort_max", "B.reaction_max"):
+        assert (figures[name].value, figures[name].note) == (None, note)
+
+
+def test_efforts_that_come_to_a_limit_where_it_locks_have_a_maximum() -> None:
+    mechanism = build(four_bar(), friction=1.0, radius=0.5)
+    figures = {figure.name: figure for figure in summary_of(trunnion.analyse(mechanism, 12))}
+    assert figures["A.effort_max"].value == pytest.approx(94.9878, rel=1e-5)

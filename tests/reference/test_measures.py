@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import trunnion
 from brief import brief
 from measured import figures, many, reads
-from mechanisms import DURANGO, build, four_bar, slider_crank
+from mechanisms import DURANGO, Data, build, four_bar, slider_crank
 from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative, primal
@@ -26,6 +26,7 @@ from trunnion.measures.positions import moved, plan
 from trunnion.model.measure_parts import STATISTICS
 from trunnion.model.measure_table import MEASURES
 from trunnion.results.attributes import summary_of
+from trunnion.results.figure import MORE_THAN
 from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run, prepare
 
@@ -371,7 +372,7 @@ def test_forces_are_those_of_the_analysis() -> None:
     rows = {row.name: row.value for row in summary_of(result)}
     assert found["efficiency"] == pytest.approx(rows["efficiency"], rel=1e-7)
     least = np.nanmin(result["locking_margin"].values)
-    assert found["margin"] <= min(least, MARGIN) + 1e-12
+    assert found["margin"] <= least + 1e-12
     assert found["now"] == pytest.approx(float(result["efficiency_instant"].values[40]), rel=1e-9, nan_ok=True)
 
 
@@ -388,6 +389,25 @@ def test_locking_margin() -> None:
     slope = figures(run, [margin], 90, {"links.crank.points.B.x": Dual(R, 1.0)})["margin"]
     assert np.isnan(np.ravel(derivative(slope))[0])
     assert float(np.ravel(primal(slope))[0]) == pytest.approx(found, rel=1e-12)
+
+
+@pytest.mark.parametrize("data", [four_bar(), rssr(friction=0.05).data], ids=["plane", "space"])
+def test_a_locking_margin_beyond_what_is_looked_for_is_infinite(data: Data) -> None:
+    """In a result, a sweep and samples; the summary says "more than"; its place does not exist."""
+    statistics = ["minimum", "mean", "place-of-minimum"]
+    measures = {name: {"locking_margin": "mechanism", "as": name} for name in statistics}
+    measures["minimum"]["at_least"] = 2
+    mechanism = build({**data, "measures": measures}, friction=0.05)
+    result = trunnion.analyse(mechanism, 12)
+    np.testing.assert_array_equal(result["measure_figure"], [np.inf, np.inf, np.nan])
+    assert np.all(np.isinf(result["measure_value"]))
+    rows = {row.name: row for row in summary_of(result)}
+    assert [(rows[name].value, rows[name].aspect) for name in statistics[:2]] == [(MARGIN, MORE_THAN)] * 2
+    mass = f"links.{next(name for name, link in data['links'].items() if 'mass' in link)}.mass"
+    swept = trunnion.sweep(mechanism, {mass: [1.0, 1.1]}, 12, measures=["minimum"])
+    assert np.all(np.isinf(swept["minimum"]))
+    studied = trunnion.tolerance(mechanism.with_values({mass: "1 kg ± 0.1 kg"}), ["minimum"], samples=20)
+    assert (studied["nominal"][0], studied["yield"][0]) == (np.inf, 1)
 
 
 def test_forces_in_space() -> None:
@@ -576,7 +596,7 @@ def test_every_kind_with_every_statistic(crank: Run) -> None:
     for one in measures:
         read = found[one.name]
         assert np.shape(read.figure) == (3,), one.name
-        if one.kind != "efficiency" and "at" not in one.name:
+        if one.kind not in ("efficiency", "locking_margin") and "at" not in one.name:
             assert np.all(np.isfinite(read.figure)), one.name
         np.testing.assert_allclose(read.figure[0], nominal[one.name], rtol=1e-12, atol=1e-12, err_msg=one.name)
         assert np.shape(read.shown) == (3, 1 if one.at is not None else 90)

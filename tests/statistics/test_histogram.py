@@ -36,6 +36,7 @@ def test_all_are_counted_except_nan() -> None:
     assert counts.dtype == np.int64
     assert counts.shape == (bins.number,)
     assert (counts[0], counts[-1], counts.sum()) == (2, 2, 8)
+    assert quantile(counts, bins, 1.0, most=np.inf) == np.inf
 
 
 def test_figures_each_with_their_bins() -> None:

@@ -268,6 +268,13 @@ class Courses:
         times = np.sort(np.concatenate(found))
         return times[np.append(np.diff(times) > ONE * self.span, True)] if len(times) else times
 
+    def below(self, rows: Sequence[int], floor: float) -> Array:
+        """Times, s, from and to, (range, 2), in which any of some rows is below 0. floor: what is rounding of them."""
+        edges = np.unique(np.concatenate([self.edges, *(self.passages(row) for row in rows)]))
+        below = np.any(self.at((edges[1:] + edges[:-1]) / 2)[rows] < -floor, axis=0)
+        ends: Array = edges[np.flatnonzero(np.diff(below, prepend=False, append=False))]
+        return ends.reshape(-1, 2)
+
     def within(self, row: int, low: float, high: float) -> float:
         """Share of the time that a row is between two levels."""
         own = self.coefficients[None, :, row]

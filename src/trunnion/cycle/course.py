@@ -24,6 +24,7 @@ from trunnion.cycle.fill import COMPARED, Arrays, allocate, fill_chunk, fill_err
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Status
 from trunnion.joints.pairs import PAIRS
+from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.loads import has_useful_work
@@ -113,6 +114,9 @@ def unknown(drivers: int, joints: int, supposed: float = 0.0, has_useful_work: b
     """Means without an answer; what share of them is supposed stays."""
     none = Mean(np.nan, np.nan, np.nan, np.nan)
     return Means(none, none, none, np.full(joints, np.nan), np.full(drivers, np.nan), supposed, has_useful_work)
+
+
+POLE, GROWS = np.array([1e-6, 1e-5, 1e-4]), 2.5  # of the cycle from a break: what grows so many times at each is a pole
 
 
 @dataclass(frozen=True)
@@ -222,9 +226,37 @@ class CycleCourse:
             What is made of its rows, (row, panel, place), the only one itself if not given.
         unit
             Of the number, so that rounding is told from change.
+
+        Returns
+        -------
+        Place
+            Infinite where the number grows without bound towards a break; None where no panel has a value.
         """
-        chosen = self.sound if panels is None else panels
-        return self.picked(name, *which).extreme(of, sign, chosen, scales_of(self.run).floor(unit))
+        chosen, courses = self.sound if panels is None else panels, self.picked(name, *which)
+        place = courses.extreme(of, sign, chosen, scales_of(self.run).floor(unit))
+        if place is None or not place.at_break:
+            return place
+        away = courses.span * POLE
+        ends = [end for end in self._ends_about(place.time) if courses.edges[0] <= end <= courses.edges[-1]]
+        times = np.array([times for end in ends for times in (end - away, end + away)])
+        inside = np.all((times >= courses.edges[0]) & (times <= courses.edges[-1]), axis=1)
+        values = sign * of(courses.at(times.ravel())).reshape(times.shape)
+        grows = inside & np.all(values[:, :-1] > GROWS * np.abs(values[:, 1:]), axis=1)
+        return place._replace(value=sign * np.inf) if np.any(grows) else place
+
+    def _ends_about(self, time: float) -> list[float]:
+        """A break, s, and those at which it is singular where positions close to that begin there."""
+        breaks = self.courses.breaks
+        k = int(np.argmin(np.abs(breaks - time)))
+        others = np.array([breaks[other] for other in (k - 1, k + 1) if 0 <= other < len(breaks)])
+        close = self.status[self.courses.panel((others + breaks[k]) / 2)] == Status.NEAR_SINGULAR
+        return [time, *others[close]]
+
+    def figure(self, name: str, subject: str, top: Place, unit: str, aspect: str) -> Figure:
+        """An extreme as a figure: none where it has no bound."""
+        locks = ": it locks there" * self.beside(top, Status.LOCKED)
+        note = f"no bound{locks}" * bool(np.isinf(top.value))
+        return Figure(name, subject, top.value, unit, aspect, self.told(top), note)
 
     def told(self, place: Place) -> str:
         """Where an extreme is, in words."""

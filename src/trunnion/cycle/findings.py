@@ -50,6 +50,7 @@ CLASS_TWO = 2
 NEGLIGIBLE = 1e-3  # of the largest effort of a driver: an interval of its effort that is less is no finding
 MUCH = 0.02  # of the drive work: what a spring keeps at the end of a range
 LEAST = 0.01  # of the drive work: what supplies less is not worth a word
+RESOLVED = 1e-7  # of its largest value: a resistance that is below 0 by less is 0, for so well its course is known
 ROUNDED = 1e-6  # beside its error: an efficiency is above 1 by more, for seats settle to as much of their clearance
 MOST_PLACES = 8  # named in one sentence
 APART = 2e-3  # of the cycle: times of lifting off that are nearer to each other are told as one
@@ -91,14 +92,13 @@ class Cycle:
 
         return run.courses(rows)
 
-    def place(self, *times: float) -> str:
-        """One time, s, or the range between two, on the dial of the drive."""
-        dial = self.run.system.dial(self.run.values, np.array([*times, self.run.cycle.duration]))
-        return dial.at(0) if len(times) == 1 else f"between {dial.at(0)} and {dial.at(1)}"
+    def place(self, time: float) -> str:
+        """A time, s, on the dial of the drive."""
+        return self.between(time, time).removeprefix("at ")
 
     def between(self, low: float, high: float) -> str:
-        """A range, s, as one place if its ends read alike."""
-        return f"at {self.place(low)}" if self.place(low) == self.place(high) else self.place(low, high)
+        """A range of times, s, on the dial of the drive, as one place if its ends read alike."""
+        return self.run.system.dial(self.run.values, np.array([low, high, self.run.cycle.duration])).between(0, 1)
 
 
 def listed(places: Sequence[str]) -> str:
@@ -314,8 +314,9 @@ def _ranges(cycle: Cycle) -> Iterator[Finding]:
     """Where it can be assembled, if there are several such ranges: extremes are of that which holds the start."""
     ranges = cycle.course.ranges if cycle.course else []
     if len(ranges) > 1:
-        starts = [cycle.place(*ends) for *ends, start in ranges if start]
-        yield finding_for("assembly.ranges", "links", ranges=[cycle.place(*ends) for *ends, _ in ranges], starts=starts)
+        starts = [cycle.between(*ends) for *ends, start in ranges if start]
+        places = [cycle.between(*ends) for *ends, _ in ranges]
+        yield finding_for("assembly.ranges", "links", ranges=places, starts=starts)
 
 
 def _no_common_period(cycle: Cycle) -> Iterator[Finding]:
@@ -344,10 +345,8 @@ def _driving_resistances(cycle: Cycle) -> Iterator[Finding]:
 
     courses = cycle.course_of(look)
     for row, path in enumerate(paths):
-        cut = courses.picked(np.array([row])).parted(courses.passages(row))
-        below = cut.at(cut.edges[:-1] + cut.half)[0] < 0
-        ends = np.flatnonzero(np.diff(np.concatenate([[0], below, [0]]).astype(int)))
-        places = [cycle.place(*cut.edges[pair]) for pair in ends.reshape(-1, 2)]
+        floor = max(RESOLVED * courses.sizes[row], scales_of(run).floor("N m" if path.endswith("torque") else "N"))
+        places = [cycle.between(*ends) for ends in courses.below([row], floor)]
         if places:
             yield finding_for("load.drives", path, at=listed(places))
 

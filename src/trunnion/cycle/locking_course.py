@@ -382,7 +382,7 @@ class LockingCourse:
             supplied, top = max(tops, key=lambda pair: pair[0], default=(0.0, None))
             if top is not None and supplied > scales.floor(unit):
                 subject = f"drive {'torque' if unit == 'N m' else 'force'} of {name} to reverse the motion"
-                yield Figure(f"{name}.effort_reverse", subject, top.value, unit, "largest", self.course.told(top))
+                yield self.course.figure(f"{name}.effort_reverse", subject, top, unit, "largest")
 
     # ---- ranges -----------------------------------------------------------------------------------------------
 

@@ -16,9 +16,9 @@ from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import ends_by_name, plan, within
 from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
-from trunnion.results.figure import Figure
+from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.sentences import finding_for
-from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.run import Run
 from trunnion.solve.seating import seating_of
 
@@ -30,7 +30,7 @@ __all__ = ["VARIABLES", "Watched", "watched"]
 Array = NDArray[np.float64]
 VARIABLES = {
     "measure_value": Variable(
-        ("measure", "position"), "measure", "the model's measure; NaN of one that has several numbers"
+        ("measure", "position"), "measure", "the model's measure; NaN of one that is no number of a position"
     ),
     "measure_figure": Variable(
         ("measure",), "measure_figure", "figure of the measure over the cycle; NaN of one that states none"
@@ -80,8 +80,9 @@ class Watched:
             name, subject, unit = measure.name, f"measure {measure.name}", measure.unit(self.run.system)
             if measure.rule != "deviation":
                 own = measure.figure_unit(self.run.system, self.run.values)
-                aspect = measure.statistic.replace("-", " ")
-                yield Figure(name, subject, figure, own, aspect, note=self.notes.get(name, ""))
+                aspect, note = measure.statistic.replace("-", " "), self.notes.get(name, "")
+                figure, aspect = (MARGIN, MORE_THAN) if np.isinf(figure) else (figure, aspect)
+                yield Figure(name, subject, figure, own, aspect, note=note)
             elif name in self.extremes:
                 least, most = self.extremes[name]
                 yield Figure(f"{name}.min", subject, least, unit, "minimum")
@@ -186,16 +187,19 @@ def _of_a_cycle(run: Run, name: str) -> Measure:
 
 
 def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod) -> Array:
-    """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers."""
+    """The measures, (measure, position), at some times in a row, s; NaN of one that is no number of a
+    position, but of several, or of the whole cycle."""
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
         return values
     with np.errstate(all="ignore"):
         courses, walk = courses_of(run, measures, time, method)[0], run.walk(time)
     for row, measure in zip(values, measures, strict=True):
-        if len(courses[measure.name]) > 1:
+        if len(courses[measure.name]) > 1 or measure.of.reduced:
             continue
         row[:] = courses[measure.name][0]
+        if measure.wants_margin:
+            row[row >= MARGIN] = np.inf
         if measure.turning(run.system):
             rate = np.broadcast_to(np.asarray(measure.coordinate(run.system).rate(walk), float), time.shape)
             unwrap_row(row, rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)

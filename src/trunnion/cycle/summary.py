@@ -129,7 +129,7 @@ def _efforts(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         for end, aspect, sign in (("min", "minimum", -1.0), ("max", "maximum", 1.0)):
             top = course.extreme("drive_effort", i, sign=sign, unit=unit)
             if top is not None:
-                yield Figure(f"{name}.effort_{end}", subject, top.value, unit, aspect, course.told(top))
+                yield course.figure(f"{name}.effort_{end}", subject, top, unit, aspect)
         yield Figure(f"{name}.effort_rms", subject, course.means.drive_effort_rms[i], unit, "RMS")
 
 
@@ -147,7 +147,7 @@ def _reactions(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
                 continue
             if planar or top.value > scales.floor(unit):
                 key = f"{name}.{what.replace(' ', '_')}_max"
-                yield Figure(key, f"{what} of {name}", top.value, unit, "maximum", course.told(top))
+                yield course.figure(key, f"{what} of {name}", top, unit, "maximum")
         if PAIRS[kind].guided:
             ends = [course.extreme("joint_slide", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
             if ends[0] is not None and ends[1] is not None:
@@ -170,7 +170,7 @@ def _friction(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         yield Figure("friction_power_error", "friction power, numerical error, at most", off, "W")
     lost = course.extreme("friction_power", of=lambda rows: np.sum(rows, axis=0), unit="W")
     if lost is not None:
-        yield Figure("friction_power_max", "friction power", lost.value, "W", "maximum", course.told(lost))
+        yield course.figure("friction_power_max", "friction power", lost, "W", "maximum")
 
 
 def _efficiency(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
@@ -216,21 +216,21 @@ def _errors(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:
         highest = max(top.value for top, _ in points) * (1 - ALIKE)
         top, k = next(pair for pair in points if pair[0].value >= highest)  # of equal ones the first
         most = f"largest: {'.'.join(run.system.points[k])}"
-        yield Figure("point_error_max", "position error", top.value, "m", most, course.told(top))
+        yield course.figure("point_error_max", "position error", top, "m", most)
     for i, (joint, (kind, links)) in enumerate(run.system.joints.items()):
         if run.system.mechanism.fixed_link not in links or joint in run.system.mechanism.drivers:
             continue
         what, unit = ("slide", "m") if PAIRS[kind].guided else ("rotation", "rad")
         if (error := largest(f"joint_{what}_error", i)) is not None:
             name, subject = f"{joint}.{what}_error_max", f"transmission error of {joint}"
-            yield Figure(name, subject, error.value, unit, "largest magnitude", course.told(error))
+            yield course.figure(name, subject, error, unit, "largest magnitude")
     for i, joint in enumerate(run.system.mechanism.drivers):
         kind, unit = ("torque", "N m") if run.system.turns(joint) else ("force", "N")
         subject, name = f"change of the drive {kind} of {joint} by the errors", f"{joint}.effort_change_max"
         ends = [course.extreme("drive_effort_change", i, sign=sign, panels=course.valid) for sign in (1.0, -1.0)]
         change = max(filter(None, ends), key=lambda end: abs(end.value), default=None)
         if change is not None:
-            yield Figure(name, subject, change.value, unit, "largest magnitude", course.told(change))
+            yield course.figure(name, subject, change, unit, "largest magnitude")
 
 
 def _backward(cycle: Cycle, course: CycleCourse) -> Iterator[Figure]:

@@ -39,15 +39,15 @@ from trunnion.errors import Status
 from trunnion.measures.lines import direction
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import gain_of, path_of
+from trunnion.solve.friction_method import MARGIN
 from trunnion.solve.run import Run
 
-__all__ = ["ENDLESS", "Figures", "Panels", "Reading", "combined", "near", "within_limits"]
+__all__ = ["Figures", "Panels", "Reading", "combined", "near", "within_limits"]
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-5  # of a period: a way back that is shorter is a jump
 BESIDE = 1e-9  # of the cycle: on a side of a break
 NARROW = 1e-9  # of the courses: panels that hold no place
-ENDLESS = 32  # beside the status of places where a number is infinite
 SIGNS = {"maximum": (1.0,), "minimum": (-1.0,), "place-of-maximum": (1.0,), "place-of-minimum": (-1.0,),
          "dead centre": (1.0,), "dead centre, least": (-1.0,)}  # fmt: skip
 BOTH = (1.0, -1.0)
@@ -59,15 +59,14 @@ class Panels:
     """Courses of mechanisms, a lane each.
 
     low, half: start and half width of every panel, s, (lane, panel); coefficients: (row, lane, panel, coefficient);
-    weights: how much time every Gauss node of a panel counts, (lane, panel, node or 1). endless: panels where a number
-    is infinite; left_out: where extremes are not looked for.
+    weights: how much time every Gauss node of a panel counts, (lane, panel, node or 1). left_out: panels where extremes
+    are not looked for.
     """
 
     low: Number
     half: Number
     coefficients: Number
     weights: Number
-    endless: NDArray[np.bool_]
     left_out: NDArray[np.bool_]
 
     @classmethod
@@ -75,15 +74,15 @@ class Panels:
         """Some rows of one mechanism; where a pin loses contact is left out."""
         half = courses.half[None]
         coefficients = np.moveaxis(courses.coefficients[:, rows], 1, 0)[:, None]
-        endless, lost = courses.states >= ENDLESS, courses.states % ENDLESS == Status.CONTACT_LOST
-        return cls(courses.edges[None, :-1], half, coefficients, half[..., None], endless[None], lost[None])
+        lost = courses.states == Status.CONTACT_LOST
+        return cls(courses.edges[None, :-1], half, coefficients, half[..., None], lost[None])
 
     @classmethod
     def constant(cls, rows: Number) -> Panels:
         """Numbers at a place, (row, lane), as courses that do not change."""
         coefficients = linear(rows, lambda array: array[..., None, None] * (np.arange(ORDER) == 0))
         half = np.full((np.shape(primal(rows))[1], 1), 0.5)
-        return cls(0.0 * half, half, coefficients, half[..., None], half < 0, half < 0)
+        return cls(0.0 * half, half, coefficients, half[..., None], half < 0)
 
     def made(self, coefficients: Number) -> Panels:
         """The same panels with other rows."""
@@ -192,12 +191,12 @@ class Reading:
     def read(self, panels: Panels) -> Figures:
         """The figure, SI, and its deviations; NaN where a part of the courses has no answer."""
         gone = np.any(np.isnan(primal(panels.coefficients)[..., 0]), axis=0)
-        lost = np.any(gone & ~panels.endless, axis=1)
+        lost = np.any(gone, axis=1)
         figure, least, most, time = self._of_rule(panels)
+        if self.measure.wants_margin:
+            figure = self._to_the_end(panels, figure)
+            least = most = figure - self.nominal
         figure, least, most = (selected(~lost, number, np.nan) for number in (figure, least, most))
-        if np.any(panels.endless) and self.measure.rule != "deviation":
-            endless = (np.all if self.measure.rule == "minimum" else np.any)(panels.endless, axis=1)
-            figure, least, most = (selected(lost | ~endless, number, np.inf) for number in (figure, least, most))
         return Figures(figure, least, most, np.where(np.isfinite(primal(figure)), time, np.nan))
 
     def offending(self, panels: Panels, excess: Array) -> NDArray[np.bool_]:
@@ -232,6 +231,13 @@ class Reading:
             return rows[0] / selected(primal(rows[1]) > 0, rows[1], np.nan)
         panels, of = self.number(panels)
         return of(panels.at(time, period))
+
+    def _to_the_end(self, panels: Panels, figure: Number) -> Number:
+        """A figure of the locking margin, ∞ where it is of places at which that is not looked for; NaN of a place."""
+        rule = self.measure.rule
+        highest = primal(panels.top(first, -1.0 if rule.endswith("minimum") else 1.0).value)
+        within = (highest < MARGIN * (1 - NARROW)) | (rule == "dwell")
+        return selected(within, figure, np.nan if self.measure.of_place else np.inf)
 
     # ---- rules --------------------------------------------------------------------------------------------
 
@@ -396,7 +402,7 @@ def within_limits(measure: Measure, figures: Array, least: Array, most: Array) -
 
     least, most: signed deviations from the nominal mechanism.
     """
-    good = np.isfinite(figures)
+    good = ~np.isnan(figures)
     if measure.lower is not None:
         good &= least >= measure.lower
     if measure.upper is not None:

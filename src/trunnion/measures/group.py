@@ -22,7 +22,7 @@ from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
-from trunnion.measures.figures import ENDLESS, Panels, Reading, combined, near
+from trunnion.measures.figures import Panels, Reading, combined, near
 from trunnion.measures.lines import turn
 from trunnion.measures.measures import Measure
 from trunnion.measures.positions import moved, within
@@ -355,9 +355,7 @@ class Group:
                     else:
                         sides = [_taken(part, lanes) for part in (low, half, weights)]
                         none = np.zeros((len(lanes), panels), bool)
-                        read = Panels(
-                            sides[0], sides[1], linear(rows, lambda array: array @ FIT.T), sides[2], none, none
-                        )
+                        read = Panels(sides[0], sides[1], linear(rows, lambda array: array @ FIT.T), sides[2], none)
                         offending[block[lanes]] |= self._offending(measure, read, primal(rows), share)
                     gone[block[lanes]] |= np.any(np.isnan(primal(rows)), axis=(0, 2, 3))
                     reads[measure.name].append(self._read(measure, read, np.max(status[lanes], axis=(1, 2)), times))
@@ -437,7 +435,7 @@ class Group:
             most = np.maximum(most, NONE * np.max(np.nan_to_num(most)))  # what has no effect has rounding for one
             last = np.max(changes[..., -2:], axis=(0, 3))
             excess = np.maximum(excess, last / np.where(most > 0.0, share * FINE_CHANGE * most, np.inf))
-        offending = np.any(np.isinf(rows), axis=(0, 3))
+        offending = np.zeros(tails.shape, bool)
         if np.any(excess > 1.0):
             answered = np.all(np.isfinite(tails), axis=1, keepdims=True)
             wide = primal(panels.half) > GAP * np.sum(primal(panels.half), axis=1, keepdims=True)
@@ -510,7 +508,7 @@ class Group:
 
     def _read_alone(self, course: Courses, times: Mapping[str, Array]) -> dict[str, Read]:
         """What the courses of one mechanism say."""
-        status, row, reads = np.array([np.max(course.states % ENDLESS)], np.int8), 0, {}
+        status, row, reads = np.array([np.max(course.states)], np.int8), 0, {}
         for measure in self.measures:
             count = 1 if measure.of_attitude(self.run.system) else self._counts[measure.name]
             panels = Panels.of(course, slice(row, row := row + count))
@@ -536,10 +534,7 @@ class Group:
             nominal = {} if tuned else self._nominal(panels)
             rows = [np.asarray(self._rows(measure, parts, nominal, panels)) for measure in self.measures]
             numbers = np.concatenate(rows).reshape(-1, *time.shape)
-            endless = np.any(np.isinf(numbers), axis=0)
-            numbers[np.isinf(numbers)] = np.nan
-            states: Lanes = ENDLESS * endless + (0 if tuned else status.reshape(time.shape))
-            return numbers, states
+            return numbers, np.zeros(time.shape, int) if tuned else status.reshape(time.shape)
 
         system = self.run.system
         counts = [1 if one.of_attitude(system) and not tuned else self._counts[one.name] for one in self.measures]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf
 from typing import Literal
 
 from trunnion.model.units import KINDS, Kind
@@ -25,7 +26,8 @@ class MeasureKind:
     rule: what makes the figure of the course if no statistic is stated, an entry of `measures.figures.RULES`;
     reduced: it is one number of a whole range already. against: whether the course is taken less that of the nominal
     mechanism, position by position. vector: whether `axis` or `along` picks one component: it `must` or `may`; in
-    space alone: `must in space`, `may in space`. space: the only one, if it is not of both.
+    space alone: `must in space`, `may in space`. space: the only one, if it is not of both. up_to: how far it is looked
+    for; what is not met up to there is ∞.
     """
 
     text: str
@@ -38,6 +40,7 @@ class MeasureKind:
     reduced: bool = False
     vector: Literal["", "must", "may", "must in space", "may in space"] = ""
     space: str = ""
+    up_to: float = inf
 
     @property
     def quantities(self) -> tuple[Kind, ...]:
@@ -183,7 +186,7 @@ MEASURES: dict[str, MeasureKind] = {
     ),
     "locking_margin": MeasureKind(
         "of the `mechanism`: the multiple of its friction at which it locks", "locking margin", NUMBER,
-        ("mechanism",), "forces", rule="minimum",
+        ("mechanism",), "forces", rule="minimum", up_to=10.0,
     ),
     "starting_time": MeasureKind(
         "free driver whose starting time is measured: when the mean speed of a turn is 95 % of the steady one",

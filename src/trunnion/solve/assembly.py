@@ -9,7 +9,7 @@ assemblies are apart. `assembly_modes` lists them at that same position, so that
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.algebra.nested import each
+from trunnion.algebra.nested import each, zipped
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.groups.gear import NUMBERS, rotation
 from trunnion.groups.spatial import SpatialGroup
@@ -26,6 +26,7 @@ from trunnion.groups.spins import unspun
 from trunnion.groups.tree import OUTER
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.names import as_key
+from trunnion.results.quantities import quantity
 from trunnion.results.sentences import finding_for
 from trunnion.solve import change_points
 from trunnion.solve.forward import Forward, pose_of, start
@@ -45,12 +46,16 @@ from trunnion.solve.track import (
 )
 from trunnion.structure.decompose import Module
 
-__all__ = ["Chosen", "apart", "choose", "coordinate", "distance", "grid", "hints", "named_way", "picked", "way_name"]
+__all__ = [
+    "Chosen", "choose", "coordinate", "distance", "grid", "hints", "joint_rows", "named_way", "way_name", "ways_of",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
+Rows = dict[str, tuple[bool, list[Array]]]  # of a joint: whether by its turn; its numbers in every assembly
 
 GRID = 720  # intervals of one turn of the fastest driver, along which general groups are followed
 MOST_INTERVALS = 720_000
+NEARER = 1e-9  # of how far it is from a hint, and of the size: an assembly that is nearer by less is as near
 LOOKED = 2  # of the grid every which position the assemblies are compared at
 TRIED = 64  # guesses at each place where it is tried whether there is an assembly at all
 SPREAD = 25  # such places
@@ -70,11 +75,10 @@ class Chosen:
 
 
 class Decision(NamedTuple):
-    """Assembly of a module, how many there were, whether a hint decides, and what there is to say."""
+    """Assembly of a module, how many there were, and what there is to say."""
 
     assembly: Any
     ways: int
-    decided: bool
     findings: Sequence[Finding] = ()
 
 
@@ -98,15 +102,13 @@ def choose(system: System, values: Values, cycle: Cycle) -> Chosen:
         for number, module in enumerate(system.plan.modules):
             group = system.groups[number]
             if module.rank == 1 or not (group.BRANCHES or getattr(group, "kept", ())):  # nothing to choose
-                decision = Decision(None, 1, True)
+                decision = Decision(None, 1)
             elif group.BRANCHES:
                 decision = _closed_form(walk, number, times)
             else:
                 decision = _general(walk, number, times, cycle.periodic)
-            assembly, count, decided, remarks = decision
+            assembly, count, remarks = decision
             findings += remarks
-            if count > 1 and not decided:
-                findings.append(_undecided(walk, module, count))
             chosen.append(assembly)
             walk.assembly.append(assembly)
             counts.append(count)
@@ -138,25 +140,28 @@ def _closed_form(walk: Forward, number: int, times: Array) -> Decision:
     """+1 or −1: the one that is named, else the one nearest the hints by place."""
     system, module = walk.system, walk.system.plan.modules[number]
     branches = system.groups[number].BRANCHES
-    named = named_way(system, module, len(branches))
-    if len(branches) == 1 or not hints(walk, module):
-        return Decision(branches[named or 0], len(branches), named is not None)
-    poses = [pose_of(walk, number, branch, times) for branch in branches]
-    lane = apart(walk, number, poses, times)
-    away = [distance(walk, module, each(pose.frames, picked(lane or 0)), lane or 0) for pose in poses]
-    nearest, decided = int(away[1] < away[0]), lane is None or _differ(np.array(away))
-    if named is None:
-        return Decision(branches[nearest], len(branches), decided)
-    return Decision(
-        branches[named], len(branches), True, _told_twice(walk, module, named, nearest if decided else None)
-    )
+    named, count = named_way(system, module, len(branches)), len(branches)
+    if count == 1 or not hints(walk, module):
+        return Decision(branches[named or 0], count, [_undecided(walk, module, count)] * (count > 1 and named is None))
+    lane, frames = ways_of(walk, number, times)
+    tied = _tied(walk, distance(walk, module, frames, lane or 0)) if lane is not None else [0]
+    best = tied[0] if named is None else named
+    return Decision(branches[best], count, _said(walk, module, count, frames, lane or 0, named, tied))
 
 
-def apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
-    """The first position at which all assemblies of a closed form exist and are apart, None if there is none.
+def ways_of(walk: Forward, number: int, times: Array) -> tuple[int | None, Any]:
+    """Where the links of a closed form lie in all of its assemblies, and the position at which that is.
 
-    Where they meet all along, the first at which they exist.
+    It is the first at which all assemblies exist and are apart; where they meet all along, the first at which they
+    exist; None if there is none.
     """
+    poses = [pose_of(walk, number, branch, times) for branch in walk.system.groups[number].BRANCHES]
+    lane = _first_apart(walk, number, poses, times)
+    frames = [each(pose.frames, lambda part: lane_of(primal(part), lane or 0)) for pose in poses]
+    return lane, zipped(lambda *numbers: np.array(numbers), *frames)
+
+
+def _first_apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int | None:
     spread = float(np.max(primal(walk.size)))
     shape = times.shape
     keys = [
@@ -169,10 +174,6 @@ def apart(walk: Forward, number: int, poses: Sequence[Any], times: Array) -> int
         if len(lanes):
             return int(lanes[0])
     return None
-
-
-def picked(lane: int) -> Callable[[Number], Number]:
-    return lambda number: lane_of(primal(number), lane)
 
 
 # ---- general groups -------------------------------------------------------------------------------------------
@@ -196,13 +197,12 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decisi
     lanes = each_once(group, solved)
     ways = len(lanes)
     if not ways:
-        return Decision(Track(times, rows, 0.0, periodic, clock, turns, nowhere), 0, True)
+        return Decision(Track(times, rows, 0.0, periodic, clock, turns, nowhere), 0)
     shape = solved.closed.shape
     frames = each(solved.pose.frames, lambda n: np.broadcast_to(n, shape)[lanes])
     named = named_way(system, module, ways)
-    away = np.broadcast_to(distance(walk, module, frames, begin), (ways,))
-    decided, nearest = ways > 1 and _differ(away), int(np.argmin(away))
-    best = nearest if named is None else named
+    tied = _tied(walk, np.broadcast_to(distance(walk, module, frames, begin), (ways,)))
+    best = tied[0] if named is None else named
     orientation = float(np.broadcast_to(solved.pose.orientation, shape)[lanes[best]])
     rows[:, begin] = solved.q[:, lanes[best]]
     follower = Follower(group, elements, drive, orientation, STRIDE)
@@ -216,9 +216,7 @@ def _general(walk: Forward, number: int, times: Array, periodic: bool) -> Decisi
     if isinstance(group, SpatialGroup):
         rows = unspun(group, elements, rows, drive)
     track = Track(times, rows, orientation, periodic, clock, turns, again, float(times[begin]), frames, best)
-    if named is None:
-        return Decision(track, ways, decided)
-    return Decision(track, ways, True, _told_twice(walk, module, named, nearest if decided or ways == 1 else None))
+    return Decision(track, ways, _said(walk, module, ways, frames, begin, named, tied))
 
 
 def _first_closed(group: Any, elements: Sequence[Any], drive: Sequence[Number], grid: int) -> tuple[int, Assemblies]:
@@ -353,13 +351,60 @@ def coordinate(walk: Forward, module: Module, frames: Sequence[Any], joint: str,
     return walk.coordinate(joint, element(first), element(second))
 
 
-def _differ(distances: Array) -> bool:
-    """Whether the nearest assembly is nearer than the next, but for rounding."""
-    least, second = np.sort(np.nan_to_num(distances, nan=np.inf))[:2]
-    return bool(second - least > 1e-9 * (second + least))
+def _tied(walk: Forward, distances: Array) -> list[int]:
+    """The assemblies that are as near the hints as the nearest, but for rounding. distances: m² and rad²."""
+    away = np.sqrt(np.nan_to_num(distances, nan=np.inf))
+    least = np.min(away)
+    return np.flatnonzero(away <= least + NEARER * (least + np.max(primal(walk.size)))).tolist()
 
 
 # ---- what there is to say -------------------------------------------------------------------------------------
+
+
+def _said(
+    walk: Forward, module: Module, count: int, frames: Any, lane: int, named: int | None, tied: Sequence[int]
+) -> list[Finding]:
+    """Of an assembly among `count` that is chosen by name, or as one of those that are nearest the hints."""
+    if named is not None:
+        return _told_twice(walk, module, named, tied[0] if len(tied) == 1 else None)
+    if len(tied) == 1:
+        return []
+    return [_undecided(walk, module, count, tied, _difference(walk, module, count, frames, lane, tied))]
+
+
+def _difference(walk: Forward, module: Module, count: int, frames: Any, lane: int, ways: Sequence[int]) -> str:
+    """Where a joint that tells some assemblies apart is in each of them."""
+    size = float(np.max(primal(walk.size)))
+    for joint, (turned, numbers) in joint_rows(walk, module, count, frames, lane).items():
+        rows = np.array(numbers)[:, ways]
+        compared = np.concatenate([np.cos(rows), np.sin(rows)]) if turned else rows / size
+        if np.max(np.ptp(compared, axis=1)) > SAME:
+            places = [", ".join(quantity(part, "rad" if turned else "m") for part in place) for place in rows.T]
+            brackets = "({})" if len(rows) > 1 else "{}"
+            texts = [f"{brackets.format(place)} in {way_name(way)}" for place, way in zip(places, ways, strict=True)]
+            return f": {joint} is at {', '.join(texts)}"
+    return ""
+
+
+def joint_rows(walk: Forward, module: Module, count: int, frames: Sequence[Any], lane: int) -> Rows:
+    """The joints of a module, each as a hint can state it: whether that is its turn, and its numbers in every assembly.
+
+    In space a joint that turns about an axis is told by its turn, known links included, others between two links of the
+    module by the place of their point, or their slide.
+    """
+    spatial = walk.system.mechanism.space == "spatial"
+    rows: Rows = {}
+    for name in sorted(set(module.joints).difference(module.driven), key=walk.system.order.__getitem__):
+        kind, links = walk.system.joints[name]
+        turned = spatial and PAIRS[kind].turns and not PAIRS[kind].ball
+        if not turned and not set(links).issubset(module.links):
+            continue
+        if turned or PAIRS[kind].guided:
+            numbers = [coordinate(walk, module, frames, name, lane)]
+        else:
+            numbers = list(walk.placed(frames[module.links.index(links[-1])], links[-1], name))
+        rows[name] = turned, [np.broadcast_to(primal(n), (count,)) for n in numbers]
+    return rows
 
 
 def _told_twice(walk: Forward, module: Module, named: int, placed: int | None) -> list[Finding]:
@@ -375,16 +420,20 @@ def _told_twice(walk: Forward, module: Module, named: int, placed: int | None) -
     return [finding_for("assembly.contradiction", where, links=links, places=places, way=way, name=name)]
 
 
-def _undecided(walk: Forward, module: Module, count: int) -> Finding:
-    """Where neither a name nor a place decides: there is no hint, or one that does not tell the assemblies apart."""
+def _undecided(walk: Forward, module: Module, count: int, tied: Sequence[int] = (), difference: str = "") -> Finding:
+    """Where neither a name nor a place decides: there is no hint, or one that does not tell the assemblies apart.
+
+    tied: those that it does not tell apart, of which the first is used; difference: what does.
+    """
     system = walk.system
     given = list(dict.fromkeys(name for _, name, _ in hints(walk, module)))
     stated = [key for key in system.mechanism.assembly if key in module.joints and key not in given]
     why, names = "no assembly hint selects one", given or stated
     if names:
         why = f"the {agreeing(len(names), 'hint', 'hints')} of {' and '.join(names)} "
-        why += agreeing(len(names), "does", "do") + " not distinguish them"
-        why += "" if given else f": {agreeing(len(names), 'its place is', 'their places are')} the same in all"
+        them = "them" if len(tied) in (0, count) else " and ".join(way_name(way) for way in tied)
+        why += f"{agreeing(len(names), 'does', 'do')} not distinguish {them}"
+        why += difference if given else f": {agreeing(len(names), 'its place is', 'their places are')} the same in all"
     free = [joint for joint in module.joints if joint not in stated] or list(module.joints)
     joint = module.joints[len(module.joints) // 2]
     joint = joint if joint in free else free[0]
@@ -396,7 +445,7 @@ def _undecided(walk: Forward, module: Module, count: int) -> Finding:
     remedy = f"state roughly {place} at the start, e.g. assembly: {hint}, or one of the names listed by `check`"
     if given:
         remedy = "give a hint that is nearer to one of them, or one of the names listed by `check`"
-    phrases = {"why": why, "remedy": remedy}
+    phrases = {"why": why, "remedy": remedy, "used": way_name(tied[0]) if tied else "the first one"}
     return finding_for("assembly.choice", "assembly", links=list(module.links), ways=count, phrases=phrases)
 
 

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
-from trunnion.algebra.nested import each, zipped
-from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import as_key
-from trunnion.solve.assembly import apart, coordinate, grid, picked, way_name
-from trunnion.solve.forward import Forward, pose_of, posed
+from trunnion.solve.assembly import grid, joint_rows, way_name, ways_of
+from trunnion.solve.forward import Forward, posed
 from trunnion.solve.run import Run
 from trunnion.solve.track import Track
-from trunnion.structure.decompose import Module
 
 __all__ = ["AssemblyMode", "GroupModes", "choices", "put_together"]
-
-Rows = dict[str, tuple[bool, list[NDArray[np.float64]]]]  # of a joint: whether by its turn; its numbers in every way
 
 
 @dataclass(frozen=True)
@@ -84,15 +77,11 @@ def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[Grou
         if isinstance(assembly, Track):
             lane, frames, taken = int(np.searchsorted(times, assembly.begin)), assembly.ways, assembly.taken
         else:
-            branches = run.system.groups[number].BRANCHES
-            poses = [pose_of(walk, number, branch, times) for branch in branches]
-            first = apart(walk, number, poses, times)
+            first, frames = ways_of(walk, number, times)
             if first is None:
                 continue
-            lane, taken = first, branches.index(assembly)
-            at_lane = [each(pose.frames, picked(lane)) for pose in poses]
-            frames = zipped(lambda *numbers: np.array(numbers), *at_lane)
-        rows = _joints(walk, module, frames, lane, count)
+            lane, taken = first, run.system.groups[number].BRANCHES.index(assembly)
+        rows = joint_rows(walk, module, count, frames, lane)
         if not rows:
             continue
         ways = []
@@ -108,27 +97,6 @@ def _modes(run: Run, walk: Forward, times: NDArray[np.float64]) -> Iterator[Grou
             dial = run.system.dial(run.values, times[lane : lane + 1])
             where = dial.at(0) + (f" of {dial.of}" if dial.of else "")
         yield GroupModes(number, module.label, module.links, link, float(times[lane]), where, tuple(ways))
-
-
-def _joints(walk: Forward, module: Module, frames: Sequence[Any], lane: int, count: int) -> Rows:
-    """The joints of a module, each as a hint can state it: whether that is its turn, and its numbers in every assembly.
-
-    In space a joint that turns about an axis is told by its turn, known links included, others between two links of the
-    module by the place of their point, or their slide.
-    """
-    spatial = walk.system.mechanism.space == "spatial"
-    rows: Rows = {}
-    for name in sorted(set(module.joints).difference(module.driven), key=walk.system.order.__getitem__):
-        kind, links = walk.system.joints[name]
-        turned = spatial and PAIRS[kind].turns and not PAIRS[kind].ball
-        if not turned and not set(links).issubset(module.links):
-            continue
-        if turned or PAIRS[kind].guided:
-            numbers = [coordinate(walk, module, frames, name, lane)]
-        else:
-            numbers = list(walk.placed(frames[module.links.index(links[-1])], links[-1], name))
-        rows[name] = turned, [np.broadcast_to(primal(n), (count,)) for n in numbers]
-    return rows
 
 
 def put_together(mechanism: Mechanism, choice: GroupModes, way: AssemblyMode) -> Mechanism:

@@ -30,7 +30,7 @@ def finding(system: System, values: Values, module: Module, at: Sequence[Meeting
     places = []
     for first, last in at:
         dial = system.dial(values, np.array([first, last]))
-        places.append(dial.at(0) if first == last else f"between {dial.at(0)} and {dial.at(1)}")
+        places.append(dial.between(0, 1).removeprefix("at "))
     links, joint = list(module.links), module.joints[1]
     return finding_for("assembly.change_point", f"links {', '.join(links)}", places=places, links=links, joint=joint)
 

@@ -8,6 +8,7 @@ from typing import Literal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
+from trunnion.model.measure_table import MEASURES
 
 __all__ = ["MARGIN", "FrictionMethod"]
 
@@ -42,4 +43,4 @@ class FrictionMethod:
             raise MechanismError(Finding(f"{self.limit} iterations are too few", "iterations", "give 1 or more"))
 
 
-MARGIN = 10.0  # multiple of the friction up to which the locking margin is looked for
+MARGIN = MEASURES["locking_margin"].up_to  # multiple of the friction up to which the locking margin is looked for

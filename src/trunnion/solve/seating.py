@@ -369,14 +369,10 @@ class _Settling:
 
 def _below(courses: Courses, signs: Sequence[Array]) -> Array:
     """Times, s, from and to, (2, time), in which one of some numbers at the nodes of settled panels is below 0."""
-    first = courses.coefficients.shape[1]
-    rows = np.arange(first, first + len(signs))
-    if not len(rows):
+    if not signs:
         return np.zeros((2, 0))
     marked = courses.extended(np.nan_to_num(signs, nan=1.0), courses.states == SETTLED, elsewhere=1.0)
-    times = np.unique(np.concatenate([courses.edges, *(marked.passages(row) for row in rows)]))
-    below = np.any(marked.at((times[1:] + times[:-1]) / 2)[rows] < -ROUNDING, axis=0)
-    return np.asarray(times[np.flatnonzero(np.diff(below, prepend=False, append=False))].reshape(-1, 2).T)
+    return marked.below(range(courses.coefficients.shape[1], marked.coefficients.shape[1]), ROUNDING).T
 
 
 def _rows(numbers: Any, time: Array) -> Array:

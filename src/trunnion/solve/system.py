@@ -57,19 +57,23 @@ class Dial(NamedTuple):
         value, largest = float(self.values[position]), np.abs(self.values).max()
         return f"{0.0 if abs(value) < ROUNDING * largest else value:.4g}{self.unit}"
 
+    def between(self, first: int, last: int) -> str:
+        """A range: 'between 132° and 228°', 'at 132°' if its ends read alike."""
+        low, high = self.at(first), self.at(last)
+        return f"at {low}" if low == high else f"between {low} and {high}"
+
     def intervals(self, positions: Positions) -> str:
         """Positions as intervals: 'at 0° and 12°, between 132° and 228° of A'."""
         if len(positions) == len(self.values):
             return "at every position" if len(self.values) > 1 else "in its one position"
         runs = np.split(positions, np.flatnonzero(np.diff(positions) > 1) + 1)
-        texts: list[str] = []
-        for single, group in itertools.groupby(runs[:MOST_INTERVALS], lambda run: len(run) == 1):
-            ends = [(self.at(run[0]), self.at(run[-1])) for run in group]
+        ranges, texts = [self.between(run[0], run[-1]) for run in runs[:MOST_INTERVALS]], list[str]()
+        for single, group in itertools.groupby(ranges, lambda text: text.startswith("at ")):
             if single:
-                *others, last = (first for first, _ in ends)
+                *others, last = (text.removeprefix("at ") for text in group)
                 texts.append(f"at {', '.join(others)} and {last}" if others else f"at {last}")
             else:
-                texts += [f"between {first} and {last}" for first, last in ends]
+                texts += group
         more = f" and in {len(runs) - MOST_INTERVALS} more places" if len(runs) > MOST_INTERVALS else ""
         return ", ".join(texts) + more + (f" of {self.of}" if self.of else "")
 

@@ -119,6 +119,7 @@ def quantile(counts: Counts, bins: Bins, q: Any, least: Any = -np.inf, most: Any
         part = np.clip((rank - reached[place] + values[place]) / np.maximum(values[place], 1), 0.0, 1.0)
         part = _tilted(part, values, edges[row], place)
         left, right = edges[row, place], edges[row, place + 1]
+        right = np.where(place == bins.number - 1, high[row], right)  # such as of values of which some are infinite
         found[row] = np.clip(left + part * (right - left), low[row], high[row])
     return np.where(np.isnan(q), np.nan, found.reshape((*counts.shape[:-1], *q.shape)))
 

@@ -164,6 +164,11 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
         low, high = value("within.from"), value("within.to")
         if low >= high:
             yield Finding(f"the band runs from {low:g} to {high:g} (SI)", f"{where}.within", "exchange its ends")
+        up_to = MEASURES[mechanism.measures[name].kind].up_to
+        for key in ("at_least", "at_most", "within.to"):
+            if value(key) >= up_to:
+                what = f"is {value(key):g}, but this measure is looked for up to {up_to:g} alone"
+                yield Finding(what, f"{where}.{key}", "give a number below that")
         parts = [number for path, number in numbers.nominal.items() if path.startswith(f"{where}.along.")]
         if parts and not any(parts):
             yield Finding("the direction is zero", f"{where}.along", "give it a length, such as [1, 0]")

@@ -71,7 +71,7 @@ STRUCTURE: dict[str, Sentence] = {
     "assembly.open": Sentence(ERROR, _open, _mend),
     "assembly.ranges": Sentence(NOTE, _ranges, _elsewhere),
     "assembly.choice": Sentence(
-        WARNING, "links {links} have {ways} assembly modes and {why}; the first one is used", "{remedy}"
+        WARNING, "links {links} have {ways} assembly modes and {why}; {used} is used", "{remedy}"
     ),
     "assembly.anew": Sentence(
         WARNING,

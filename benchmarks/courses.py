@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import trunnion
 from benchmarks.drawn import planar, spatial
@@ -26,8 +27,10 @@ from trunnion.results.figure import NUMERICAL
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 
+Array = NDArray[np.float64]
 STEPS = (12, 60, 360, 3600)
 SAME, DENSE = 1e-6, 1e-4  # of the scale of a figure
+PEAK = 201  # positions beside an extreme
 SIDE = 1e-9  # of the cycle: from a break to its sides
 EXAMPLES = Path(__file__).parent.parent / "examples"
 OF_POSITIONS = (*NUMERICAL, "positions_solved", "positions_lost")
@@ -83,27 +86,38 @@ def figures(mechanism: trunnion.Mechanism, steps: int) -> dict[str, tuple[float,
 
 
 def dense(run: Run, count: int) -> dict[str, float]:
-    """Extremes at very many positions and on both sides of every break."""
+    """Extremes at very many positions, on both sides of every break, and at as many more beside each extreme of these
+    as a peak between two of them needs."""
     breaks, duration = course_of(run, FrictionMethod()).courses.breaks, run.cycle.duration
     sides = (breaks[:, None] + SIDE * duration * np.array([-1.0, 1.0])).ravel()
     sides = sides % duration if run.cycle.periodic else sides[(sides > 0) & (sides < duration)]
     time = np.sort(np.concatenate([run.cycle.times(count), sides]))
-    parts = [stretch(run, part, FrictionMethod()) for part in np.array_split(time, max(1, count // 20_000))]
-    found: dict[str, float] = {}
-    for arrays in (part.arrays for part in parts):
+    found: dict[str, tuple[float, float]] = {}
+    extremes(run, time, found)
+    for place in {place for _, place in found.values()}:
+        k = int(np.searchsorted(time, place))
+        extremes(run, np.linspace(time[max(k - 1, 0)], time[min(k + 1, len(time) - 1)], PEAK), found)
+    return {name: value for name, (value, _) in found.items()}
+
+
+def extremes(run: Run, time: Array, found: dict[str, tuple[float, float]]) -> None:
+    """Replace the extremes, by name with their times, that are surpassed at these times."""
+    for part in np.array_split(time, max(1, len(time) // 20_000)):
+        arrays = stretch(run, part, FrictionMethod()).arrays
         solved = arrays["status"] == Status.SOLVED
         if not np.any(solved):
             continue
+        rows = {"friction_power_max": np.sum(arrays["friction_power"], axis=0)}
         for i, name in enumerate(run.system.mechanism.drivers):
-            effort = arrays["drive_effort"][i][solved]
-            found[f"{name}.effort_max"] = max(found.get(f"{name}.effort_max", -np.inf), float(np.max(effort)))
-            found[f"{name}.effort_min"] = min(found.get(f"{name}.effort_min", np.inf), float(np.min(effort)))
+            rows[f"{name}.effort_max"] = rows[f"{name}.effort_min"] = arrays["drive_effort"][i]
         for i, name in enumerate(run.system.joints):
-            size = np.sqrt(np.sum(arrays["reaction_force"][i][:, solved] ** 2, axis=0))
-            found[f"{name}.reaction_max"] = max(found.get(f"{name}.reaction_max", 0.0), float(np.max(size)))
-        lost = np.sum(arrays["friction_power"], axis=0)[solved]
-        found["friction_power_max"] = max(found.get("friction_power_max", -np.inf), float(np.max(lost)))
-    return found
+            rows[f"{name}.reaction_max"] = np.sqrt(np.sum(arrays["reaction_force"][i] ** 2, axis=0))
+        for name, row in rows.items():
+            sign = -1.0 if name.endswith("_min") else 1.0
+            k = int(np.argmax(sign * row[solved]))
+            value = float(row[solved][k])
+            if name not in found or sign * value > sign * found[name][0]:
+                found[name] = value, float(part[solved][k])
 
 
 def examine(mechanism: trunnion.Mechanism, count: int) -> tuple[int, int, list[str]]:

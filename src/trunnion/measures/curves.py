@@ -154,7 +154,7 @@ def power(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
 
 def friction_power(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
     """Power lost to friction in a joint, W."""
-    return (back.friction_power(measure.subject),)
+    return (back.losses[measure.subject],)
 
 
 def friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:
@@ -162,7 +162,7 @@ def friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ...
     walk = back.walk
     driver = next(iter(walk.system.mechanism.drivers), "")
     duration: Number = walk.system.span(walk.values, driver).duration if driver else 0.0
-    return back.friction_power(measure.subject), duration
+    return back.losses[measure.subject], duration
 
 
 def efficiency(measure: MotionRequest, back: Backward) -> tuple[Number, ...]:

@@ -76,16 +76,15 @@ class Backward:
     loads: on each link, the wrenches of joints passed so far included; reactions: on the second link by the first,
     friction and drive effort not included, in the plane about the joint's point on the second, in space about the
     origin; friction: torque about the axis, N m, of a ball or a cross about the relative angular velocity, or force
-    along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction is;
-    losses: power of friction, W; drags: effort and power, W, of losses that do not follow the load, which are part of
-    both; contacts: those of each joint that rubs; settled: per module; undefined: where each
-    load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the share of its
-    friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
-    N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
-    that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart;
-    module_reactions: reactions as their modules see them. stated: loads before any joint was passed;
-    rubbed: contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
-    `locking_margin`, once it was asked for.
+    along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction
+    is; losses: power that each joint loses, W, to friction, and where seats travel to its load on the way of its
+    pin; drags: effort and power, W, of losses that do not follow the load, which are part of both; contacts: those
+    of each joint that rubs; settled: per module; undefined: where each load or spring (by path) has no value;
+    turning: of joints that rub and turn, the contact and the share of its friction that acts about the axis; spins:
+    torque that each link with a free spin would need to keep from spinning, N m; travels: whether seats do;
+    gear_power: of all gear pairs, whose wheels then move apart; module_reactions: reactions as their modules see
+    them. stated: loads before any joint was passed; rubbed: contacts per module as `settled`, those of gear pairs
+    last; margin_up_to: as in the method; margin: that of `locking_margin`, once it was asked for.
     """
 
     walk: Forward
@@ -107,23 +106,12 @@ class Backward:
     turning: dict[str, tuple[Contact, Number]] = field(default_factory=dict)
     spins: dict[str, Number] = field(default_factory=dict)
     travels: bool = False
-    passed: dict[str, Number] = field(default_factory=dict)
     gear_power: Number = 0.0
     module_reactions: dict[str, Any] = field(default_factory=dict)
     stated: dict[str, Any] = field(default_factory=dict)
     rubbed: list[list[tuple[Contact, Rubbing | None]]] = field(default_factory=list)
     margin_up_to: float = 0.0
     margin: Number | None = None
-
-    def friction_power(self, joint: str) -> Number:
-        """Power lost in a joint, W."""
-        return self.lost(joint) if self.travels else self.losses[joint]
-
-    def lost(self, joint: str) -> Number:
-        """What a joint takes out and its driver does not put in, W: friction, and the load on its seat's way."""
-        driven = self.efforts[joint] * self.walk.rate(joint) if joint in self.efforts else 0.0
-        dragged = self.drags[joint][1] if joint in self.drags else 0.0
-        return driven - self.passed[joint] + dragged
 
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
@@ -367,10 +355,12 @@ def _record(
         effort, drag = back.drags[joint]
         friction = algebra.added(friction, algebra.times(effort, walk.axis(joint, turns)[1]))
         amount, loss = amount + effort, loss + drag
+    if back.travels:  # what the joint takes out and its driver does not put in
+        put_in = back.efforts[joint] * walk.rate(joint) if driven else 0.0
+        loss = put_in - algebra.power(walk.on_link(second, total, joint), walk.against(joint))
+        loss = loss + back.drags[joint][1] if joint in back.drags else loss
     back.reactions[joint], back.friction_wrenches[joint] = reaction, friction
     back.friction[joint], back.losses[joint] = amount, loss
-    if back.travels:
-        back.passed[joint] = algebra.power(walk.on_link(second, total, joint), walk.against(joint))
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, total if link == second else algebra.times(-1.0, total), joint))

@@ -26,7 +26,7 @@ from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
-    "Backward", "Given", "Sense", "Slip", "backward", "body_loads", "pass_on", "sense_of", "solve",
+    "Backward", "Given", "Sense", "backward", "body_loads", "pass_on", "sense_of", "solve",
     "stated_actions", "under", "unloaded",
 ]  # fmt: skip
 
@@ -61,14 +61,6 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
     return sense[contact] if isinstance(sense, tuple) else sense
 
 
-@dataclass(frozen=True)
-class Slip:
-    """Relative speed of a joint, second link against first (rad/s, m/s), and where what resists it sees it at rest."""
-
-    speed: Number
-    zero: Number
-
-
 @dataclass
 class Backward:
     """What one walk backward found, by joint and driver as the file names them.
@@ -79,17 +71,18 @@ class Backward:
     along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction
     is; losses: power that each joint loses, W, to friction, and where seats travel to its load on the way of its
     pin; drags: effort and power, W, of losses that do not follow the load, which are part of both; contacts: those
-    of each joint that rubs; settled: per module; undefined: where each load or spring (by path) has no value;
-    turning: of joints that rub and turn, the contact and the share of its friction that acts about the axis; spins:
-    torque that each link with a free spin would need to keep from spinning, N m; travels: whether seats do;
-    gear_power: of all gear pairs, whose wheels then move apart; module_reactions: reactions as their modules see
-    them. stated: loads before any joint was passed; rubbed: contacts per module as `settled`, those of gear pairs
-    last; margin_up_to: as in the method; margin: that of `locking_margin`, once it was asked for.
+    of each joint that rubs; resting: where what resists each joint sees it at rest; settled: per module; undefined:
+    where each load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the
+    share of its friction that acts about the axis; spins: torque that each link with a free spin would need to keep
+    from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move apart;
+    module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
+    contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
+    `locking_margin`, once it was asked for.
     """
 
     walk: Forward
     loads: dict[str, Any]
-    slips: dict[str, Slip] = field(default_factory=dict)
+    resting: dict[str, Number] = field(default_factory=dict)
     contacts: dict[str, list[Rubbing]] = field(default_factory=dict)
     reactions: dict[str, Any] = field(default_factory=dict)
     friction: dict[str, Number] = field(default_factory=dict)
@@ -154,7 +147,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     system = walk.system
     back = Backward(walk, unloaded(walk), travels=bool(given.travel), margin_up_to=method.margin_up_to)
     back.contacts = {joint: list(contacts_of(walk, joint)) for joint in rubbing(system)}
-    back.slips = {joint: _slip(back, joint) for joint in system.joints}
+    back.resting = {joint: _resting(back, joint) for joint in system.joints}
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip, given.rests)
     for name, action in given.acting(walk) if given.acting else ():
@@ -200,14 +193,11 @@ def unloaded(walk: Forward) -> dict[str, Any]:
     return dict.fromkeys(walk.system.mechanism.effective_links, walk.algebra.ZERO_LOAD)
 
 
-def _slip(back: Backward, joint: str) -> Slip:
-    """Slip of a joint, and where a contact of it rests, or the turn or slide that a load resists."""
-    walk = back.walk
-    if not walk.pair(joint).count:
-        return Slip(0.0, False)
+def _resting(back: Backward, joint: str) -> Number:
+    """Where a contact of a joint rests, or the turn or slide that a load resists."""
     zeros = [rub.zero for rub in back.contacts.get(joint, [])]
-    zeros += [walk.still(joint, turns) for turns in walk.system.resisted.get(joint, ())]
-    return Slip(walk.speed(joint), functools.reduce(operator.or_, zeros) if zeros else False)
+    zeros += [back.walk.still(joint, turns) for turns in back.walk.system.resisted.get(joint, ())]
+    return functools.reduce(operator.or_, zeros) if zeros else False
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------

@@ -72,10 +72,10 @@ class Backward:
     is; losses: power that each joint loses, W, to friction, and where seats travel to its load on the way of its
     pin; drags: effort and power, W, of losses that do not follow the load, which are part of both; contacts: those
     of each joint that rubs; resting: where what resists each joint sees it at rest; settled: per module; undefined:
-    where each load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the
-    share of its friction that acts about the axis; spins: torque that each link with a free spin would need to keep
-    from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move apart;
-    module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
+    where each load or spring (by path) has no value; turning: of joints that rub and turn, the friction force about
+    the axis for each newton of normal load, and the slip; spins: torque that each link with a free spin would need
+    to keep from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move
+    apart; module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
     contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
     `locking_margin`, once it was asked for.
     """
@@ -96,7 +96,7 @@ class Backward:
     springs: dict[str, SpringState] = field(default_factory=dict)
     gears: dict[str, GearLoad] = field(default_factory=dict)
     undefined: dict[str, Number] = field(default_factory=dict)
-    turning: dict[str, tuple[Contact, Number]] = field(default_factory=dict)
+    turning: dict[str, tuple[Number, Number]] = field(default_factory=dict)
     spins: dict[str, Number] = field(default_factory=dict)
     travels: bool = False
     gear_power: Number = 0.0
@@ -245,11 +245,12 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     for k, place in enumerate(places):
         joint = place.joint
         for i, rub in enumerate(() if place.witness else back.contacts.get(joint, ())):
-            contact = _contact(back, module.links, k, joint, rub, given, i)
+            slope, slip = _slope(back, joint, rub, given, i)
             # power goes by the speed itself where the law is told on which side of rest it is
-            rubbed.append((contact, rub if joint in given.rests else rub._replace(slip=contact.slip)))
+            felt = rub if joint in given.rests else rub._replace(slip=slip)
+            rubbed.append((_contact(walk, module.links, k, joint, rub, slope), felt))
             if rub.turning is not None:
-                back.turning[joint] = contact, rub.turning
+                back.turning[joint] = literal.times(slope, rub.turning), slip
     rubbed += [(contact, None) for contact in teeth(walk, number)]
     settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
@@ -293,10 +294,13 @@ def pass_on(
                 back.add(places[joint].links[side], wrench)
 
 
-def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, given: Given, i: int) -> Contact:
-    """One contact of a joint, its i-th, as `friction` sees it."""
-    walk, law = back.walk, law_of(back.walk.system, joint)
-    parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
+def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number]:
+    """Friction force of the i-th contact of a joint for each newton of its normal load, and the slip that goes with it.
+
+    Where there is no slip it is that which is about to begin.
+    """
+    law = law_of(back.walk.system, joint)
+    parameters = {name: back.walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
     sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), rub.slip, rub.zero, given.sliding
@@ -304,20 +308,24 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Ru
         zero, sliding = np.bool_(given.rests[joint]), False
         if not zero:
             slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
-    resting: Number = 0.0
-    share: Number = 1.0
-    if np.any(zero):
-        slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
-        if not sliding:
-            resting = np.where(zero, 1.0, 0.0)
-        if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
-            share = np.where(zero, np.abs(sense), 1.0)
+    if not np.any(zero):
+        return law.function(1.0, slip, **parameters), slip
+    slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
+    slope = law.function(1.0, slip, **parameters)
+    if law.at_rest is not None and not sliding:
+        slope = namespace(slope).where(zero, law.at_rest(1.0, slip, **parameters), slope)
+    if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
+        slope = np.where(zero, np.abs(sense), 1.0) * slope
+    return slope, slip
+
+
+def _contact(walk: Forward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, slope: Number) -> Contact:
+    """One contact of a joint, the k-th of its module, as `friction` sees it."""
     first, second = walk.system.joints[joint][1]
     unit = walk.on_link(second, rub.unit, joint)
     on = {first: walk.algebra.times(-1.0, unit), second: unit}
-    felt = tuple(flat(rub.unit)) if rub.felt else None
     units = [on.get(link, walk.algebra.ZERO_LOAD) for link in links]
-    return Contact(k, units, rub.load, law, parameters, slip, own=felt, resting=resting, share=share)
+    return Contact(k, units, rub.load, slope, own=tuple(flat(rub.unit)) if rub.felt else None)
 
 
 def _record(

@@ -66,7 +66,7 @@ def _all(run: Run, time: Array) -> Iterator[Any]:
     yield from _links(back.walk)
     for name, reaction in back.reactions.items():
         yield from (reaction.x, reaction.y, reaction.m)
-        yield from (back.friction[name], -back.friction[name] * back.slips[name].speed)
+        yield from (back.friction[name], -back.friction[name] * back.walk.speed(name))
     yield from back.efforts.values()
 
 

@@ -124,7 +124,7 @@ def _rows_of_forces(back: Any) -> Iterator[Any]:
     for joint in "ABCD":
         yield back.friction[joint]
     for joint in "ABCD":
-        yield -back.friction[joint] * back.slips[joint].speed
+        yield -back.friction[joint] * back.walk.speed(joint)
     yield back.efforts["A"]
 
 

@@ -78,7 +78,7 @@ def given(run: Run, time: Array) -> Given:
         [(number[first], number[second]) for _, (first, second) in joints.values()],
         np.array([rows(end.x, end.y) for _, end in ends.values()]),
         np.array([rows(end.c, end.s) for end, _ in ends.values()]),
-        rows(*(np.where(slip.zero, 0.0, np.sign(slip.speed)) for slip in (back.slips[name] for name in joints))),
+        rows(*(np.where(back.resting[name], 0.0, np.sign(back.walk.speed(name))) for name in joints)),
         [0.0 if pins[name] else values[f"joints.{name}.guide.length"] for name in joints],
         [_strength(values, name, pin) for name, pin in pins.items()],
         [list(joints).index(name) for name in mechanism.drivers],

@@ -13,7 +13,7 @@ import trunnion
 from trunnion.errors import Severity
 from trunnion.model.checks.values import check_values
 from trunnion.model.numbers import ParameterSet
-from trunnion.solve import assembly, switches
+from trunnion.solve import assembly
 from trunnion.solve.run import prepare
 from trunnion.solve.track import Track
 
@@ -87,18 +87,3 @@ def test_wide_steps_along_a_branch_come_to_what_narrow_ones_do(name: str, monkey
         assert one.coordinates == pytest.approx(other.coordinates, abs=1e-12, nan_ok=True)
         assert one.orientation == other.orientation
         assert np.array_equal(one.again, other.again)
-
-
-def test_passages_of_all_mechanisms_at_once_are_those_of_each() -> None:
-    rng = np.random.default_rng(3)
-    course = np.round(rng.normal(size=(20, 60)), 1)
-    course[rng.random(course.shape) < 0.05] = np.nan
-    time, level = np.sort(rng.random(course.shape), axis=1), np.round(rng.normal(size=20), 1)
-    found = [tuple(map(float, one)) for one in switches._passed_once(course, level, time, 5)]
-    each = [
-        (float(row), 5.0, *map(float, one))
-        for row in range(20)
-        for one in switches._passed(course[row], level[row : row + 1], time[row])
-    ]
-    assert found == each
-    assert len(found) > 100

@@ -47,9 +47,7 @@ def settled(
             k,
             [float(i == k + 1) for i in range(count + 1)],
             load,
-            COULOMB,
-            {"coefficient": f, "pair_factor": 1.0},
-            -1.0,
+            COULOMB.function(1.0, -1.0, coefficient=f, pair_factor=1.0),
         )
         for k, (load, f) in enumerate(contacts)
     ]

@@ -28,11 +28,11 @@ def state_by_integrator(run: Any, joint: str, law: dict[str, Any], turns: int) -
     duration = run.cycle.duration
 
     def speed(time: float) -> float:
-        slip = run.solve(np.array([time % duration])).slips[joint].speed
+        slip = run.solve(np.array([time % duration])).walk.speed(joint)
         return float(np.ravel(lever * slip)[0])
 
     fine = np.linspace(0, duration, 4001)
-    speeds = np.ravel(lever * run.solve(fine).slips[joint].speed)
+    speeds = np.ravel(lever * run.solve(fine).walk.speed(joint))
 
     def v_of(time: float) -> float:
         return float(np.interp(time % duration, fine, speeds))

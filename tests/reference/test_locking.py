@@ -128,7 +128,7 @@ def independent_shares(run: Any, data: Data, coefficient: float, radius: float, 
     names, start, slope = affine(run, data)
     walk = run.solve(oracle.times(run))
     kinds = [run.system.joints[name][0] for name in names]
-    sign = np.array([np.broadcast_to(np.sign(walk.slips[name].speed), (STEPS,)) for name in names]).T
+    sign = np.array([np.broadcast_to(np.sign(walk.walk.speed(name)), (STEPS,)) for name in names]).T
     lever = np.where(np.array(kinds) == "revolute", radius, 1.0)
     axes = []
     for name, (_, (first, _)) in run.system.joints.items():

@@ -172,7 +172,7 @@ def test_friction_obeys_its_law(name: str) -> None:
     largest = max(float(np.max(normal)) for normal in normals.values())
     for joint, (kind, _) in run.system.joints.items():
         lever = radius if kind == "revolute" else 1.0
-        expected = -np.sign(back.slips[joint].speed) * coefficient * lever * normals[joint]
+        expected = -np.sign(back.walk.speed(joint)) * coefficient * lever * normals[joint]
         # the iteration rests where no normal load changes by more than 1e-8 of the largest
         np.testing.assert_allclose(
             np.broadcast_to(back.friction[joint], (STEPS,)),

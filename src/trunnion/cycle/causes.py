@@ -51,7 +51,7 @@ class Causes:
     def note(self, back: Backward, status: NDArray[np.int8], places: Positions) -> None:
         """Look at some positions, by their numbers in the cycle."""
         for name in sticking(self.system):
-            self.keep("rest", name, back.slips[name].zero & (status < Status.NOT_CONVERGED), places)
+            self.keep("rest", name, back.resting[name] & (status < Status.NOT_CONVERGED), places)
         if not np.any(status >= Status.LOCKED):
             return
         for path, where in back.undefined.items():

@@ -193,7 +193,7 @@ def fill_power(arrays: Into, back: Backward, time: Number, window: slice) -> Non
     for power in back.load_powers.values():
         total = total + power
     for i, name in enumerate(walk.system.joints):
-        lost = back.friction_power(name)
+        lost = back.losses[name]
         arrays["friction_power"][i, window] = lost
         total = total - lost
     for i, state in enumerate(back.springs.values()):

@@ -309,7 +309,7 @@ def works_recorded(motion: FreeMotion, at: Moment, back: Backward) -> list[Numbe
     drive = sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0)
     loads = sum((power for name, power in back.load_powers.items() if name in stated), 0.0)
     springs = sum((state.power for state in back.springs.values()), 0.0)
-    friction = sum((back.friction_power(joint) for joint in back.walk.system.joints), 0.0)
+    friction = sum((back.losses[joint] for joint in back.walk.system.joints), 0.0)
     found = [drive, loads, springs, friction]
     if motion.contacts.each:
         found.append(sum((push.loss for _, push in motion.contacts.pushes(back.walk, at.onsets)), 0.0))

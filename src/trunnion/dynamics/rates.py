@@ -182,7 +182,7 @@ def powers_of(back: Backward, lanes: int) -> Array:
         [effort * walk.rate(name) for name, effort in back.efforts.items()],
         [power for name, power in back.load_powers.items() if name in stated],
         [state.power for state in back.springs.values()],
-        [back.friction_power(joint) for joint in walk.system.joints],
+        [back.losses[joint] for joint in walk.system.joints],
     )
     found = np.zeros((len(each), lanes))
     for row, powers in zip(found, each, strict=True):

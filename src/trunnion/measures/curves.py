@@ -232,7 +232,7 @@ def _friction_energy(measure: MotionRequest, back: Backward) -> tuple[Number, ..
     walk = back.walk
     driver = next(iter(walk.system.mechanism.drivers), "")
     duration: Number = walk.system.span(walk.values, driver).duration if driver else 0.0
-    return back.friction_power(measure.subject), duration
+    return back.losses[measure.subject], duration
 
 
 def _efficiency(measure: MotionRequest, back: Backward) -> Number | tuple[Number, ...]:
@@ -291,7 +291,7 @@ CURVES: dict[str, Callable[[MotionRequest, Any], Number | tuple[Number, ...]]] =
     "spring_elongation": lambda measure, walk: _spring(measure, walk).elongation,
     "reaction": _reaction,
     "power": _power,
-    "friction_power": lambda measure, back: back.friction_power(measure.subject),
+    "friction_power": lambda measure, back: back.losses[measure.subject],
     "friction_energy": _friction_energy,
     "efficiency": _efficiency,
     "locking_margin": _locking_margin,

@@ -26,7 +26,7 @@ from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
-    "Backward", "Given", "Sense", "Slip", "backward", "body_loads", "pass_on", "sense_of", "solve",
+    "Backward", "Given", "Sense", "backward", "body_loads", "pass_on", "sense_of", "solve",
     "stated_actions", "under", "unloaded",
 ]  # fmt: skip
 
@@ -61,14 +61,6 @@ def sense_of(zero_slip: Mapping[str, Sense], joint: str, contact: int = 0) -> Sh
     return sense[contact] if isinstance(sense, tuple) else sense
 
 
-@dataclass(frozen=True)
-class Slip:
-    """Relative speed of a joint, second link against first (rad/s, m/s), and where what resists it sees it at rest."""
-
-    speed: Number
-    zero: Number
-
-
 @dataclass
 class Backward:
     """What one walk backward found, by joint and driver as the file names them.
@@ -76,21 +68,21 @@ class Backward:
     loads: on each link, the wrenches of joints passed so far included; reactions: on the second link by the first,
     friction and drive effort not included, in the plane about the joint's point on the second, in space about the
     origin; friction: torque about the axis, N m, of a ball or a cross about the relative angular velocity, or force
-    along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction is;
-    losses: power of friction, W; drags: effort and power, W, of losses that do not follow the load, which are part of
-    both; contacts: those of each joint that rubs; settled: per module; undefined: where each
-    load or spring (by path) has no value; turning: of joints that rub and turn, the contact and the share of its
-    friction that acts about the axis; spins: torque that each link with a free spin would need to keep from spinning,
-    N m; travels: whether seats do, so that a joint also loses what its load does on the way of its pin; passed: power
-    that each joint passes on to its links in all; gear_power: of all gear pairs, whose wheels then move apart;
-    module_reactions: reactions as their modules see them. stated: loads before any joint was passed;
-    rubbed: contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
+    along the slide, N, on the second link; friction_wrenches: all that friction does to it, about what the reaction
+    is; losses: power that each joint loses, W, to friction, and where seats travel to its load on the way of its
+    pin; drags: effort and power, W, of losses that do not follow the load, which are part of both; contacts: those
+    of each joint that rubs; resting: where what resists each joint sees it at rest; settled: per module; undefined:
+    where each load or spring (by path) has no value; turning: of joints that rub and turn, the friction force about
+    the axis for each newton of normal load, and the slip; spins: torque that each link with a free spin would need
+    to keep from spinning, N m; travels: whether seats do; gear_power: of all gear pairs, whose wheels then move
+    apart; module_reactions: reactions as their modules see them. stated: loads before any joint was passed; rubbed:
+    contacts per module as `settled`, those of gear pairs last; margin_up_to: as in the method; margin: that of
     `locking_margin`, once it was asked for.
     """
 
     walk: Forward
     loads: dict[str, Any]
-    slips: dict[str, Slip] = field(default_factory=dict)
+    resting: dict[str, Number] = field(default_factory=dict)
     contacts: dict[str, list[Rubbing]] = field(default_factory=dict)
     reactions: dict[str, Any] = field(default_factory=dict)
     friction: dict[str, Number] = field(default_factory=dict)
@@ -104,26 +96,15 @@ class Backward:
     springs: dict[str, SpringState] = field(default_factory=dict)
     gears: dict[str, GearLoad] = field(default_factory=dict)
     undefined: dict[str, Number] = field(default_factory=dict)
-    turning: dict[str, tuple[Contact, Number]] = field(default_factory=dict)
+    turning: dict[str, tuple[Number, Number]] = field(default_factory=dict)
     spins: dict[str, Number] = field(default_factory=dict)
     travels: bool = False
-    passed: dict[str, Number] = field(default_factory=dict)
     gear_power: Number = 0.0
     module_reactions: dict[str, Any] = field(default_factory=dict)
     stated: dict[str, Any] = field(default_factory=dict)
     rubbed: list[list[tuple[Contact, Rubbing | None]]] = field(default_factory=list)
     margin_up_to: float = 0.0
     margin: Number | None = None
-
-    def friction_power(self, joint: str) -> Number:
-        """Power lost in a joint, W."""
-        return self.lost(joint) if self.travels else self.losses[joint]
-
-    def lost(self, joint: str) -> Number:
-        """What a joint takes out and its driver does not put in, W: friction, and the load on its seat's way."""
-        driven = self.efforts[joint] * self.walk.rate(joint) if joint in self.efforts else 0.0
-        dragged = self.drags[joint][1] if joint in self.drags else 0.0
-        return driven - self.passed[joint] + dragged
 
     def on_hole(self, joint: str) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         """Force, N, and moment about its middle, N m, of the pin on the hole of a joint, in the hole's frame."""
@@ -166,7 +147,7 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     system = walk.system
     back = Backward(walk, unloaded(walk), travels=bool(given.travel), margin_up_to=method.margin_up_to)
     back.contacts = {joint: list(contacts_of(walk, joint)) for joint in rubbing(system)}
-    back.slips = {joint: _slip(back, joint) for joint in system.joints}
+    back.resting = {joint: _resting(back, joint) for joint in system.joints}
     _add_body_loads(back)
     _add_stated_loads(back, given.zero_slip, given.rests)
     for name, action in given.acting(walk) if given.acting else ():
@@ -212,14 +193,11 @@ def unloaded(walk: Forward) -> dict[str, Any]:
     return dict.fromkeys(walk.system.mechanism.effective_links, walk.algebra.ZERO_LOAD)
 
 
-def _slip(back: Backward, joint: str) -> Slip:
-    """Slip of a joint, and where a contact of it rests, or the turn or slide that a load resists."""
-    walk = back.walk
-    if not walk.pair(joint).count:
-        return Slip(0.0, False)
+def _resting(back: Backward, joint: str) -> Number:
+    """Where a contact of a joint rests, or the turn or slide that a load resists."""
     zeros = [rub.zero for rub in back.contacts.get(joint, [])]
-    zeros += [walk.still(joint, turns) for turns in walk.system.resisted.get(joint, ())]
-    return Slip(walk.speed(joint), functools.reduce(operator.or_, zeros) if zeros else False)
+    zeros += [back.walk.still(joint, turns) for turns in back.walk.system.resisted.get(joint, ())]
+    return functools.reduce(operator.or_, zeros) if zeros else False
 
 
 # ---- loads ----------------------------------------------------------------------------------------------------
@@ -267,11 +245,12 @@ def _settle_module(back: Backward, number: int, method: FrictionMethod, given: G
     for k, place in enumerate(places):
         joint = place.joint
         for i, rub in enumerate(() if place.witness else back.contacts.get(joint, ())):
-            contact = _contact(back, module.links, k, joint, rub, given, i)
+            slope, slip = _slope(back, joint, rub, given, i)
             # power goes by the speed itself where the law is told on which side of rest it is
-            rubbed.append((contact, rub if joint in given.rests else rub._replace(slip=contact.slip)))
+            felt = rub if joint in given.rests else rub._replace(slip=slip)
+            rubbed.append((_contact(walk, module.links, k, joint, rub, slope), felt))
             if rub.turning is not None:
-                back.turning[joint] = contact, rub.turning
+                back.turning[joint] = literal.times(slope, rub.turning), slip
     rubbed += [(contact, None) for contact in teeth(walk, number)]
     settled = settle(partial(walk.reactions, number), loads, [contact for contact, _ in rubbed], method)
     back.settled.append(settled)
@@ -315,10 +294,13 @@ def pass_on(
                 back.add(places[joint].links[side], wrench)
 
 
-def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, given: Given, i: int) -> Contact:
-    """One contact of a joint, its i-th, as `friction` sees it."""
-    walk, law = back.walk, law_of(back.walk.system, joint)
-    parameters = {name: walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
+def _slope(back: Backward, joint: str, rub: Rubbing, given: Given, i: int) -> tuple[Number, Number]:
+    """Friction force of the i-th contact of a joint for each newton of its normal load, and the slip that goes with it.
+
+    Where there is no slip it is that which is about to begin.
+    """
+    law = law_of(back.walk.system, joint)
+    parameters = {name: back.walk.values[f"joints.{joint}.friction.{name}"] for name in law.parameters}
     if joint in given.deflections:
         parameters["deflection"] = given.deflections[joint]
     sense, slip, zero, sliding = sense_of(given.zero_slip, joint, i), rub.slip, rub.zero, given.sliding
@@ -326,20 +308,24 @@ def _contact(back: Backward, links: tuple[str, ...], k: int, joint: str, rub: Ru
         zero, sliding = np.bool_(given.rests[joint]), False
         if not zero:
             slip = namespace(slip).where(primal(slip) * sense > 0.0, slip, 1e-300 * sense)
-    resting: Number = 0.0
-    share: Number = 1.0
-    if np.any(zero):
-        slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
-        if not sliding:
-            resting = np.where(zero, 1.0, 0.0)
-        if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
-            share = np.where(zero, np.abs(sense), 1.0)
+    if not np.any(zero):
+        return law.function(1.0, slip, **parameters), slip
+    slip = namespace(slip).where(zero, np.sign(sense) * np.maximum(np.abs(primal(slip)), 1e-300), slip)
+    slope = law.function(1.0, slip, **parameters)
+    if law.at_rest is not None and not sliding:
+        slope = namespace(slope).where(zero, law.at_rest(1.0, slip, **parameters), slope)
+    if law.interval_at_rest and np.any(np.abs(sense) != 1.0) and np.any(sense):
+        slope = np.where(zero, np.abs(sense), 1.0) * slope
+    return slope, slip
+
+
+def _contact(walk: Forward, links: tuple[str, ...], k: int, joint: str, rub: Rubbing, slope: Number) -> Contact:
+    """One contact of a joint, the k-th of its module, as `friction` sees it."""
     first, second = walk.system.joints[joint][1]
     unit = walk.on_link(second, rub.unit, joint)
     on = {first: walk.algebra.times(-1.0, unit), second: unit}
-    felt = tuple(flat(rub.unit)) if rub.felt else None
     units = [on.get(link, walk.algebra.ZERO_LOAD) for link in links]
-    return Contact(k, units, rub.load, law, parameters, slip, own=felt, resting=resting, share=share)
+    return Contact(k, units, rub.load, slope, own=tuple(flat(rub.unit)) if rub.felt else None)
 
 
 def _record(
@@ -367,10 +353,12 @@ def _record(
         effort, drag = back.drags[joint]
         friction = algebra.added(friction, algebra.times(effort, walk.axis(joint, turns)[1]))
         amount, loss = amount + effort, loss + drag
+    if back.travels:  # what the joint takes out and its driver does not put in
+        put_in = back.efforts[joint] * walk.rate(joint) if driven else 0.0
+        loss = put_in - algebra.power(walk.on_link(second, total, joint), walk.against(joint))
+        loss = loss + back.drags[joint][1] if joint in back.drags else loss
     back.reactions[joint], back.friction_wrenches[joint] = reaction, friction
     back.friction[joint], back.losses[joint] = amount, loss
-    if back.travels:
-        back.passed[joint] = algebra.power(walk.on_link(second, total, joint), walk.against(joint))
     for link, outer in zip(place.links, place.outer, strict=True):
         if outer:
             back.add(link, walk.on_link(link, total if link == second else algebra.times(-1.0, total), joint))

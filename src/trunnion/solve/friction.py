@@ -66,7 +66,7 @@ def settle(
         return Settled(start, [], 0, 0.0, 0.0, True)
     if method.multiple is not None:
         contacts = [
-            contact._replace(share=method.multiple * contact.share) if contact.rubs else contact for contact in contacts
+            contact._replace(slope=method.multiple * contact.slope) if contact.rubs else contact for contact in contacts
         ]
     influence = [with_own(contact, reactions(contact.unit_loads)) for contact in contacts]
     problem = FrictionProblem(contacts, start, influence)

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.linalg import weighted
 from trunnion.algebra.literal import is_zero, less, plus, times
-from trunnion.algebra.namespace import Number, apart, namespace
+from trunnion.algebra.namespace import Number, apart
 from trunnion.algebra.nested import replaced
-from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import ContactLoad, Reaction
 
 __all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "added", "largest", "total"]
@@ -29,38 +28,23 @@ class Contact(NamedTuple):
     """A contact with friction in a joint, as its module sees it.
 
     joint: its number in the module; unit_loads: what a friction force of 1 N on the second side does to the
-    links; load: normal load and its gradient from the joint's reaction; law with parameters; slip: m/s.
-    rubs: False for the separating force of a gear pair, which follows the tooth force as friction follows the
-    normal load, but is there in full whatever the friction. own: what the unit load adds to what the joint itself
-    carries, where its load depends on that. resting: above 0 where the law takes its value at rest; share: of what the
-    law says.
+    links; load: normal load and its gradient from the joint's reaction; slope: friction force for each newton of normal
+    load, as every law is proportional to it. rubs: False for the separating force of a gear pair, which follows the
+    tooth force as friction follows the normal load, but is there in full whatever the friction. own: what the unit load
+    adds to what the joint itself carries, where its load depends on that.
     """
 
     joint: int
     unit_loads: Sequence[Any]
     load: ContactLoad
-    law: FrictionLaw
-    parameters: dict[str, Number]
-    slip: Number
+    slope: Number
     rubs: bool = True
     own: Reaction | None = None
-    resting: Number = 0.0
-    share: Number = 1.0
-
-    @property
-    def slope(self) -> Number:
-        """Friction force for each newton of normal load: every law is proportional to it."""
-        slope = self.law.function(1.0, self.slip, **self.parameters)
-        if self.law.at_rest is not None and not is_zero(self.resting):
-            slope = namespace(slope).where(self.resting > 0, self.law.at_rest(1.0, self.slip, **self.parameters), slope)
-        return times(self.share, slope)
 
     def mapped(self, change: Callable[[Number], Number]) -> Contact:
-        """The same with `change` applied to every number that the laws see."""
-        parameters = {name: change(value) for name, value in self.parameters.items()}
+        """The same with `change` applied to every number that friction depends on."""
         load: ContactLoad = self.load.mapped(change)
-        slip, resting, share = change(self.slip), change(self.resting), change(self.share)
-        return self._replace(load=load, parameters=parameters, slip=slip, resting=resting, share=share)
+        return self._replace(load=load, slope=change(self.slope))
 
 
 class Rubbing(NamedTuple):
@@ -190,7 +174,7 @@ class FrictionProblem:
             normals = [c.load.normal(reaction) for c, reaction in zip(self.contacts, reactions, strict=True)]
         return State(reactions, normals)
 
-    @cached_property
+    @property
     def slopes(self) -> list[Number]:
         """Friction force for each newton of normal load: every law is proportional to it."""
         return [contact.slope for contact in self.contacts]

@@ -9,7 +9,6 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.plane import ZERO_LOAD, added, power
 from trunnion.groups.gear import GearPair, Mesh, ToothForce, actions, apart, mesh
 from trunnion.groups.general import General
-from trunnion.joints.friction import FrictionLaw
 from trunnion.joints.pairs import PlanarContactLoad
 from trunnion.solve.forward import Forward
 from trunnion.solve.friction_problem import Contact
@@ -51,14 +50,7 @@ def teeth(walk: Forward, number: int) -> Iterator[Contact]:
         # a guide of length 2/|f/λ| under the moment λ alone presses with |f|
         load = PlanarContactLoad((1.0, 0.0), 2 / namespace(touch.factor).abs(touch.factor))
         slope = namespace(angle).sin(angle) / namespace(angle).cos(angle)
-        yield Contact(len(places) + i, list(units.values()), load, SEPARATION, {"slope": slope}, 0.0, rubs=False)
-
-
-def _separation(normal: Number, slip: Number, **parameters: Number) -> Number:
-    return parameters["slope"] * normal
-
-
-SEPARATION = FrictionLaw(_separation)
+        yield Contact(len(places) + i, list(units.values()), load, slope, rubs=False)
 
 
 def acting(walk: Forward, number: int, i: int, torque: Number, parting: bool = True) -> list[ToothForce]:

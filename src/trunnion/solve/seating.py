@@ -396,9 +396,9 @@ def _share(back: Backward, joint: str) -> Number | None:
     """
     if joint not in back.turning:
         return None
-    contact, turning = back.turning[joint]
-    slope = contact.slope
-    return -primal(slope * turning) * np.sign(primal(contact.slip)) / contact.parameters.get("pair_factor", 1.0)
+    factor = back.walk.values.get(f"joints.{joint}.friction.pair_factor", 1.0)
+    slope, slip = back.turning[joint]
+    return -primal(slope) * np.sign(primal(slip)) / factor
 
 
 def _added_twists(run: Run, values: Values, time: Array) -> dict[str, Any]:

@@ -37,7 +37,7 @@ def pose_status(walk: Forward, shape: tuple[int, ...]) -> NDArray[np.int8]:
 def status_number(back: Backward) -> Number:
     """The gravest status in whatever shape the numbers of the walk have."""
     status = pose_status_number(back.walk)
-    reasons = [(Status.ZERO_SLIP, back.slips[name].zero) for name in sticking(back.walk.system)]
+    reasons = [(Status.ZERO_SLIP, back.resting[name]) for name in sticking(back.walk.system)]
     for settled in back.settled:
         reasons.append((Status.NOT_CONVERGED, np.logical_not(settled.converged)))
         reasons.append((Status.LOCKED, np.less(settled.share, 1.0)))

@@ -143,7 +143,7 @@ class Model:
         """Positions beside one with a relative speed of the other sign, in a joint that friction or a load resists."""
         found = np.zeros(shape, bool)
         for joint in sticking(self.run.system):
-            speed = np.broadcast_to(np.asarray(primal(back.slips[joint].speed), float), shape)
+            speed = np.broadcast_to(np.asarray(primal(back.walk.speed(joint)), float), shape)
             most = np.max(np.abs(np.nan_to_num(speed)), axis=-1, keepdims=True)
             sign = np.where(np.abs(speed) > STILL * most, np.sign(speed), 0.0)
             differs = sign != np.roll(sign, -1, axis=-1)

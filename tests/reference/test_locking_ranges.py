@@ -16,7 +16,7 @@ from mechanisms_parts import Data, plunger, revolute
 from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
-from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, reverse
+from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
@@ -491,7 +491,7 @@ def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:
         part for part in found.ranges() if part.state == LockingState.SELF_LOCKING and part.places[0] == "74.55°"
     ]
     inside = np.linspace(part.low, part.high, 9)
-    powers = reverse(found.run, found.run.walk(inside), FrictionMethod()).acting
+    powers = passed(found.run, found.run.walk(inside).backward(), FrictionMethod()).acting
     assert np.all(powers[1:-1] > 0)
     np.testing.assert_allclose(powers[[0, -1]], 0.0, atol=1e-5 * np.max(powers))
 

@@ -17,7 +17,7 @@ from trunnion.cycle.locking_course import (
     critical_multiples,
     holding_multiples,
     locking_course,
-    reverse,
+    passed,
 )  # fmt: skip
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
@@ -91,7 +91,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     result = analyse_run(run, steps, progress=progress)
     time, status = result["time"].values, result["status"].values
     back = run.solve(time, method=FrictionMethod())
-    other, multiples = reverse(run, back.walk, FrictionMethod()), critical_multiples(back, MARGIN)
+    other, multiples = passed(run, back.walk.backward(), FrictionMethod()), critical_multiples(back, MARGIN)
     answered = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     course, nothing = locking_course(run, METHOD), np.full(len(time), np.nan)
     state = np.full(len(time), int(LockingState.RUNS)) if course is None else course.states_at(time)

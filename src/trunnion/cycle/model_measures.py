@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.measures import curves
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
@@ -197,6 +198,6 @@ def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: Frict
             continue
         row[:] = courses[measure.name][0]
         if measure.turning(run.system):
-            rate = np.broadcast_to(np.asarray(measure.coordinate(run.system).rate(walk), float), time.shape)
+            rate = np.broadcast_to(np.asarray(curves.rate(measure.coordinate(run.system), walk), float), time.shape)
             unwrap_row(row, rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)
     return values

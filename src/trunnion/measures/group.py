@@ -21,6 +21,7 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
+from trunnion.measures.curves import rate
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
 from trunnion.measures.figures import ENDLESS, Panels, Reading, combined, near
 from trunnion.measures.lines import turn
@@ -171,8 +172,8 @@ class Group:
 
         def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
             walk = run.walk(within(run, time))
-            rate = np.asarray(primal(coordinate.rate(walk)), float)
-            return np.broadcast_to(rate, (1, *time.shape)), pose_status(walk, time.shape)
+            speed = np.asarray(primal(rate(coordinate, walk)), float)
+            return np.broadcast_to(speed, (1, *time.shape)), pose_status(walk, time.shape)
 
         knots = np.array([bend.time for bend in run.bends if bend.scan < 0])
         rates = Courses.of(look, breaks_between(run.cycle, knots, *self.span), None, accuracy_of(run.cycle, TURNING))
@@ -200,11 +201,9 @@ class Group:
             return max((float(np.nanmax(part, initial=0.0)) for part in parts), default=0.0)
 
         length, pace = (float(np.ravel(primal(of(run.values)))[0]) for of in (run.system.size, run.system.pace))
-        largest = (
-            0.0 if all(not measure.of.of_forces for measure in self.measures) else run.once("largest force", force)
-        )
-        scales = {measure: Scales(length, pace, largest * measure.of.of_forces) for measure in self.measures}
-        return {one.name: own.floor(one.unit(run.system)) / ROUNDING for one, own in scales.items()}
+        forces = any(measure.of.of_forces for measure in self.measures)
+        scales = Scales(length, pace, run.once("largest force", force) if forces else 0.0)
+        return {measure.name: scales.floor(measure.unit(run.system)) / ROUNDING for measure in self.measures}
 
     @cached_property
     def _sizes(self) -> dict[str, float]:

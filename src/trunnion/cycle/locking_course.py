@@ -488,16 +488,15 @@ class LockingCourse:
         multiple, joint = choose(pairs, key=lambda pair: pair[0], default=(0.0, ""))
         return (joint, multiple) if joint and (multiple > 0 or not locked) else None
 
-    def critical_figures(self, tables: dict[str, Array]) -> Iterator[Figure]:
-        """The least critical multiple of each joint whose friction is not 0, and its friction there.
-
-        tables: the multiples at some positions, which tell what is nowhere finite.
-        """
+    def critical_figures(self) -> Iterator[Figure]:
+        """The least critical multiple of each joint whose friction is not 0, and its friction there."""
         run, joints = self.run, felt(self.run.system, self.run.values)
+        beyond = np.zeros(len(joints), bool)  # where a joint does not lock up to the margin
 
         def look(time: Array) -> tuple[Array, NDArray[np.int64]]:
             multiples = critical_multiples(run.solve(time, method=FrictionMethod()), MARGIN)
             rows = np.array([multiples.get(joint, np.full(time.shape, np.nan)) for joint in joints])
+            beyond[np.any(np.isinf(rows), axis=1)] = True
             rows = np.where(np.isfinite(rows), rows, np.nan)
             return rows, np.tensordot(1 << (np.arange(len(joints)) % BITS), np.isfinite(rows), 1)
 
@@ -513,8 +512,7 @@ class LockingCourse:
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
             least = course.extreme("multiple", i, of=multiple_of, sign=-1.0, panels=every)
             if least is None:
-                bounded = np.any(np.isinf(tables[joint]))
-                yield Figure(name, subject, MARGIN if bounded else None, aspect=MORE_THAN * bool(bounded))
+                yield Figure(name, subject, MARGIN if beyond[i] else None, aspect=MORE_THAN * bool(beyond[i]))
                 continue
             alone = critical_figure(run, joint, least.value, course.told(least))
             if least.value > 0:

@@ -16,7 +16,7 @@ from trunnion.measures.evaluation import courses_of
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import ends_by_name, plan, within
-from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
+from trunnion.results.dataset import MemberUnits, Variable, described
 from trunnion.results.figure import Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
@@ -62,18 +62,22 @@ class Watched:
     notes: Mapping[str, str]
     extremes: Mapping[str, tuple[float, float]]
 
-    def joined(self, result: xr.Dataset) -> xr.Dataset:
-        """A result with them."""
+    @property
+    def labels(self) -> dict[str, list[str]]:
+        """Names along their dimension, if there are any."""
+        return {"measure": [one.name for one in self.measures]} if self.measures else {}
+
+    def variables(self) -> dict[str, xr.Variable]:
+        """What a result has of them."""
         if not self.measures:
-            return result
+            return {}
         system, values = self.run.system, self.run.values
         arrays = {"measure_value": self.values, "measure_figure": self.figures}
         units = {
             "measure": MemberUnits("measure", [one.unit(system) for one in self.measures]),
             "measure_figure": MemberUnits("measure", [one.figure_unit(system, values) for one in self.measures]),
         }
-        labelled = result.assign_coords(measure=np.asarray([one.name for one in self.measures], dtype=str))
-        return with_variables(labelled, described(arrays, VARIABLES, units))
+        return described(arrays, VARIABLES, units)
 
     def summary(self) -> Iterator[Figure]:
         """The figure of each; of one that states none its extremes over the cycle."""

@@ -11,6 +11,7 @@ from mechanisms import Array
 from mechanisms_parts import Data
 from trunnion import Mechanism
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
+from trunnion.measures.curves import value
 from trunnion.measures.measures import Measure
 from trunnion.solve.forward import forward
 from trunnion.solve.run import Run
@@ -70,8 +71,8 @@ def pressed_to(load: Vector, radius: float) -> Vector:
 
 def changes(run: Run, measure: Measure, offsets: Mapping[str, Array], time: Array) -> Array:
     """What offsets change in a measure of the motion, by the exact closure."""
-    base = measure.value(forward(run.system, run.values, run.chosen.assembly, time))
-    moved = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+    base = value(measure, forward(run.system, run.values, run.chosen.assembly, time))
+    moved = value(measure, forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
     return np.asarray(moved - base)
 
 

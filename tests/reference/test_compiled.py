@@ -16,6 +16,7 @@ import trunnion.studies.tolerance.kernel
 from mechanisms import DURANGO, eccentric_press
 from trunnion import Mechanism, MechanismError
 from trunnion.errors import Status
+from trunnion.measures.curves import value
 from trunnion.measures.measures import named, outputs
 from trunnion.solve.run import Run, prepare
 from trunnion.solve.status import pose_status, status_of
@@ -37,7 +38,7 @@ def figures(run: Run, *names: str) -> dict[str, Callable[[Any], Any]]:
     """What the measures of these names read off a walk."""
 
     def reader(measure: Any) -> Callable[[Any], Any]:
-        return lambda back: measure.value(back.walk) if measure.of_motion else back.efforts[measure.subject]
+        return lambda back: value(measure, back.walk) if measure.of_motion else back.efforts[measure.subject]
 
     return {one.name: reader(one) for one in named(run.system.mechanism, names, run.values)}
 

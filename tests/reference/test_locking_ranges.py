@@ -16,7 +16,7 @@ from mechanisms_parts import Data, plunger, revolute
 from mechanisms_space import rssr
 from trunnion import Mechanism, Status
 from trunnion.cycle.locking import LockingState, locking, look, report_figures
-from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, reverse
+from trunnion.cycle.locking_course import NO_MARGIN, LockingCourse, locking_course, passed
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
 from trunnion.solve.loads import NOTHING_USEFUL, STATE_USEFUL
@@ -82,8 +82,7 @@ def test_the_friction_that_holds_it_at_the_end_or_everywhere_is_a_figure(first: 
     data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
     data["drivers"]["A"]["range"] = [first, last]
     run = prepare(Mechanism(**data))
-    found = look(run, 41)
-    rows = {one.name: one for one in report_figures(run, found) if one.name.startswith("holding")}
+    rows = {one.name: one for one in report_figures(run) if one.name.startswith("holding")}
     if not told:
         assert not rows
         return
@@ -141,7 +140,7 @@ def test_where_the_drive_effort_changes_sign_is_told_and_kept_in_the_result() ->
     run = prepare(hoist())
     found = look(run, 30)
     limit = 180 - np.degrees(np.arccos(FRICTION * RADIUS / ARM))
-    (told,) = [one for one in report_figures(run, found) if one.name == "drive_effort_sign"]
+    (told,) = [one for one in report_figures(run) if one.name == "drive_effort_sign"]
     assert told.value == f"{limit:.2f}°"
     kept = attribute(found, "locking_ranges")
     assert (kept["of"], kept["unit"], kept["positions"]) == ("A", "°", 30)
@@ -311,7 +310,7 @@ def test_without_useful_work_there_is_no_efficiency_and_it_says_why(lifted: Call
     (row,) = [one for one in summary_of(result) if one.name == "efficiency"]
     assert (row.value, row.note) == (None, f"{NOTHING_USEFUL}: {STATE_USEFUL}")
     run = prepare(mechanism)
-    (row,) = [one for one in report_figures(run, look(run, 12)) if one.name == "efficiency_reverse"]
+    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
     assert NOTHING_USEFUL in row.subject
     speed = f"drivers.{next(iter(mechanism.drivers))}.speed"
     swept = trunnion.sweep(mechanism, {speed: [1e-6, 2e-6]}, steps=12)
@@ -338,7 +337,7 @@ def test_without_friction_all_that_a_useful_spring_stored_comes_back(last: float
     """Wherever the range ends: nothing but the spring supplies work, and rounding makes no other answer."""
     data = spring_hoist(stiffness=1e4, free_length=0.1, useful=True).with_friction("off")
     run = prepare(data.with_values({"drivers.A.range.to": last}))
-    (row,) = [one for one in report_figures(run, look(run, 8)) if one.name == "efficiency_reverse"]
+    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
     assert row.value == pytest.approx(1.0, rel=1e-12)
     assert row.value <= 1.0
     assert not row.note
@@ -350,7 +349,7 @@ def test_work_that_other_springs_supply_backward_is_named() -> None:
     data["springs"] = {"s": {"between": ["ground.Q", "crank.P"], "stiffness": 1e5, "free_length": 0.1}}
     data["drivers"]["A"]["range"] = [0.0, 1.4]
     run = prepare(Mechanism(**data))
-    (row,) = [one for one in report_figures(run, look(run, 8)) if one.name == "efficiency_reverse"]
+    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
     assert row.value is None
     assert row.note == "springs supply work too"
 
@@ -415,7 +414,7 @@ def test_joints_whose_friction_is_zero_are_not_named() -> None:
         for joint in ("H", "K"):
             data["joints"][joint] |= {"pin": {"radius": 0.004}, "friction": friction if joint == "H" else 0.0}
         run = prepare(Mechanism(**data))
-        names = {one.name.partition(".")[0] for one in report_figures(run, look(run, 8)) if "critical" in one.name}
+        names = {one.name.partition(".")[0] for one in report_figures(run) if "critical" in one.name}
         assert names == set(named)
 
 
@@ -462,7 +461,7 @@ def test_effort_to_open_a_clamp_past_its_dead_centre(share: float) -> None:
     assert np.isfinite(found["holding_multiple"].values[-1]) == (share == 0.95)
     if share:
         return
-    row = next(one for one in report_figures(run, found) if one.name == "O.effort_reverse")
+    row = next(one for one in report_figures(run) if one.name == "O.effort_reverse")
     assert row.place == "at 3°"
     assert row.value == pytest.approx(opens, rel=1e-9)
     assert float(found["drive_effort_reverse"].max()) > 0  # where the spring opens it, it is held back
@@ -491,7 +490,7 @@ def test_a_short_range_ends_where_the_loads_cease_to_push() -> None:
         part for part in found.ranges() if part.state == LockingState.SELF_LOCKING and part.places[0] == "74.55°"
     ]
     inside = np.linspace(part.low, part.high, 9)
-    powers = reverse(found.run, found.run.walk(inside), FrictionMethod()).acting
+    powers = passed(found.run, found.run.walk(inside).backward(), FrictionMethod()).acting
     assert np.all(powers[1:-1] > 0)
     np.testing.assert_allclose(powers[[0, -1]], 0.0, atol=1e-5 * np.max(powers))
 

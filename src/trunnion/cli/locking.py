@@ -59,7 +59,7 @@ def locking(
         run = prepare(mechanism)
         with bar("positions", steps, least=200_000) as progress:
             found = look(run, steps, progress, near)
-    figures = report_figures(run, found)
+    figures = report_figures(run)
     every = attribute(found, "locking_ranges", "{}")
 
     def show() -> None:

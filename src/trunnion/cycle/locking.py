@@ -17,7 +17,7 @@ from trunnion.cycle.locking_course import (
     critical_multiples,
     holding_multiples,
     locking_course,
-    reverse,
+    passed,
 )  # fmt: skip
 from trunnion.cycle.scales import scales_of
 from trunnion.cycle.summary import member_units
@@ -91,7 +91,7 @@ def look(run: Run, steps: int = 360, progress: Callable[[int], None] | None = No
     result = analyse_run(run, steps, progress=progress)
     time, status = result["time"].values, result["status"].values
     back = run.solve(time, method=FrictionMethod())
-    other, multiples = reverse(run, back.walk, FrictionMethod()), critical_multiples(back, MARGIN)
+    other, multiples = passed(run, back.walk.backward(), FrictionMethod()), critical_multiples(back, MARGIN)
     answered = (status < Status.NOT_CONVERGED) | (status == Status.LOCKED)
     course, nothing = locking_course(run, METHOD), np.full(len(time), np.nan)
     state = np.full(len(time), int(LockingState.RUNS)) if course is None else course.states_at(time)
@@ -129,8 +129,8 @@ def _notes(run: Run) -> list[Finding]:
     return notes
 
 
-def report_figures(run: Run, result: xr.Dataset) -> list[Figure]:
-    """The figures of a result of `look` that one looks at first."""
+def report_figures(run: Run) -> list[Figure]:
+    """The figures of locking over the cycle that one looks at first."""
     course, useful = locking_course(run, METHOD), has_useful_work(run.system.mechanism)
     why = "the useful loads do no net work backward" if useful else NOTHING_USEFUL
     none = Figure(
@@ -139,10 +139,9 @@ def report_figures(run: Run, result: xr.Dataset) -> list[Figure]:
     if course is None:
         return [none]
     what = ", all friction together" if rubbing(run.system) else " (no joint has friction)"
-    table = {str(joint): result["critical_multiple"].sel(joint=joint).values for joint in result["joint"].values}
     figures = [
         course.margin_figure(f"locking margin{what}", ""),
-        *course.critical_figures(table),
+        *course.critical_figures(),
         course.sign_figure(),
         *course.holding_figures(),
         *course.reversing_figures(),

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HEAD", "HELD_AND_DRIVEN", "NEAR", "NO_MARGIN", "LockingCourse", "LockingRange", "LockingState", "Passage",
-    "critical_figure", "critical_multiples", "holding_multiples", "locking_course", "locks", "reverse",
+    "critical_figure", "critical_multiples", "holding_multiples", "locking_course", "locks", "passed",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -126,14 +126,12 @@ class Passage(NamedTuple):
         return cls(efforts, locks(back), delivered, acting, given)
 
 
-def reverse(run: Run, ahead: Forward, method: FrictionMethod) -> Passage:
-    """Drive the mechanism backward through the positions of a walk: speeds turned round, friction and all that resists
-    with them; inertia stays, for accelerations do."""
-    return _passed(run, ahead.backward(), method)
+def passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
+    """Positions of a walk, in its direction.
 
-
-def _passed(run: Run, walk: Forward, method: FrictionMethod) -> Passage:
-    """Positions of a walk, in its direction."""
+    Of one that goes `backward` speeds are turned round, friction and all that resists with them; inertia stays, for
+    accelerations do.
+    """
     turned, time = walk.direction < 0, np.asarray(walk.time, float)
     past = histories(run.system, run.values, run.chosen.assembly, run.cycle, turned)
     time = run.cycle.duration - time if turned else time
@@ -213,7 +211,7 @@ def holding_multiples(run: Run, time: Array) -> Array:
     multiples, least = np.full(len(time), np.nan), scales_of(run).floor("W")
     walk = run.walk(time)
     for direction in (walk, walk.backward()):
-        full = _passed(run, direction, FrictionMethod())
+        full = passed(run, direction, FrictionMethod())
         holding = np.flatnonzero((full.acting > least) & (full.locked | (full.delivered <= 0)))
         if not len(holding):
             continue
@@ -223,7 +221,7 @@ def holding_multiples(run: Run, time: Array) -> Array:
         ) -> tuple[Array, NDArray[np.intp]]:
             """Power delivered to the drivers for multiples of all friction; below 0 where it locks."""
             part = run.walk(np.repeat(times[lane], multiple.shape[1]))
-            through = _passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
+            through = passed(run, part.backward() if back else part, FrictionMethod(multiple=multiple.ravel()))
             power = np.where(through.locked, -np.abs(through.acting), through.delivered)
             return power.reshape(1, *multiple.shape), through.locked.reshape(multiple.shape).astype(np.intp)
 
@@ -287,7 +285,7 @@ class LockingCourse:
 
         def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
             back = run.solve(time, method=plain)
-            ahead, other = Passage.of(back), reverse(run, back.walk, plain)
+            ahead, other = Passage.of(back), passed(run, back.walk.backward(), plain)
             status: NDArray[np.integer] = status_of(back, time.shape)
             locked = ahead.locked
             if seated is not None:  # where it locks pins are in their seats
@@ -490,16 +488,15 @@ class LockingCourse:
         multiple, joint = choose(pairs, key=lambda pair: pair[0], default=(0.0, ""))
         return (joint, multiple) if joint and (multiple > 0 or not locked) else None
 
-    def critical_figures(self, tables: dict[str, Array]) -> Iterator[Figure]:
-        """The least critical multiple of each joint whose friction is not 0, and its friction there.
-
-        tables: the multiples at some positions, which tell what is nowhere finite.
-        """
+    def critical_figures(self) -> Iterator[Figure]:
+        """The least critical multiple of each joint whose friction is not 0, and its friction there."""
         run, joints = self.run, felt(self.run.system, self.run.values)
+        beyond = np.zeros(len(joints), bool)  # where a joint does not lock up to the margin
 
         def look(time: Array) -> tuple[Array, NDArray[np.int64]]:
             multiples = critical_multiples(run.solve(time, method=FrictionMethod()), MARGIN)
             rows = np.array([multiples.get(joint, np.full(time.shape, np.nan)) for joint in joints])
+            beyond[np.any(np.isinf(rows), axis=1)] = True
             rows = np.where(np.isfinite(rows), rows, np.nan)
             return rows, np.tensordot(1 << (np.arange(len(joints)) % BITS), np.isfinite(rows), 1)
 
@@ -515,8 +512,7 @@ class LockingCourse:
             name, subject = f"{joint}.critical_multiple", f"critical multiple of {joint} alone"
             least = course.extreme("multiple", i, of=multiple_of, sign=-1.0, panels=every)
             if least is None:
-                bounded = np.any(np.isinf(tables[joint]))
-                yield Figure(name, subject, MARGIN if bounded else None, aspect=MORE_THAN * bool(bounded))
+                yield Figure(name, subject, MARGIN if beyond[i] else None, aspect=MORE_THAN * bool(beyond[i]))
                 continue
             alone = critical_figure(run, joint, least.value, course.told(least))
             if least.value > 0:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.unwrap import unwrap_row
 from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.measures import curves
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.many import figures_of
 from trunnion.measures.measures import Measure, named
 from trunnion.measures.positions import ends_by_name, plan, within
-from trunnion.results.dataset import MemberUnits, Variable, described, with_variables
+from trunnion.results.dataset import MemberUnits, Variable, described
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import MARGIN, FrictionMethod
@@ -61,18 +62,22 @@ class Watched:
     notes: Mapping[str, str]
     extremes: Mapping[str, tuple[float, float]]
 
-    def joined(self, result: xr.Dataset) -> xr.Dataset:
-        """A result with them."""
+    @property
+    def labels(self) -> dict[str, list[str]]:
+        """Names along their dimension, if there are any."""
+        return {"measure": [one.name for one in self.measures]} if self.measures else {}
+
+    def variables(self) -> dict[str, xr.Variable]:
+        """What a result has of them."""
         if not self.measures:
-            return result
+            return {}
         system, values = self.run.system, self.run.values
         arrays = {"measure_value": self.values, "measure_figure": self.figures}
         units = {
             "measure": MemberUnits("measure", [one.unit(system) for one in self.measures]),
             "measure_figure": MemberUnits("measure", [one.figure_unit(system, values) for one in self.measures]),
         }
-        labelled = result.assign_coords(measure=np.asarray([one.name for one in self.measures], dtype=str))
-        return with_variables(labelled, described(arrays, VARIABLES, units))
+        return described(arrays, VARIABLES, units)
 
     def summary(self) -> Iterator[Figure]:
         """The figure of each; of one that states none its extremes over the cycle."""
@@ -201,6 +206,6 @@ def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: Frict
         if measure.wants_margin:
             row[row >= MARGIN] = np.inf
         if measure.turning(run.system):
-            rate = np.broadcast_to(np.asarray(measure.coordinate(run.system).rate(walk), float), time.shape)
+            rate = np.broadcast_to(np.asarray(curves.rate(measure.coordinate(run.system), walk), float), time.shape)
             unwrap_row(row, rate, float(time[1] - time[0]) if len(time) > 1 else 0.0)
     return values

@@ -77,8 +77,8 @@ def result_of(run: Run, at: Positions, kept: Kept = ALL) -> Result:
 
     def dataset() -> xr.Dataset:
         along, units = driven(at.time, *at.dial), member_units(run.system)
-        parts = at.arrays, at.labels, along, at.means, attributes, units, at.ideal
-        return measured.joined(results.dataset(*parts, kept.variables, kept.dtype))
+        parts = at.arrays, at.labels | measured.labels, along, at.means, attributes, units, at.ideal
+        return results.dataset(*parts, kept.variables, kept.dtype, measured.variables())
 
     return Result(attributes, dataset)
 

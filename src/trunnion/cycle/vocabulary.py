@@ -11,7 +11,7 @@ import numpy as np
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle.model_measures import watched
-from trunnion.errors import Finding, MechanismError
+from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.curves import MOTIONS
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
@@ -72,15 +72,12 @@ class Vocabulary:
 
     def data(self) -> dict[str, Any]:
         """For JSON: null in place of a number that is none."""
-        return {
-            "numbers": [_plain(asdict(one)) for one in self.numbers],
-            "measures": [_plain(asdict(one)) for one in self.measures],
-            "findings": [str(one) for one in self.findings],
-        }
 
+        def row(entry: NamedNumber | NamedMeasure) -> dict[str, Any]:
+            return {**asdict(entry), "value": entry.value if np.isfinite(entry.value) else None}
 
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    return {**row, "value": row["value"] if np.isfinite(row["value"]) else None}
+        rows = {"numbers": list(map(row, self.numbers)), "measures": list(map(row, self.measures))}
+        return {**rows, "findings": list(map(str, self.findings))}
 
 
 @np.errstate(all="ignore")
@@ -109,20 +106,15 @@ def _numbers(mechanism: Mechanism) -> Iterator[NamedNumber]:
     values, names = mechanism.parameters(), mechanism.parameter_set.names
     kinds, shortest = measured(mechanism, mechanism.parameter_set.entries.values()), dict[str, str]()
     for ending, paths in names.endings.items():
-        if len(paths) == 1 and len(ending) < len(shortest.get(paths[0], paths[0])) and _means(mechanism, ending, paths):
-            shortest[paths[0]] = ending
+        path = paths[0]
+        if len(paths) == 1 and len(ending) < len(shortest.get(path, path)) and mechanism.path_of(ending) == path:
+            shortest[path] = ending  # it means this number, and no dimension or whole path
     for path, entry in mechanism.parameter_set.entries.items():
         value = float(np.ravel(primal(values[path]))[0]) if path in values else float("nan")
         place = path.split(".")
         swept = path in values and not (place[0] == "measures" and place[2] in TIMES)
-        name = path.removeprefix("dimensions.")
-        name = shortest.get(path, path) if name == path else name
+        name = path.removeprefix("dimensions.") if place[0] == "dimensions" else shortest.get(path, path)
         yield NamedNumber(name, path, kinds[path].unit, value, str(entry.quantity.source), swept)
-
-
-def _means(mechanism: Mechanism, name: str, paths: list[str]) -> bool:
-    """Whether a name means this number, and no dimension or whole path."""
-    return mechanism.path_of(name) == paths[0]
 
 
 def _others(run: Run) -> Iterator[Measure]:
@@ -149,19 +141,10 @@ def _others(run: Run) -> Iterator[Measure]:
 
 def _at_the_start(run: Run, measures: list[Measure]) -> dict[str, float]:
     """Value of every measure of one number at the start of the cycle, by name; NaN where it has none there."""
-    asked = [one for one in measures if one.single(run.system) and (one.of_motion or not _undetermined(run))]
-    courses = courses_of(run, asked, np.zeros(1), FrictionMethod())[0]
+    open_ = run.determinacy is not None and any(one.severity is Severity.ERROR for one in run.determinacy.findings())
+    single = [one for one in measures if one.single(run.system) and (one.of_motion or not open_)]
+    courses = courses_of(run, single, np.zeros(1), FrictionMethod())[0]
     return {name: float(np.ravel(primal(parts[0]))[0]) for name, parts in courses.items()}
-
-
-def _undetermined(run: Run) -> bool:
-    """Whether the forces are not determined."""
-    try:
-        if run.determinacy is not None:
-            run.determinacy.refuse()
-    except MechanismError:
-        return True
-    return False
 
 
 def _verbs(run: Run, measure: Measure) -> Iterator[str]:

@@ -402,13 +402,9 @@ def within_limits(measure: Measure, figures: Array, least: Array, most: Array) -
 
     least, most: signed deviations from the nominal mechanism.
     """
-    good = ~np.isnan(figures)
-    if measure.lower is not None:
-        good &= least >= measure.lower
-    if measure.upper is not None:
-        good &= most <= measure.upper
-    if measure.at_least is not None:
-        good &= figures >= measure.at_least
-    if measure.at_most is not None:
-        good &= figures <= measure.at_most
-    return np.asarray(good)
+    good = np.asarray(~np.isnan(figures))
+    for number, bound in ((least, measure.lower), (figures, measure.at_least)):
+        good &= True if bound is None else number >= bound
+    for number, bound in ((most, measure.upper), (figures, measure.at_most)):
+        good &= True if bound is None else number <= bound
+    return good

@@ -21,6 +21,7 @@ from trunnion.algebra.course import Accuracy, Courses
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import FIT, ON_GAUSS, POINTS, RATE, linear
+from trunnion.measures.curves import rate
 from trunnion.measures.evaluation import Kernel, lanes_of, picked, step_of
 from trunnion.measures.figures import Panels, Reading, combined, near
 from trunnion.measures.lines import turn
@@ -171,8 +172,8 @@ class Group:
 
         def look(time: Array) -> tuple[Array, NDArray[np.integer]]:
             walk = run.walk(within(run, time))
-            rate = np.asarray(primal(coordinate.rate(walk)), float)
-            return np.broadcast_to(rate, (1, *time.shape)), pose_status(walk, time.shape)
+            speed = np.asarray(primal(rate(coordinate, walk)), float)
+            return np.broadcast_to(speed, (1, *time.shape)), pose_status(walk, time.shape)
 
         knots = np.array([bend.time for bend in run.bends if bend.scan < 0])
         rates = Courses.of(look, breaks_between(run.cycle, knots, *self.span), None, accuracy_of(run.cycle, TURNING))
@@ -200,11 +201,9 @@ class Group:
             return max((float(np.nanmax(part, initial=0.0)) for part in parts), default=0.0)
 
         length, pace = (float(np.ravel(primal(of(run.values)))[0]) for of in (run.system.size, run.system.pace))
-        largest = (
-            0.0 if all(not measure.of.of_forces for measure in self.measures) else run.once("largest force", force)
-        )
-        scales = {measure: Scales(length, pace, largest * measure.of.of_forces) for measure in self.measures}
-        return {one.name: own.floor(one.unit(run.system)) / ROUNDING for one, own in scales.items()}
+        forces = any(measure.of.of_forces for measure in self.measures)
+        scales = Scales(length, pace, run.once("largest force", force) if forces else 0.0)
+        return {measure.name: scales.floor(measure.unit(run.system)) / ROUNDING for measure in self.measures}
 
     @cached_property
     def _sizes(self) -> dict[str, float]:
@@ -335,17 +334,15 @@ class Group:
         reads: dict[str, list[Read]] = {measure.name: [] for measure in self.measures}
         offending, gone = np.zeros((count, panels), bool), np.zeros(count, bool)
         for block in _blocks(count, max(1, self.kernel.at_once // (len(POINTS) * max(1, panels)))):
-            some = picked(values, block) if count > len(block) else values
-            own_edges = _taken(edges, block)
-            low, half = (
-                linear(own_edges, lambda array: array[:, :-1]),
-                linear(own_edges, lambda array: np.diff(array) / 2),
-            )
-            time = _wide(own_edges) if self.at_place else _wide(low) + _wide(half) * (1.0 + POINTS)
-            parts, status, own = self._evaluated(some, time)
+            block_values = picked(values, block) if count > len(block) else values
+            block_edges = _taken(edges, block)
+            low = linear(block_edges, lambda array: array[:, :-1])
+            half = linear(block_edges, lambda array: np.diff(array) / 2)
+            time = _wide(block_edges) if self.at_place else _wide(low) + _wide(half) * (1.0 + POINTS)
+            parts, status, moved_times = self._evaluated(block_values, time)
             nominal, weights = self._nominal(time), _wide(half)
-            if own is not None and not self.at_place:  # how much time of each mechanism the Gauss nodes count
-                weights = linear(own, lambda array: array @ FIT.T @ RATE @ ON_GAUSS)
+            if moved_times is not None and not self.at_place:  # how much time of each mechanism the Gauss nodes count
+                weights = linear(moved_times, lambda array: array @ FIT.T @ RATE @ ON_GAUSS)
             for measure in self.measures:
                 every = self._rows(measure, parts, nominal, time)
                 for lanes in _blocks(len(status), READ):
@@ -353,9 +350,9 @@ class Group:
                     if self.at_place:
                         read = Panels.constant(linear(rows, lambda array: array[..., 0, 0]))
                     else:
-                        sides = [_taken(part, lanes) for part in (low, half, weights)]
+                        start, width, weight = (_taken(part, lanes) for part in (low, half, weights))
                         none = np.zeros((len(lanes), panels), bool)
-                        read = Panels(sides[0], sides[1], linear(rows, lambda array: array @ FIT.T), sides[2], none)
+                        read = Panels(start, width, linear(rows, lambda array: array @ FIT.T), weight, none)
                         offending[block[lanes]] |= self._offending(measure, read, primal(rows), share)
                     gone[block[lanes]] |= np.any(np.isnan(primal(rows)), axis=(0, 2, 3))
                     reads[measure.name].append(self._read(measure, read, np.max(status[lanes], axis=(1, 2)), times))
@@ -484,17 +481,17 @@ class Group:
         accuracy = MARGINS if self.measures[0].wants_margin else MOTION if self.of_motion else OWN
         more = np.array([bend.time for bend in self.bends if self.against])
         for lanes in _blocks(lanes_of(values), ALONE):
-            some, count = picked(values, lanes), len(lanes)
-            lengths = np.ravel(primal(moved(run, some, np.array([cycle.duration])))) / cycle.duration
+            block_values, count = picked(values, lanes), len(lanes)
+            lengths = np.ravel(primal(moved(run, block_values, np.array([cycle.duration])))) / cycle.duration
             ratio, switching = np.broadcast_to(lengths, count), [np.zeros(0)] * count
             if self.bends or not self.of_motion:
                 cycles = [replace(cycle, duration=cycle.duration * float(length)) for length in ratio]
-                switching = bends(Mechanisms(run.system, run.chosen.assembly, some, cycles))
+                switching = bends(Mechanisms(run.system, run.chosen.assembly, block_values, cycles))
             breaks = [
                 breaks_between(cycle, np.concatenate([bend / length, more]), *self.span)
                 for bend, length in zip(switching, ratio, strict=True)
             ]
-            reads += [self._read_alone(course, times) for course in self._courses(some, breaks, accuracy)]
+            reads += [self._read_alone(course, times) for course in self._courses(block_values, breaks, accuracy)]
         return {name: _joined_reads([read[name] for read in reads]) for name in reads[0]}
 
     def own_figures(self, breaks: Array, accuracy: Accuracy) -> dict[str, float]:
@@ -525,12 +522,9 @@ class Group:
         """
 
         def look(lanes: Lanes, time: Array) -> tuple[Array, NDArray[np.integer]]:
-            panels, some = time[:, None], values
-            if len(breaks) == 1:
-                panels = time.reshape(1, 1, -1)
-            else:
-                some = picked(values, lanes)
-            parts, status, _ = self._evaluated(some, panels)
+            alone = len(breaks) == 1
+            panels = time.reshape(1, 1, -1) if alone else time[:, None]
+            parts, status, _ = self._evaluated(values if alone else picked(values, lanes), panels)
             nominal = {} if tuned else self._nominal(panels)
             rows = [np.asarray(self._rows(measure, parts, nominal, panels)) for measure in self.measures]
             numbers = np.concatenate(rows).reshape(-1, *time.shape)

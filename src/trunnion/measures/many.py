@@ -35,13 +35,13 @@ def figures_of(
     """
     figures: dict[str, float] = {}
     gaps = np.zeros((2, 0)) if gaps is None else gaps
-    for ends, some in together(run, measures):
-        kernel = SeatedKernel(run, some, replace(method, margin_up_to=0.0), gaps)
-        group = Group(run, some, ends, run.values, kernel, {})
-        breaks = [bend.time for bend in run.bends if run.seats or matters(bend, some)]
+    for ends, grouped in together(run, measures):
+        kernel = SeatedKernel(run, grouped, replace(method, margin_up_to=0.0), gaps)
+        group = Group(run, grouped, ends, run.values, kernel, {})
+        breaks = [bend.time for bend in run.bends if run.seats or matters(bend, grouped)]
         breaks += [*(seating_of(run, method).breaks if run.seats else ()), *gaps.ravel()]
         motion = MOTION if group.of_motion else Accuracy()
-        accuracy = MARGINS if some[0].wants_margin else SEATED if run.seats else motion
+        accuracy = MARGINS if grouped[0].wants_margin else SEATED if run.seats else motion
         figures |= group.own_figures(np.array(breaks), accuracy)
     return {measure.name: figures[measure.name] for measure in measures}
 

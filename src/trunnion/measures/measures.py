@@ -16,7 +16,6 @@ from pydantic import ValidationError
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.measures import curves
 from trunnion.measures.curves import AXES, CURVES, MOTIONS
 from trunnion.model.checks.measures import check_measure
 from trunnion.model.contact import motions
@@ -169,18 +168,6 @@ class Measure:
         if len(self.of.quantities) == 1 or not self.of_places:
             return self
         return Measure(self.name, "rotation" if system.turns(self.subject) else "slide", self.subject)
-
-    def value(self, walk: Forward) -> Number:
-        """The measure of the motion, m or rad; the turn of a link in space is from where it lies without errors: 0."""
-        return curves.value(self, walk)
-
-    def loads(self, walk: Forward) -> dict[str, Any]:
-        """The unit loads by link: their power is the rate of the measure; see `curves.loads`."""
-        return curves.loads(self, walk)
-
-    def rate(self, walk: Forward) -> Number:
-        """ẏ, by the power of the unit loads."""
-        return curves.rate(self, walk)
 
 
 def coordinate_unit(system: System, values: Values) -> str:

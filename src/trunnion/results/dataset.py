@@ -189,5 +189,5 @@ def with_variables(result: xr.Dataset, variables: Mapping[str, xr.Variable]) -> 
     return result.assign(variables).set_coords(_unit_coordinates(variables))
 
 
-def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> set[str]:
-    return {one.attrs[UNITS_OF_EACH] for one in variables.values() if UNITS_OF_EACH in one.attrs}
+def _unit_coordinates(variables: Mapping[str, xr.Variable]) -> list[str]:
+    return list(dict.fromkeys(one.attrs[UNITS_OF_EACH] for one in variables.values() if UNITS_OF_EACH in one.attrs))

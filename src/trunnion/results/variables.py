@@ -226,10 +226,12 @@ def dataset(
     ideal: CycleMeans | None = None,
     kept: Collection[str] | None = None,
     dtype: str = "float64",
+    more: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
     """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; units: those of
     drivers and springs; kept: variables of every position that it has, all if not given; dtype: of their floats. Where
     that is another than theirs, arrays are taken out of their dict one by one, so that both need not be in memory.
+    more: what it has beside.
     """
     known = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]
@@ -239,4 +241,4 @@ def dataset(
     found |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:
         found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
-    return dataset_of("cycle", found, labels, attributes, along)
+    return dataset_of("cycle", {**found, **(more or {})}, labels, attributes, along)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.errors import Finding, Severity, Status
+from trunnion.measures import curves
 from trunnion.measures.curves import MOTIONS
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
@@ -78,7 +79,7 @@ def _value(run: Run, measure: Measure, time: Array, offsets: dict[str, Array]) -
         value = measure.curve(run.at(time, offsets, FrictionMethod()))[0]
     else:
         walk = forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time)
-        value = measure.value(walk) if measure.kind in MOTIONS else measure.curve(walk)[0]
+        value = curves.value(measure, walk) if measure.kind in MOTIONS else measure.curve(walk)[0]
     return np.broadcast_to(np.asarray(primal(value), float), time.shape)
 
 

@@ -33,6 +33,7 @@ from trunnion.cycle.positions import check_steps
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, MechanismError, Severity, Status
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector, worst_case
+from trunnion.measures import curves
 from trunnion.measures.curves import MOTIONS
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.many import Many
@@ -81,7 +82,7 @@ def plays(system: System, values: Values) -> dict[str, Play]:
 
 def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
     """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
-    loads = measure.loads(walk)
+    loads = curves.loads(measure, walk)
     back = under(walk, loads)
     return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
 
@@ -97,7 +98,7 @@ def by_duals(
     offsets = {path: Dual(0.0, row) for path, row in rows.items()}
     with np.errstate(all="ignore"):
         if measure.kind in MOTIONS:
-            number = measure.value(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+            number = curves.value(measure, forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
         elif measure.of_motion:
             number = measure.curve(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))[0]
         else:
@@ -295,7 +296,7 @@ def _fill(effect: Effect, rates: Array, window: slice) -> None:
     effect.status[window] = status
     for i, measure in enumerate(effect.measures):
         if measure.kind in MOTIONS:
-            value, known, rates[i, window] = measure.value(walk), posed, measure.rate(walk)
+            value, known, rates[i, window] = curves.value(measure, walk), posed, curves.rate(measure, walk)
             loads, others = by_virtual_load(walk, measure, effect.plays), None
             placed = status < Status.NOT_ASSEMBLED
         else:

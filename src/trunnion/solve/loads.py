@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
-from trunnion.algebra.table import look_up
+from trunnion.algebra.spline import look_up
 from trunnion.model.expression import PLACED
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Load

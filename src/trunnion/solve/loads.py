@@ -209,7 +209,7 @@ def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     if load.frame == "link":
         force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
     place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
-    wrench = algebra.load(frame, force, moment, place)
+    wrench = algebra.about(force, moment, place)
     return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
@@ -310,7 +310,7 @@ def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> 
     on = []
     for body, end, sign in ((link, a, 1.0), (other, b, -1.0)):
         pull = tuple(sign * along * part for part in apart)
-        on.append((body, walk.algebra.load(walk.motions[body].frame, pull, walk.algebra.NO_MOMENT, end.place)))
+        on.append((body, walk.algebra.about(pull, walk.algebra.NO_MOMENT, end.place)))
     return LoadAction(on, state.power), state
 
 

@@ -14,7 +14,7 @@ from mechanisms import Array, Data, findings, four_bar, prismatic, revolute, sli
 from mechanisms_space import rssr
 from trunnion import Mechanism, MechanismError
 from trunnion.algebra.dual import Dual, derivative
-from trunnion.algebra.table import look_up
+from trunnion.algebra.spline import look_up
 from trunnion.solve.run import prepare
 
 STEPS = 48

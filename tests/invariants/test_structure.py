@@ -257,7 +257,7 @@ def test_parallelogram_with_a_third_crank() -> None:
 
 def test_rank_of_a_parallelogram_differs_from_the_formula() -> None:
     """Rank of the joints' constraints, taken alone: 1 where Grübler says 0."""
-    from trunnion.structure.mobility import mobility_by_rank
+    from trunnion.structure.decompose import mobility_by_rank
 
     turn = 0.7
     c, s = 0.5 * np.cos(turn), 0.5 * np.sin(turn)
@@ -281,7 +281,7 @@ def test_rank_of_a_parallelogram_differs_from_the_formula() -> None:
 @pytest.mark.parametrize("shift", [0.0, 1e3, 1e5, 1e6])
 def test_rank_far_from_the_origin(shift: float) -> None:
     """Where the drawing has its origin says nothing about mobility."""
-    from trunnion.structure.mobility import mobility_by_rank
+    from trunnion.structure.decompose import mobility_by_rank
 
     result = trunnion.analyse(build(four_bar()), 6)
     joints = {

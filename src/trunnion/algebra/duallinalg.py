@@ -2,15 +2,14 @@
 
 The dual part of a result is its derivative in the direction B. Where there is none, because A is singular or
 eigenvalues are equal (to `EQUAL` of the largest), it is NaN: in that lane and in the columns of the eigenvectors
-concerned. Lanes that NumPy cannot factor are NaN altogether.
+concerned. Lanes that cannot be factored are NaN altogether.
 
 Source: J. R. Magnus and H. Neudecker, Matrix Differential Calculus, Wiley 1988, chapters 8 and 9.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ class Eigen(NamedTuple):
 def transpose(a: Dual | Array) -> Dual:
     """Âᵀ."""
     real, dual = _split(a)
-    return Dual(_t(real), _t(dual))
+    return Dual(real.swapaxes(-1, -2), dual.swapaxes(-1, -2))
 
 
 def matmul(a: Dual | Array, *others: Dual | Array) -> Dual:
@@ -55,7 +54,7 @@ def matmul(a: Dual | Array, *others: Dual | Array) -> Dual:
 def inverse(a: Dual | Array) -> Dual:
     """A⁻¹ − ε A⁻¹ B A⁻¹; NaN where A is singular."""
     real, dual = _split(a)
-    (found,) = _each(np.linalg.inv, real)
+    found = np.linalg.inv(_regular(real))
     return Dual(found, -found @ dual @ found)
 
 
@@ -69,19 +68,12 @@ def solve(a: Dual | Array, b: Dual | Array) -> Dual:
     if b0.ndim < real.ndim:
         found = solve(a, Dual(b0[..., None], b1[..., None]))
         return Dual(found.real[..., 0], found.dual[..., 0])
-    b0, b1 = np.broadcast_arrays(b0, b1)
-    x0 = _solved(real, b0)
-    return Dual(x0, _solved(real, b1 - dual @ x0))
+    real = _regular(real)
+    x0 = np.linalg.solve(real, b0)
+    return Dual(x0, np.linalg.solve(real, b1 - dual @ x0))
 
 
-def _solved(a: Array, b: Array) -> Array:
-    both = np.concatenate([np.broadcast_to(a, (*b.shape[:-2], *a.shape[-2:])), b], axis=-1)
-    n = a.shape[-1]
-    (found,) = _each(lambda rows: np.linalg.solve(rows[..., :n], rows[..., n:]), both)
-    return found
-
-
-# ---- eigenvalues --------------------------------------------------------------------------------------------------
+# ---- eigenvalues ----------------------------------------------------------------------------------------------
 
 
 def eigh(a: Dual | Array) -> Eigen:
@@ -90,10 +82,13 @@ def eigh(a: Dual | Array) -> Eigen:
     With M = Vᵀ B V: λ̇ᵢ = Mᵢᵢ, V̇ = V (F ∘ M), Fᵢⱼ = 1/(λⱼ − λᵢ). NaN for equal eigenvalues.
     """
     real, dual = _split(a)
-    values, vectors = _each(np.linalg.eigh, real)
-    m = _t(vectors) @ _symmetric(dual) @ vectors
+    lost = np.asarray(~np.isfinite(real).all(axis=(-2, -1)))
+    values, vectors = np.linalg.eigh(np.where(lost[..., None, None], np.eye(real.shape[-1]), real))
+    values, vectors = np.where(lost[..., None], np.nan, values), np.where(lost[..., None, None], np.nan, vectors)
+    symmetric = np.tril(dual) + np.tril(dual, -1).swapaxes(-1, -2)
+    m = vectors.swapaxes(-1, -2) @ symmetric @ vectors
     factors = _gaps(values, np.max(np.abs(values), axis=-1))
-    slopes = np.where(np.isnan(factors).any(axis=-2), np.nan, _diagonal(m))
+    slopes = np.where(np.isnan(factors).any(axis=-2), np.nan, np.diagonal(m, axis1=-2, axis2=-1))
     return Eigen(Dual(values, slopes), Dual(vectors, vectors @ (factors * m)))
 
 
@@ -109,39 +104,11 @@ def _split(a: Dual | Array) -> tuple[Array, Array]:
     return both[0], both[1]
 
 
-def _each(factor: Callable[[Array], Any], a: Array) -> tuple[Array, ...]:
-    """Results of a function of NumPy for the whole stack, lane by lane only where it refuses one: that lane is NaN."""
-    try:
-        return _tuple(factor(a))
-    except np.linalg.LinAlgError:
-        lanes = a.reshape(-1, *a.shape[-2:])
-        example = _tuple(factor(np.eye(*a.shape[-2:])))
-        found = [np.full((len(lanes), *one.shape), np.nan) for one in example]
-        for i, lane in enumerate(lanes):
-            try:
-                results = _tuple(factor(lane))
-            except np.linalg.LinAlgError:
-                continue
-            for where, result in zip(found, results, strict=True):
-                where[i] = result
-        return tuple(one.reshape(*a.shape[:-2], *one.shape[1:]) for one in found)
-
-
-def _tuple(found: Any) -> tuple[Array, ...]:
-    return tuple(found) if isinstance(found, tuple) else (found,)
-
-
-def _t(a: Array) -> Array:
-    return np.swapaxes(a, -1, -2)
-
-
-def _diagonal(a: Array) -> Array:
-    return np.diagonal(a, axis1=-2, axis2=-1)
-
-
-def _symmetric(a: Array) -> Array:
-    """The symmetric matrix of a lower triangle."""
-    return np.tril(a) + _t(np.tril(a, -1))
+def _regular(a: Array) -> Array:
+    """The matrices with NaN in place of those that elimination finds singular, which NumPy refuses."""
+    with np.errstate(invalid="ignore"):
+        sign, _ = np.linalg.slogdet(a)
+    return np.where((sign == 0.0)[..., None, None], np.nan, a)
 
 
 def _gaps(values: Array, largest: Array) -> Array:

@@ -17,16 +17,9 @@ from trunnion.algebra.literal import is_zero, plus
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
-    "condition",
-    "cross",
-    "determinant",
-    "dot",
-    "inverse",
-    "quick_inverse",
-    "solve",
-    "solve_and_determinant",
+    "condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "solve_and_determinant",
     "weighted",
-]
+]  # fmt: skip
 
 Vector = tuple[Number, Number]
 Table = NDArray[np.float64]

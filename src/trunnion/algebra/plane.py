@@ -17,40 +17,11 @@ from trunnion.algebra.literal import is_zero, less, plus
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
-    "NO_MOMENT",
-    "NULL",
-    "ORIGIN",
-    "STILL",
-    "ZERO",
-    "ZERO_LOAD",
-    "Frame",
-    "Twist",
-    "Vector2",
-    "Wrench",
-    "about",
-    "acceleration_at",
-    "added",
-    "bracket",
-    "compose",
-    "distance",
-    "line_of",
-    "load",
-    "minus",
-    "moment_at",
-    "moving",
-    "place_of",
-    "point_of",
-    "power",
-    "relative",
-    "rotated",
-    "rotated_moment",
-    "slid",
-    "spin",
-    "times",
-    "turned",
-    "turned_vector",
-    "velocity_at",
-]
+    "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Twist", "Vector2", "Wrench", "about",
+    "acceleration_at", "added", "bracket", "compose", "distance", "line_of", "minus", "moment_at", "moving",
+    "place_of", "point_of", "power", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned",
+    "turned_vector", "velocity_at",
+]  # fmt: skip
 
 Vector2 = tuple[Number, Number]
 
@@ -215,11 +186,6 @@ def about(force: Vector2, moment: Number, place: Vector2) -> Wrench:
     """The wrench of a force at a place and a moment, about the origin."""
     arm = less(literal.times(place[0], force[1]), literal.times(place[1], force[0]))
     return Wrench(force[0], force[1], plus(moment, arm))
-
-
-def load(frame: Frame, force: Vector2, moment: Number, place: Vector2) -> Wrench:
-    """What a force at a place and a moment do to a link: the wrench about the origin, whatever its frame."""
-    return about(force, moment, place)
 
 
 def spin(twist: Twist) -> Number:

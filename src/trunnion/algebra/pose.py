@@ -29,18 +29,9 @@ from trunnion.algebra.vector import (
 )
 
 __all__ = [
-    "adjoint",
-    "compose",
-    "frame",
-    "inverse",
-    "link",
-    "moved_point",
-    "pose",
-    "rotation_and_point",
-    "transform",
-    "turn_x",
-    "turn_z",
-]
+    "adjoint", "compose", "frame", "inverse", "link", "moved_point", "pose", "rotation_and_point", "transform",
+    "turn_x", "turn_z",
+]  # fmt: skip
 
 
 def turn_z(angle: Number) -> Matrix3:

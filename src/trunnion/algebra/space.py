@@ -17,39 +17,11 @@ from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.vector import IDENTITY, Vector3, cross, dot, plus, scaled, transpose
 
 __all__ = [
-    "NO_MOMENT",
-    "NULL",
-    "ORIGIN",
-    "STILL",
-    "ZERO",
-    "ZERO_LOAD",
-    "Frame",
-    "Screw",
-    "about",
-    "added",
-    "bracket",
-    "compose",
-    "distance",
-    "element",
-    "line_of",
-    "load",
-    "minus",
-    "moment_at",
-    "moving",
-    "place_of",
-    "point_of",
-    "power",
-    "quaternion",
-    "relative",
-    "rotated",
-    "rotated_moment",
-    "slid",
-    "spin",
-    "times",
-    "turned",
-    "vector_minus",
+    "NO_MOMENT", "NULL", "ORIGIN", "STILL", "ZERO", "ZERO_LOAD", "Frame", "Screw", "about", "added", "bracket",
+    "compose", "distance", "element", "line_of", "minus", "moment_at", "moving", "place_of", "point_of", "power",
+    "quaternion", "relative", "rotated", "rotated_moment", "slid", "spin", "times", "turned", "vector_minus",
     "velocity_at",
-]
+]  # fmt: skip
 
 
 class Frame(NamedTuple):
@@ -229,11 +201,6 @@ def moment_at(a: Screw, place: Vector3) -> Vector3:
 
 
 velocity_at = moment_at  # the same of a twist
-
-
-def load(frame: Frame, force: Vector3, moment: Vector3, place: Vector3) -> Screw:
-    """What a force at a place and a moment do to a link: the wrench about the origin, whatever its frame."""
-    return about(force, moment, place)
 
 
 def spin(twist: Screw) -> Number:

@@ -1,9 +1,10 @@
-"""Cubic splines through points: twice continuously differentiable, on any number, ends at rest, free or periodic."""
+"""Numbers between points: cubic splines, and the values of a table, linear or by a spline; on any number."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -12,20 +13,24 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 
-__all__ = ["Ends", "Spline", "spline"]
+__all__ = ["Ends", "Spline", "look_up", "spline"]
 
 Ends = Literal["clamped", "natural", "periodic"]
+STRAIGHT = 0.0  # coefficient of a power that a straight line does not have
+SLACK = 1e-9  # of the table's extent: a cycle that ends where the table does is inside, whatever the rounding
 
 
 class Spline(NamedTuple):
-    """A spline by its knots with value and slope there; beyond its ends the last cubic goes on.
+    """A cubic of each interval between knots, with values and slopes there; beyond the ends the first and last go on.
 
-    table: knot, value, slope and the coefficients of x² and x³ of every interval, if all numbers are plain.
+    rows: knot, and value, slope and coefficients of x² and x³ there, of every interval; table: the same as an array,
+    (number, interval), if all numbers are plain.
     """
 
-    knots: tuple[Number, ...]
-    values: tuple[Number, ...]
-    slopes: tuple[Number, ...]
+    knots: Sequence[Number]
+    values: Sequence[Number]
+    slopes: Sequence[Number]
+    rows: Sequence[Sequence[Number]]
     table: NDArray[np.float64] | None = None
 
     def at(self, place: Number) -> tuple[Number, Number, Number]:
@@ -35,33 +40,20 @@ class Spline(NamedTuple):
         return value + x * (slope + x * (c2 + x * c3)), slope + x * (2 * c2 + 3 * x * c3), 2 * c2 + 6 * x * c3
 
     def _interval(self, place: Number) -> Sequence[Number]:
-        """The row of the table for the interval in which each place lies."""
+        """The row of the interval in which each place lies."""
         if self.table is not None:
             index = np.searchsorted(self.table[0], primal(place), side="right") - 1
             return [namespace(index).take(row, np.maximum(index, 0)) for row in self.table]
-        found = self._row(0)
-        xp = namespace(place, *self.knots, *self.values)
-        for k in range(1, len(self.knots) - 1):
-            beyond = primal(place) >= primal(self.knots[k])
-            found = [xp.where(beyond, new, old) for new, old in zip(self._row(k), found, strict=True)]
-        return found
-
-    def _row(self, k: int) -> list[Number]:
-        """Knot, value, slope and the coefficients of x² and x³, x counted from the knot, of one interval."""
-        h = self.knots[k + 1] - self.knots[k]
-        mean = (self.values[k + 1] - self.values[k]) / h
-        here, there = self.slopes[k], self.slopes[k + 1]
-        return [
-            self.knots[k],
-            self.values[k],
-            here,
-            (3 * mean - 2 * here - there) / h,
-            (here + there - 2 * mean) / (h * h),
-        ]
+        row = list(self.rows[0])
+        xp = namespace(place, *(number for numbers in self.rows for number in numbers))
+        for later in self.rows[1:]:
+            beyond = primal(place) >= primal(later[0])
+            row = [old if new is old else xp.where(beyond, new, old) for new, old in zip(later, row, strict=True)]
+        return row
 
 
 def spline(knots: Sequence[Number], values: Sequence[Number], ends: Ends) -> Spline:
-    """The spline through at least two points, three if periodic.
+    """The twice continuously differentiable spline through at least two points, three if periodic.
 
     ends: clamped has slope 0 there, natural no curvature, periodic the same slope and curvature at both (its
     values may differ: it then advances by their difference every period).
@@ -69,34 +61,67 @@ def spline(knots: Sequence[Number], values: Sequence[Number], ends: Ends) -> Spl
     derivative, h = distance of the knots, d = slope of the chord, m = slope of the spline:
     m₋/h₋ + 2 m (1/h₋ + 1/h₊) + m₊/h₊ = 3 (d₋/h₋ + d₊/h₊).
     """
+    return _through(knots, values, ends)
+
+
+def look_up(
+    knots: Sequence[Number], values: Sequence[Number], place: Number, smooth: bool = False, periodic: bool = False
+) -> Number:
+    """The value at a place: NaN outside a table that is not periodic; knots must rise.
+
+    smooth: by the natural or periodic cubic spline, not linear. A periodic table repeats after its last knot.
+    """
+    low, extent = knots[0], knots[-1] - knots[0]
+    if periodic:
+        place = place - extent * np.floor(primal((place - low) / extent))
+    found = _through(knots, values, ("periodic" if periodic else "natural") if smooth else None).at(place)[0]
+    if periodic:
+        return found
+    beside = primal((place - low) / extent)
+    return namespace(found).where((beside >= -SLACK) & (beside <= 1 + SLACK), found, np.nan)
+
+
+def _through(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:
+    """A spline through points, or straight lines between them; that of plain numbers is kept, with its table."""
     if all(isinstance(number, (int, float)) for number in (*knots, *values)):
         return _plain(tuple(map(float, knots)), tuple(map(float, values)), ends)
     return _fitted(knots, values, ends)
 
 
 @functools.lru_cache(maxsize=64)
-def _plain(knots: tuple[float, ...], values: tuple[float, ...], ends: Ends) -> Spline:
-    """The same for plain numbers, kept, with its table."""
+def _plain(knots: tuple[float, ...], values: tuple[float, ...], ends: Ends | None) -> Spline:
     found = _fitted(knots, values, ends)
-    rows = np.array([found._row(k) for k in range(len(knots) - 1)])
-    return found._replace(table=rows.T.copy())
+    return found._replace(table=np.array(found.rows).T.copy())
 
 
-def _fitted(knots: Sequence[Number], values: Sequence[Number], ends: Ends) -> Spline:
+def _fitted(knots: Sequence[Number], values: Sequence[Number], ends: Ends | None) -> Spline:
+    steps = [after - before for before, after in pairwise(knots)]
+    chords = [(after - before) / h for (before, after), h in zip(pairwise(values), steps, strict=True)]
+    if ends is None:
+        slopes, curved = chords, [(STRAIGHT, STRAIGHT)] * len(chords)
+    else:
+        slopes = _slopes(knots, values, ends)
+        curved = [
+            ((3 * chord - 2 * here - there) / h, (here + there - 2 * chord) / (h * h))
+            for chord, h, (here, there) in zip(chords, steps, pairwise(slopes), strict=True)
+        ]
+    rows = [[*row, *more] for *row, more in zip(knots, values, slopes, curved, strict=False)]
+    return Spline(knots, values, slopes, rows)
+
+
+def _slopes(knots: Sequence[Number], values: Sequence[Number], ends: Ends) -> list[Number]:
+    """Of the spline at its knots."""
     n = len(knots)
     w = [1.0 / (knots[k + 1] - knots[k]) for k in range(n - 1)]  # 1/h
     r = [3 * (values[k + 1] - values[k]) * w[k] * w[k] for k in range(n - 1)]  # 3 d/h
     inner = [2 * (w[k - 1] + w[k]) for k in range(1, n - 1)]
     right = [r[k - 1] + r[k] for k in range(1, n - 1)]
-    slopes: list[Number]
     if ends == "periodic":
         slopes = _cyclic(w, [2 * (w[-1] + w[0]), *inner], [r[-1] + r[0], *right])
-        slopes.append(slopes[0])
-    elif ends == "clamped":
-        slopes = [0.0, *_tridiagonal(w[1:-1], inner, right), 0.0]
-    else:
-        slopes = _tridiagonal(w, [2 * w[0], *inner, 2 * w[-1]], [r[0], *right, r[-1]])
-    return Spline(tuple(knots), tuple(values), tuple(slopes))
+        return [*slopes, slopes[0]]
+    if ends == "clamped":
+        return [0.0, *_tridiagonal(w[1:-1], inner, right), 0.0]
+    return _tridiagonal(w, [2 * w[0], *inner, 2 * w[-1]], [r[0], *right, r[-1]])
 
 
 def _tridiagonal(side: Sequence[Number], main: Sequence[Number], right: Sequence[Number]) -> list[Number]:

@@ -21,8 +21,7 @@ from trunnion.results.sentences import finding_for
 from trunnion.solve.assembly_modes import GroupModes, choices
 from trunnion.solve.forward import Forward, forward
 from trunnion.solve.run import Run, prepare
-from trunnion.structure.decompose import Plan
-from trunnion.structure.mobility import mobility_by_rank
+from trunnion.structure.decompose import Plan, mobility_by_rank
 
 __all__ = ["Check", "GearPair", "check"]
 

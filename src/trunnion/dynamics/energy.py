@@ -30,9 +30,7 @@ def kinetic_energy(walk: Forward) -> Number:
         mass, moment = walk.values[f"links.{link}.mass"], still.inertia_moment(link)
         centre = still.at(link, system.centre(walk.values, link))
         force = tuple(-mass * a for a in centre.acceleration)
-        load = algebra.load(
-            walk.motions[link].frame, force, algebra.NO_MOMENT if moment is None else moment, centre.place
-        )
+        load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
         found = found - 0.5 * algebra.power(load, walk.motions[link].twist)
     return found
 

@@ -131,7 +131,7 @@ class Contact(ABC):
         on: list[tuple[str, Any]] = []
         for link, sign in ((self.body, 1.0), (self.other, -1.0)):
             own = tuple(sign * part for part in force)
-            on.append((link, walk.algebra.load(walk.motions[link].frame, own, walk.algebra.NO_MOMENT, state.place)))
+            on.append((link, walk.algebra.about(own, walk.algebra.NO_MOMENT, state.place)))
         return LoadAction(on, push.normal * state.rate + push.friction * state.slip)
 
 

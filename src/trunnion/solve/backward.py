@@ -213,9 +213,9 @@ def _add_body_loads(back: Backward) -> None:
         mass, moment = walk.values[f"links.{link}.mass"], walk.inertia_moment(link)
         if moment is None and literal.is_zero(mass):
             continue
-        centre, (frame, twist, _) = walk.at(link, system.centre(walk.values, link)), walk.motions[link]
+        centre, twist = walk.at(link, system.centre(walk.values, link)), walk.motions[link].twist
         force = tuple(literal.times(mass, g - a) for g, a in zip(gravity, centre.acceleration, strict=True))
-        load = algebra.load(frame, force, algebra.NO_MOMENT if moment is None else moment, centre.place)
+        load = algebra.about(force, algebra.NO_MOMENT if moment is None else moment, centre.place)
         back.body_power = back.body_power + algebra.power(load, twist)
         back.add(link, load)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.algebra.nested import flat
-from trunnion.algebra.table import look_up
+from trunnion.algebra.spline import look_up
 from trunnion.model.expression import PLACED
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Load
@@ -195,7 +195,7 @@ def _push(stated: Stated, load: Load, path: str) -> LoadAction:
     if load.frame == "link":
         force, moment = algebra.rotated(frame, force), algebra.rotated_moment(frame, moment)
     place = walk.placed(frame, link, load.at) if load.at else algebra.point_of(frame, algebra.NULL)
-    wrench = algebra.load(frame, force, moment, place)
+    wrench = algebra.about(force, moment, place)
     return LoadAction([(link, wrench)], algebra.power(wrench, twist))
 
 
@@ -296,7 +296,7 @@ def _line(walk: Forward, path: str, ends: tuple[str, str], only: str | None) -> 
     on = []
     for body, end, sign in ((link, a, 1.0), (other, b, -1.0)):
         pull = tuple(sign * along * part for part in apart)
-        on.append((body, walk.algebra.load(walk.motions[body].frame, pull, walk.algebra.NO_MOMENT, end.place)))
+        on.append((body, walk.algebra.about(pull, walk.algebra.NO_MOMENT, end.place)))
     return LoadAction(on, state.power), state
 
 

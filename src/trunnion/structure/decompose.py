@@ -10,7 +10,7 @@ work.  [THEORY of the docs, "Structure"; D 17 for the formula]
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +18,10 @@ import numpy as np
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.structure.generic import GEAR, SPIN, Constraint, Generic
+from trunnion.structure.generic import GEAR, SPIN, Constraint, Gears, Generic, Joints, Places, constraints, rank
 from trunnion.structure.graph import components, longest_loop, matching, ordered
 
-__all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "passive"]
+__all__ = ["FREEDOMS", "Module", "Plan", "decompose", "mobility_by_formula", "mobility_by_rank", "passive"]
 
 FREEDOMS = {"planar": 3, "spatial": 6}  # of a free link
 # outer, inner, outer joint of the dyads in closed form, in the plane and in space
@@ -83,6 +83,42 @@ def mobility_by_formula(mechanism: Mechanism) -> int:
     moving = len(mechanism.effective_links) - 1
     held = sum(taken(mechanism, joint) for joint in mechanism.effective_joints)
     return FREEDOMS[mechanism.space] * moving - held - len(mechanism.gears)
+
+
+def mobility_by_rank(
+    links: Sequence[str],
+    ground: str,
+    joints: Joints,
+    places: Places,
+    gears: Gears | None = None,
+    modules: Sequence[Module] = (),
+) -> int:
+    """Freedoms of the links less the rank of the joints' constraints at one position.
+
+    It exceeds Grübler's count where constraints repeat each other, as in a parallelogram with a third crank. modules:
+    all links and joints in the order in which they are determined. One that holds its own links firmly takes from them
+    what it should, unless a later one that does not hangs on it: so few constraints of a row are looked at at once.
+    """
+    gears = gears or {}
+    weak: list[Module] = []
+    needed: set[str] = set()
+    firm = 0
+    for module in reversed(modules):
+        meshed = {name: gears[name] for name in module.gears}
+        spoken = (joint for pair, _ in meshed.values() for joint in pair)
+        held = {name: joints[name] for name in dict.fromkeys((*module.joints, *spoken))}
+        matrix, _ = constraints(module.links, ground, held, places, module.driven, meshed)
+        if needed.isdisjoint(module.links) and rank(matrix) == int(matrix.shape[1]):
+            firm += len(module.driven)
+        else:
+            weak.append(module)
+            needed.update(link for _, sides in held.values() for link in sides)
+    if modules:
+        links = [link for module in weak for link in module.links]
+        joints = {name: joints[name] for module in weak for name in module.joints}
+        gears = {name: gears[name] for module in weak for name in module.gears}
+    matrix, _ = constraints(links, ground, joints, places, gears=gears)
+    return firm + int(matrix.shape[1]) - rank(matrix)
 
 
 def passive(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
@@ -186,11 +222,11 @@ class LinkTable:
         for name, joint in self.joints.items():
             for link in dict.fromkeys(joint.links):
                 self.joints_of.setdefault(link, []).append(name)
-        constraints = [(name, (name, i)) for name in self.joints for i in range(taken(mechanism, name))]
-        constraints += [(joint, (name, GEAR)) for name, gear in mechanism.gears.items() for joint in gear.joints]
-        constraints += [(name, (name, FREEDOMS[mechanism.space])) for name in mechanism.drivers]
+        numbered = [(name, (name, i)) for name in self.joints for i in range(taken(mechanism, name))]
+        numbered += [(joint, (name, GEAR)) for name, gear in mechanism.gears.items() for joint in gear.joints]
+        numbered += [(name, (name, FREEDOMS[mechanism.space])) for name in mechanism.drivers]
         self.links_of: dict[Constraint, list[str]] = {}
-        for name, constraint in constraints:
+        for name, constraint in numbered:
             related = self.links_of.setdefault(constraint, [])
             related += [link for link in dict.fromkeys(self.joints[name].links) if link not in (ground, *related)]
         self.links_of |= {(link, SPIN): [link] for link in spinning}

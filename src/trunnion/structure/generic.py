@@ -25,6 +25,7 @@ Constraint = tuple[str, int]  # of a joint, the number of a freedom it takes; of
 Joints = Mapping[str, tuple[str, tuple[str, str]]]  # kind and links, by name
 Gears = Mapping[str, tuple[tuple[str, str], float]]  # joints and ratio, by name
 Places = Mapping[str, tuple[float, float, float, float]]  # point and direction of the slide (x, y, c, s), by joint
+TURN = np.array([0.0, 0.0, 1.0])  # the constraint that a turn is held
 RANK_TOLERANCE = 1e-9  # of the largest singular value
 SEED = 1916  # of the generic dimensions
 MOST_LINKS = 40  # whose constraints are looked at row by row; of more, rounding and time go beyond what it is worth
@@ -51,29 +52,27 @@ def constraints(
     spread = float(np.max(np.abs(points - middle), initial=0.0)) or 1.0
     rows: list[NDArray[np.float64]] = []
     owners: list[str] = []
+
+    def add(owner: str, *parts: tuple[Sequence[str], NDArray[np.float64]]) -> None:
+        """A row of what the second link of each pair does against the first."""
+        row = np.zeros((len(number), 3))
+        for sides, constraint in parts:
+            for link, sign in zip(sides, (-1.0, 1.0), strict=True):
+                if link in number:
+                    row[number[link]] += sign * constraint
+        rows.append(row)
+        owners.append(owner)
+
     for name, (kind, sides) in joints.items():
         x, y = (np.asarray(places[name][:2]) - middle) / spread
         c, s = places[name][2:]
-        at_x, at_y, turn = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x]), np.array([0.0, 0.0, 1.0])
+        at_x, at_y = np.array([1.0, 0.0, -y]), np.array([0.0, 1.0, x])
         across, along = c * at_y - s * at_x, c * at_x + s * at_y
-        held = [at_x, at_y] if PAIRS[kind].turns else [across, turn]
-        if name in drivers:
-            held.append(turn if PAIRS[kind].turns else along)
-        for constraint in held:
-            row = np.zeros(3 * len(number))
-            for link, sign in zip(sides, (-1.0, 1.0), strict=True):
-                if link in number:
-                    row[3 * number[link] : 3 * number[link] + 3] += sign * constraint
-            rows.append(row)
-            owners.append(name)
+        held = [at_x, at_y, TURN] if PAIRS[kind].turns else [across, TURN, along]
+        for constraint in held[: 3 if name in drivers else 2]:
+            add(name, (sides, constraint))
     for name, (pair, ratio) in (gears or {}).items():
-        row = np.zeros(3 * len(number))
-        for joint, factor in zip(pair, (-ratio, 1.0), strict=True):
-            for link, sign in zip(joints[joint][1], (-1.0, 1.0), strict=True):
-                if link in number:
-                    row[3 * number[link] + 2] += sign * factor
-        rows.append(row)
-        owners.append(name)
+        add(name, (joints[pair[0]][1], -ratio * TURN), (joints[pair[1]][1], TURN))
     return np.array(rows).reshape(len(rows), 3 * len(number)), owners
 
 

@@ -32,7 +32,8 @@ def test_not_assembled_over_part_of_the_turn() -> None:
     out = (q > limit) & (q < 360 - limit)
     status = result["status"].values
     np.testing.assert_array_equal(status == Status.NOT_ASSEMBLED, out)
-    for variable in (*FORCES, "point_position", "point_velocity", "link_angle", "joint_rotation", "condition"):
+    motion = ("point_position", "point_velocity", "link_angle", "joint_rotation", "joint_slide", "condition")
+    for variable in (*FORCES, *motion):
         bad = np.isnan(result[variable].values).any(axis=tuple(range(result[variable].ndim - 1)))
         assert np.all(bad[out]), variable
         assert not np.any(bad[status < Status.NOT_CONVERGED]), variable

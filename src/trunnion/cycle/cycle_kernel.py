@@ -34,7 +34,7 @@ from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.memory import CHUNK
 from trunnion.solve.run import Run
 from trunnion.solve.switches import Mechanisms, accuracy_of, bends, breaks_between
-from trunnion.solve.system import System, Values
+from trunnion.solve.system import Values
 from trunnion.solve.walk_kernel import Figure, WalkKernel
 
 __all__ = ["CycleKernel", "Engine", "Many", "compiles", "kernel_of"]
@@ -238,7 +238,9 @@ class Many:
         parts: Sequence[str] = (),
     ) -> Arrays:
         """Variables by name, and the condition of every module."""
-        arrays = _allocated(self.run.system, shape, {*wanted, "status"}, parts)
+        flat = allocate(self.run.system, shape[0] * shape[1], parts, {*wanted, "status"})
+        arrays = {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
+        arrays[CONDITIONS] = np.zeros((len(self.run.system.plan.modules), *shape))
         kernel = kernel_of(self.run, self.engine, values, time, arrays, method) if self.compiled else None
         if kernel is None:
             self.compiled = False
@@ -268,10 +270,3 @@ class Many:
         with np.errstate(all="ignore"):
             found = Courses.many(look, breaks, lambda sizes: like(self.run, shapes, sizes), accuracy)
         return [CycleCourse(self.run, shapes, one) for one in found]
-
-
-def _allocated(system: System, shape: tuple[int, int], wanted: Collection[str], parts: Sequence[str]) -> Arrays:
-    """Arrays to be filled, (…, mechanism, position)."""
-    flat = allocate(system, shape[0] * shape[1], parts, wanted)
-    found = {name: array.reshape(*array.shape[:-1], *shape) for name, array in flat.items()}
-    return found | {CONDITIONS: np.zeros((len(system.plan.modules), *shape))}

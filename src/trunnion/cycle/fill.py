@@ -39,21 +39,14 @@ Arrays = dict[str, NDArray[np.float64]]
 Into = Mapping[str, Any]  # arrays by name, or what stands for them where a walk is written down
 Vector = Sequence[Number]
 CONDITIONS = "module_condition"  # (module, …, position), beside the variables of a result where somebody asks for it
-FORCES = [
-    *("reaction_force", "reaction_moment", "friction_torque", "friction_force", "friction_moment", "friction_power"),
-    *("drive_effort", "drive_power", "useful_power", "efficiency_instant", "power_residual", "friction_change"),
-    *("friction_residual", "friction_contraction"),
-    *("spring_force", "spring_power", "damping_power", "gear_torque", "gear_force"),
-    *("reaction_force_change", "drive_effort_change", "friction_power_change"),
-    # where the load is not known, neither is the seat
-    *("seat_offset", "seat_beta", "seat_xi", "seat_xi_pin", "end_force", "contact_position"),
-    *("point_error", "link_error", "joint_rotation_error", "joint_slide_error"),
-]
 POSES = [
     *("point_position", "link_angle", "link_position", "link_rotation", "joint_rotation", "joint_slide"),
     *("spring_elongation", "closure_residual", "condition"),
 ]
 RATES = [name for name in results.VARIABLES if name.endswith(("velocity", "acceleration"))]
+# with them what follows from them: of loads that are not known neither the seats are, nor what errors change
+APART = {*POSES, *RATES, "locking_margin", "seat_change", "contact_loss_number"}
+FORCES = [name for name, own in results.VARIABLES.items() if own.dtype is np.float64 and name not in APART]
 AXES = "xyz"
 DIFFERENCES = {
     "point_error": "point_position",

@@ -251,19 +251,18 @@ class Group:
     def _tracked(self, values: Values) -> Number:
         """Times of the nominal mechanism, s, (lane, bend), at which each switches; NaN where it is far off."""
         run, count = self.run, lanes_of(values)
-        plain, slopes = _parts_of(values)
+        plain = {path: primal(value) for path, value in values.items()}
 
         def at(own: Values, time: Array) -> Number:
             return moved(run, own, time)
 
         of = Mechanisms(run.system, run.chosen.assembly, plain, [run.cycle] * count)
         times = tracked(of, self.bends, at)
-        if not slopes:
+        if not any(isinstance(value, Dual) for value in values.values()):
             return times
-        if not any(np.any(slope) for slope in slopes.values()):
+        below, above, step = _sides(run, values, SHORT)
+        if not np.any(step):
             return Dual(times, np.zeros_like(times))
-        step = SHORT * step_of(run, values, count)
-        below, above = ({**plain, **_beside(plain, slopes, sign * step)} for sign in (-1.0, 1.0))
         shifts = shifts_of(of, self.bends, times, at, (below, above))
         return Dual(times, np.divide(shifts, 2 * step, out=np.zeros_like(shifts), where=step > 0))
 
@@ -460,11 +459,10 @@ class Group:
         self, reads: dict[str, Read], values: Values, lanes: Lanes, times: Mapping[str, Array]
     ) -> dict[str, Read]:
         """The same with some mechanisms read of courses of their own; derivatives are differences of them."""
-        plain, slopes = _parts_of(values)
+        plain = {path: primal(value) for path, value in values.items()}
         own = self._of_their_own(picked(plain, lanes), times)
-        if slopes:
-            step = step_of(self.run, values, lanes_of(values))
-            sides = [{**plain, **_beside(plain, slopes, sign * step)} for sign in (-1.0, 1.0)]
+        if any(isinstance(value, Dual) for value in values.values()):
+            *sides, step = _sides(self.run, values, 1.0)
             below, above = (self._of_their_own(picked(side, lanes), {}) for side in sides)
             width = 2 * step[lanes, 0]
             for name, read in own.items():
@@ -540,15 +538,18 @@ class Group:
 # ---- lanes ----------------------------------------------------------------------------------------------------
 
 
-def _parts_of(values: Values) -> tuple[dict[str, Number], dict[str, Array]]:
-    """The numbers of mechanisms without derivatives, and the derivatives of those that have some."""
-    slopes = {path: derivative(value) for path, value in values.items() if isinstance(value, Dual)}
-    return {path: primal(value) for path, value in values.items()}, slopes
+def _sides(run: Run, values: Values, share: float) -> tuple[Values, Values, Array]:
+    """Numbers of mechanisms moved along their derivatives to either side, and by how much, (lane, 1): a share of the
+    step of a difference, 0 without derivatives."""
+    step = share * step_of(run, values, lanes_of(values))
 
+    def beside(sign: float) -> Values:
+        return {
+            path: primal(value) + sign * step * derivative(value) if isinstance(value, Dual) else value
+            for path, value in values.items()
+        }
 
-def _beside(plain: Values, slopes: Mapping[str, Array], step: Array) -> dict[str, Number]:
-    """Numbers moved along their derivatives."""
-    return {path: plain[path] + step * slope for path, slope in slopes.items()}
+    return beside(-1.0), beside(1.0), step
 
 
 def _blocks(count: int, size: int) -> Iterator[Lanes]:

@@ -12,6 +12,8 @@ happens is reported.
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -23,7 +25,7 @@ from trunnion.algebra.namespace import Number, apart, looped
 from trunnion.joints.pairs import Reaction
 from trunnion.solve import continuation
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.solve.friction_problem import Contact, FrictionProblem, added, largest, total
+from trunnion.solve.friction_problem import Contact, FrictionProblem, largest
 
 __all__ = ["Contact", "FrictionMethod", "FrictionProblem", "Settled", "frictionless", "scaled", "settle", "with_own"]
 
@@ -79,7 +81,7 @@ def settle(
 def with_own(contact: Contact, column: list[Reaction]) -> list[Reaction]:
     """What 1 N of friction changes in the reactions of a module, with what the joint itself feels of it."""
     if contact.own is not None:
-        column[contact.joint] = added(column[contact.joint], contact.own)
+        column[contact.joint] = tuple(plus(*both) for both in zip(column[contact.joint], contact.own, strict=True))
     return column
 
 
@@ -181,7 +183,7 @@ def _round(real: FrictionProblem, at: _Iterate, method: FrictionMethod) -> _Iter
     if method.name == "newton":
         rows = real.map_derivative(real.state(at.forces, at.normals))
         forces = _corrected(at.forces, at.gaps, rows)
-        contraction = largest([total([np.abs(entry) for entry in row]) for row in rows])
+        contraction = largest([functools.reduce(operator.add, map(np.abs, row)) for row in rows])
     else:
         forces = real.target(at.normals)
     forces = _chosen(goes_on, forces, at.forces)

@@ -6,6 +6,8 @@ law is proportional to N. So the derivative of the map φ → law(N(R(φ))) has 
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,12 +18,12 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.linalg import weighted
-from trunnion.algebra.literal import is_zero, less, plus, times
+from trunnion.algebra.literal import less, plus, times
 from trunnion.algebra.namespace import Number, apart
 from trunnion.algebra.nested import replaced
 from trunnion.joints.pairs import ContactLoad, Reaction
 
-__all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "added", "largest", "total"]
+__all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "largest"]
 
 
 class Contact(NamedTuple):
@@ -161,27 +163,19 @@ class FrictionProblem:
 
     def reactions(self, forces: Sequence[Number]) -> list[Reaction]:
         """Reactions of all joints under friction forces."""
-        if all(is_zero(force) for force in forces):
-            return list(self.start)
         joints = enumerate(self.start)
         return [Felt(start, [column[k] for column in self.influence]).under(forces) for k, start in joints]
 
     def state(self, forces: Sequence[Number], normals: list[Number] | None = None) -> State:
         """Reactions and normal loads at the contacts under friction forces. normals: where they are known."""
-        frictionless = all(is_zero(force) for force in forces)
-        reactions = [felt.start if frictionless else felt.under(forces) for felt in self.felt]
+        reactions = [felt.under(forces) for felt in self.felt]
         if normals is None:
             normals = [c.load.normal(reaction) for c, reaction in zip(self.contacts, reactions, strict=True)]
         return State(reactions, normals)
 
-    @property
-    def slopes(self) -> list[Number]:
-        """Friction force for each newton of normal load: every law is proportional to it."""
-        return [contact.slope for contact in self.contacts]
-
     def target(self, normals: Sequence[Number]) -> list[Number]:
         """What the laws say for these normal loads."""
-        return [slope * normal for slope, normal in zip(self.slopes, normals, strict=True)]
+        return [contact.slope * normal for contact, normal in zip(self.contacts, normals, strict=True)]
 
     def gaps(self, state: State, forces: Sequence[Number]) -> list[Number]:
         """What the laws say less what the forces are: 0 where they are settled."""
@@ -205,8 +199,8 @@ class FrictionProblem:
     def map_derivative(self, state: State) -> list[list[Number]]:
         """A with A_kl = ∂ law_k / ∂ φ_l."""
         rows = []
-        for contact, felt, slope, *at in zip(self.contacts, self.felt, self.slopes, *state, strict=True):
-            rates = [times(slope, entry) for entry in contact.load.gradient(*at)]
+        for contact, felt, *at in zip(self.contacts, self.felt, *state, strict=True):
+            rates = [times(contact.slope, entry) for entry in contact.load.gradient(*at)]
             rows.append([weighted(rates, column) for column in felt.columns])
         return rows
 
@@ -217,30 +211,12 @@ class FrictionProblem:
         """
         factors = multiples or [1.0] * len(self.contacts)
         rows = [
-            np.abs(factor * slope) * total([contact.load.bound(column) for column in felt.columns])
-            for contact, slope, factor, felt in zip(self.contacts, self.slopes, factors, self.felt, strict=True)
+            np.abs(factor * contact.slope) * functools.reduce(operator.add, map(contact.load.bound, felt.columns))
+            for contact, factor, felt in zip(self.contacts, factors, self.felt, strict=True)
         ]
         return largest(rows)
 
 
-def added(a: Reaction, b: Reaction) -> Reaction:
-    """a + b; a literal zero costs nothing."""
-    return tuple(plus(p, q) for p, q in zip(a, b, strict=True))
-
-
-def total(parts: Sequence[Number]) -> Number:
-    """Sum; of nothing a literal zero. The built-in sum would add the first part to 0."""
-    if not parts:
-        return 0.0
-    found = parts[0]
-    for part in parts[1:]:
-        found = found + part
-    return found
-
-
 def largest(values: Sequence[Number]) -> Number:
     """Largest magnitude, elementwise; NaN if one is NaN."""
-    largest = np.abs(primal(values[0]))
-    for value in values[1:]:
-        largest = np.maximum(largest, np.abs(primal(value)))
-    return largest
+    return functools.reduce(np.maximum, [np.abs(primal(value)) for value in values])

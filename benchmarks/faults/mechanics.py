@@ -322,8 +322,8 @@ _ENGINES = (
     Fault(
         "margin-of-astray-steps",
         "solve/continuation.py",
-        "good = converged(x, residual) & (calm > 0) & near &",
-        "good = converged(x, residual) & (calm > 0) &",
+        "good = (closed > 0) & (determinant > 0) & near &",
+        "good = (closed > 0) & (determinant > 0) &",
         ("tests/invariants/test_continuation.py",),
     ),
     Fault(

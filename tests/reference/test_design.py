@@ -155,30 +155,30 @@ def test_a_driver_between_two_moving_links_has_no_type() -> None:
     """And says so; its range of assembly is that of its own motion."""
     data = model(four_bar())
     data["drivers"] = {"B": {"range": ["60 deg", "70 deg"], "speed": 1.0}}
-    rows = {row.name: row for row in figures.report_figures(Mechanism(**data), 36)}
+    rows = {row.name: row for row in figures.report_figures(Mechanism(**data))}
     assert rows["transmission_angle"].value is None
     assert "B drives two moving links" in rows["transmission_angle"].note
     assert "grashof" not in rows
     assert rows["limits"].aspect
-    assert "transmission_angle" not in {row.name for row in figures.report_figures(build(four_bar()), 36)}
+    assert "transmission_angle" not in {row.name for row in figures.report_figures(build(four_bar()))}
 
 
 def test_design_with_gaps_returns_and_no_mass() -> None:
     """What has no answer is left out: a drive that turns back has no flywheel, a link without mass no balance."""
     gaps = Mechanism(**model(four_bar(2.0, 1.5, 1.5, 4.0)))
-    assert any("counterweight" in row.name for row in figures.report_figures(gaps, 90))
+    assert any("counterweight" in row.name for row in figures.report_figures(gaps))
     data = model(four_bar())
     data["drivers"] = {"A": {"law": "harmonic", "mean": 1.0, "amplitude": 0.7, "period": 0.5}}
     swinging = Mechanism(**data)
     found = figures.design(swinging)
     np.testing.assert_allclose(found.limits, [(0.3, 1.7)], rtol=1e-9)
     assert np.isnan(found.flywheel(0.05))
-    assert "flywheel" not in [row.name for row in figures.report_figures(swinging, 90)]
+    assert "flywheel" not in [row.name for row in figures.report_figures(swinging)]
     bare = model(four_bar(), friction=None)
     for link in bare["links"].values():
         for key in ("mass", "centre", "inertia"):
             link.pop(key, None)
-    assert not any("counterweight" in row.name for row in figures.report_figures(Mechanism(**bare), 90))
+    assert not any("counterweight" in row.name for row in figures.report_figures(Mechanism(**bare)))
 
 
 def test_work_that_cancels_gives_no_efficiency() -> None:

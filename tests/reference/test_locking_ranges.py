@@ -363,7 +363,7 @@ def test_a_mean_is_called_self_locking_only_where_it_holds_all_along(first: floa
     data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
     data["drivers"]["A"]["range"] = [first, last]
     run = prepare(Mechanism(**data))
-    for figures in (report_figures(run, look(run, 30)), summary_of(trunnion.analyse(Mechanism(**data), 30))):
+    for figures in (report_figures(run), summary_of(trunnion.analyse(Mechanism(**data), 30))):
         assert [one.note for one in figures if one.name == "efficiency_reverse" and one.value] == [note]
 
 
@@ -423,7 +423,7 @@ def test_what_masses_hold_is_no_self_locking() -> None:
     data = trunnion.read(EXAMPLES / "durango-fourbar.yaml").model_dump(by_alias=True, exclude_unset=True)
     data["drivers"]["A"]["range"] = [0.0, 0.08]
     mechanism = trunnion.Mechanism(**data).with_friction("off")
-    found = {one.name: one for one in report_figures(prepare(mechanism), trunnion.locking(mechanism, steps=9))}
+    found = {one.name: one for one in report_figures(prepare(mechanism))}
     assert "holding_multiple" not in found
     assert found["efficiency_reverse"].note == "it takes work on the whole; see the ranges of `locking`"
 
@@ -472,12 +472,12 @@ def test_a_return_spring_that_supplies_work_leaves_no_efficiency() -> None:
     data: Data = hoist().model_dump(by_alias=True, exclude_unset=True)
     data["drivers"]["A"]["range"] = [0.2, 1.2]
     bare = prepare(Mechanism(**data))
-    (row,) = [one for one in report_figures(bare, look(bare, 30)) if one.name == "efficiency_reverse"]
+    (row,) = [one for one in report_figures(bare) if one.name == "efficiency_reverse"]
     assert row.value is not None
     data["springs"] = {"back": {"joint": "A", "stiffness": 0.1, "free_angle": 0.0}}
     sprung = Mechanism(**data)
     run = prepare(sprung)
-    (row,) = [one for one in report_figures(run, look(run, 30)) if one.name == "efficiency_reverse"]
+    (row,) = [one for one in report_figures(run) if one.name == "efficiency_reverse"]
     assert (row.value, row.note) == (None, "springs supply work too")
     (told,) = [one for one in trunnion.analyse(sprung, 30).trunnion.findings if one.code == "spring.stores"]
     assert told.figures["stored"] == pytest.approx(0.05 * (1.2**2 - 0.2**2), rel=1e-9)

@@ -164,7 +164,8 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
         low, high = value("within.from"), value("within.to")
         if low >= high:
             yield Finding(f"the band runs from {low:g} to {high:g} (SI)", f"{where}.within", "exchange its ends")
-        up_to = MEASURES[mechanism.measures[name].kind].up_to
+        kind = mechanism.measures[name].kind
+        up_to = MEASURES[kind].up_to if kind else np.inf
         for key in ("at_least", "at_most", "within.to"):
             if value(key) >= up_to:
                 what = f"is {value(key):g}, but this measure is looked for up to {up_to:g} alone"

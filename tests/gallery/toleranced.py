@@ -12,6 +12,7 @@ from gallery.entry import Entry, Outcome
 from gallery.plane import corner, slope
 from gallery.spatial import rocker_of_rssr
 from trunnion.algebra.dual import Dual, derivative
+from trunnion.measures.curves import value
 from trunnion.measures.measures import named
 from trunnion.solve.run import prepare
 
@@ -40,7 +41,7 @@ def shifts(one: Outcome, measure: str) -> dict[str, float]:
     for tolerance in one.mechanism.tolerated():
         values = one.mechanism.parameters(deviations={tolerance.path: Dual(0.0, 1.0)})
         walk = run.solve(run.cycle.times(6)[1:2], values).walk
-        found[tolerance.path] = abs(float(np.ravel(derivative(what.value(walk)))[0])) * tolerance.half_width
+        found[tolerance.path] = abs(float(np.ravel(derivative(value(what, walk)))[0])) * tolerance.half_width
     return found
 
 

@@ -116,6 +116,7 @@ def watched(run: Run, time: Array, method: FrictionMethod, status: NDArray[Any] 
             findings.append(finding_for("measure.contact_lost", f"measures.{measure.name}", at=at, phrases=phrases))
         elif len(gone):
             notes[measure.name] = f"a pin loses contact at {len(gone)} of its {len(places)} positions"
+    values[[one.of.reduced for one in measures]] = np.nan  # a number of the whole cycle
     return Watched(run, measures, values, figures, findings, notes, extremes)
 
 
@@ -192,15 +193,14 @@ def _of_a_cycle(run: Run, name: str) -> Measure:
 
 
 def _values_at(run: Run, measures: Sequence[Measure], time: Array, method: FrictionMethod) -> Array:
-    """The measures, (measure, position), at some times in a row, s; NaN of one that is no number of a
-    position, but of several, or of the whole cycle."""
+    """The measures, (measure, position), at some times in a row, s; NaN of one that has several numbers."""
     values = np.full((len(measures), len(time)), np.nan)
     if not measures:
         return values
     with np.errstate(all="ignore"):
         courses, walk = courses_of(run, measures, time, method)[0], run.walk(time)
     for row, measure in zip(values, measures, strict=True):
-        if len(courses[measure.name]) > 1 or measure.of.reduced:
+        if len(courses[measure.name]) > 1:
             continue
         row[:] = courses[measure.name][0]
         if measure.wants_margin:

@@ -193,9 +193,10 @@ class Reading:
         gone = np.any(np.isnan(primal(panels.coefficients)[..., 0]), axis=0)
         lost = np.any(gone, axis=1)
         figure, least, most, time = self._of_rule(panels)
-        if self.measure.wants_margin:
+        if self.measure.wants_margin and self.measure.rule != "deviation":
             figure = self._to_the_end(panels, figure)
-            least = most = figure - self.nominal
+            known = np.isfinite(primal(figure)) | (primal(figure) != self.nominal)
+            least = most = selected(known, figure - self.nominal, 0.0)
         figure, least, most = (selected(~lost, number, np.nan) for number in (figure, least, most))
         return Figures(figure, least, most, np.where(np.isfinite(primal(figure)), time, np.nan))
 
@@ -233,11 +234,13 @@ class Reading:
         return of(panels.at(time, period))
 
     def _to_the_end(self, panels: Panels, figure: Number) -> Number:
-        """A figure of the locking margin, ∞ where it is of places at which that is not looked for; NaN of a place."""
-        rule = self.measure.rule
-        highest = primal(panels.top(first, -1.0 if rule.endswith("minimum") else 1.0).value)
-        within = (highest < MARGIN * (1 - NARROW)) | (rule == "dwell")
-        return selected(within, figure, np.nan if self.measure.of_place else np.inf)
+        """A figure of the locking margin where it is of places at which that is not looked for: ∞ of an extreme, and
+        of a mean where it is so all along; NaN of others."""
+        rule, end = self.measure.rule, MARGIN * (1 - NARROW)
+        lowest, highest = (primal(panels.top(first, sign).value) for sign in (-1.0, 1.0))
+        within = ((lowest if rule.endswith("minimum") else highest) < end) | (rule == "dwell")
+        beyond = (rule in ("maximum", "largest", "value")) | (lowest >= end) & (rule in ("minimum", "mean", "rms"))
+        return selected(within, figure, np.where(beyond, np.inf, np.nan))
 
     # ---- rules --------------------------------------------------------------------------------------------
 

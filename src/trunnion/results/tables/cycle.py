@@ -128,11 +128,12 @@ def _locking_state(result: xr.Dataset) -> list[Column]:
 
 
 def _measures(result: xr.Dataset) -> list[Column]:
-    """The model's measures that have a number at a position, by their names."""
+    """The model's measures, by their names, but for those that are numbers of the whole cycle alone."""
     names = result["measure"].values if "measure" in result.dims else ()
     return [
         column(result, "measure_value", str(name), (i,))
-        for i, name in enumerate(names) if not np.all(np.isnan(result["measure_value"].values[i]))
+        for i, name in enumerate(names)
+        if np.isnan(result["measure_figure"].values[i]) or not np.all(np.isnan(result["measure_value"].values[i]))
     ]  # fmt: skip
 
 

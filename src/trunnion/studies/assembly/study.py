@@ -1,7 +1,7 @@
 """Whether a mechanism whose joints constrain more than its links have freedoms can be put together as it is built.
 
 Its loops close only if the axes fit exactly. Where they do not, pins lie in their holes as the closure asks: of the
-offsets of their ends the smallest are looked for that close every loop, position by position (`space.cone`).
+offsets of their ends the smallest are looked for that close every loop, position by position (`solve.space.loops`).
 """
 
 from __future__ import annotations

@@ -244,7 +244,7 @@ def _nominal(outcome: Outcome) -> Iterator[Finding]:
         elif code == Status.NEAR_SINGULAR and len(where):
             yield finding_for("tolerance.near_singular", at=dial.intervals(where))
     for of in study.linear.measures:
-        if not np.isfinite(of.reference.figure):
+        if np.isnan(of.reference.figure):
             name = of.measure.name
             if of.measure.in_time:
                 yield finding_for("tolerance.nominal_not_steady", f"measures.{name}", **unfound(study.run, of.measure))

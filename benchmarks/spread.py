@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-
 from trunnion.studies.tolerance.checkpoint import Checkpoint
 from trunnion.studies.tolerance.ranges import union
 from trunnion.studies.tolerance.runner import run

@@ -259,11 +259,6 @@ TOLERANCE = {
         "begin with few samples or points",
     ),
     "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}", quiet=True),
-    "samples.machines": Sentence(
-        NOTE,
-        "the samples were computed on {kinds} kinds of machines, whose sines or logarithms differ in the last bit",
-        "use machines of one kind if results must be reproducible to the last bit",
-    ),
 }
 
 ALLOCATION = {

@@ -21,7 +21,7 @@ from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
-from trunnion.studies.tolerance.sampling import CAUSES
+from trunnion.studies.tolerance.sampled import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed, scatters
 
 if TYPE_CHECKING:

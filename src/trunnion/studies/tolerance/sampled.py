@@ -104,10 +104,10 @@ def _failed(samples: Samples) -> NDArray[np.int64]:
 
 
 def _quantiles(ordered: Array, shares: Array) -> Array:
-    """Quantiles of figures in order; linear between two of them, where both are finite."""
+    """Quantiles of figures in order, of which the k-th stands for the share (k − ½)/n; linear between two of them."""
     if not ordered.size:
         return np.full(shares.shape, np.nan)
-    found = np.quantile(ordered, np.clip(np.nan_to_num(shares), 0.0, 1.0))
+    found = np.quantile(ordered, np.clip(np.nan_to_num(shares), 0.0, 1.0), method="hazen")
     found = np.where(np.isnan(found), _of_rank(ordered, shares), found)
     return np.where(np.isnan(shares), np.nan, found)
 

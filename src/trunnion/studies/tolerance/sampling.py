@@ -36,7 +36,7 @@ BATCHES = 8  # of the kernel in a block, so that what a block costs by itself is
 MOST = 2048  # samples in a block
 MOTIONS = 480  # the same of motions in time, each of which takes as long as a cycle of many positions
 REPLICATES = 8  # independent scramblings, whose spread is the error
-CURVES = 4096  # samples whose curves are kept, for the bands over the cycle
+CURVES = 1 << 22  # numbers of the curves of a measure that are kept, for the bands over the cycle
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,4 +202,5 @@ class Sampler:
     def __call__(self, block: int) -> Part:
         """What is known of the samples of a block."""
         with np.errstate(all="ignore"):
-            return self.figures(self.drawn(block), max(CURVES - block * self.job.block_size, 0))
+            kept = CURVES // self.job.positions
+            return self.figures(self.drawn(block), max(kept - block * self.job.block_size, 0))

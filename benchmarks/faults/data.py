@@ -24,7 +24,7 @@ _STATISTICS = (
     Fault(
         "deviation-by-the-number",
         "statistics/moments.py",
-        "np.sqrt(second * divisor / np.maximum(number - 1, 1.0))",
+        "np.sqrt(second * number / (number - 1))",
         "np.sqrt(second)",
         ("tests/statistics/test_moments.py",),
     ),

@@ -27,20 +27,22 @@ class Moments(NamedTuple):
 
 def moments_of(values: Floats) -> Moments:
     """Moments along the last axis; NaN are left out."""
-    known = ~np.isnan(values)
-    number = np.sum(known, axis=-1, dtype=float)
-    divisor = np.maximum(number, 1.0)
+    rows = np.array([_moments_of(row[~np.isnan(row)]) for row in values.reshape(-1, values.shape[-1])])
+    return Moments(*np.moveaxis(rows.reshape(*values.shape[:-1], len(Moments._fields)), -1, 0))
+
+
+def _moments_of(values: Floats) -> tuple[float, ...]:
+    number = len(values)
+    if not number:
+        return 0.0, np.nan, np.nan, np.nan, np.nan
     with np.errstate(all="ignore"):
-        mean = np.sum(values, axis=-1, where=known) / divisor
-        # with what rounding left in the mean
-        mean = mean + np.nan_to_num(np.sum(values - mean[..., None], axis=-1, where=known) / divisor)
-        apart = np.where(known, values - mean[..., None], 0.0)
+        mean = float(np.mean(values))
+        apart = values - mean
+        if np.isfinite(mean):
+            mean += float(np.mean(apart))  # what rounding left in the mean
+            apart = values - mean
         square = apart * apart
-        second, third, fourth = (np.sum(one, axis=-1) / divisor for one in (square, square * apart, square * square))
-        return Moments(
-            number,
-            np.where(number > 0, mean, np.nan),
-            np.where(number > 1, np.sqrt(second * divisor / np.maximum(number - 1, 1.0)), np.nan),
-            np.where(second > 0, third / second**1.5, np.nan),
-            np.where(second > 0, fourth / second**2, np.nan),
-        )
+        second, third, fourth = (float(np.mean(one)) for one in (square, square * apart, square * square))
+    deviation = np.sqrt(second * number / (number - 1)) if number > 1 else np.nan
+    shape = (third / second**1.5, fourth / second**2) if second > 0 else (np.nan, np.nan)
+    return float(number), mean, float(deviation), *shape

@@ -11,39 +11,21 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from functools import lru_cache, partial
 from itertools import islice
-from typing import Any, Protocol
-
-from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.studies.checkpoint import Checkpoint
+from trunnion.studies.job import DEATHS, Job, Part, undisturbed
 
-__all__ = ["DEATHS", "Job", "Part", "run", "spread", "undisturbed", "work"]
+__all__ = ["run"]
 
-Part = dict[str, NDArray[Any]]  # what a block gives: arrays of numbers by name
 AHEAD = 2  # blocks given to every worker: the one under way and the next
 PAUSE = 0.5  # s; Windows hears Ctrl-C only between two waits
-DEATHS = 3  # workers that die one after another before a block is finished
-
-
-class Job(Protocol):
-    """A task in blocks. It is picklable: it is sent to the workers, and prepared there."""
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks; fixed by the job alone, never by the workers."""
-
-    def identity(self) -> Mapping[str, Any]:
-        """All that the bits of the answer depend on, as JSON or NumPy's `tolist` writes it: model, seed, …"""
-
-    def prepare(self) -> Callable[[int], Part]:
-        """What works out a block by its number; called once in every process."""
 
 
 def run(
@@ -95,7 +77,7 @@ def _worked(job: Job, blocks: list[int], jobs: int, threads: bool, cluster: str 
         from trunnion.studies.cluster import connected  # its package is an extra
 
         with connected(cluster, workers) as (executor, count):
-            yield from spread(partial(work, pickle.dumps(job)), blocks, executor, count)
+            yield from _spread(partial(_work, pickle.dumps(job)), blocks, executor, count)
     elif workers <= 1:
         part_of = job.prepare() if blocks else None
         for block in blocks:
@@ -103,12 +85,12 @@ def _worked(job: Job, blocks: list[int], jobs: int, threads: bool, cluster: str 
             yield block, part_of(block)
     elif threads:
         with ThreadPoolExecutor(workers) as executor:
-            yield from spread(job.prepare(), blocks, executor, workers)
+            yield from _spread(job.prepare(), blocks, executor, workers)
     else:
         yield from _by_processes(job, blocks, workers)
 
 
-def spread(
+def _spread(
     part_of: Callable[[int], Part], blocks: Iterable[int], executor: Executor, workers: int
 ) -> Iterator[tuple[int, Part]]:
     """Blocks with their parts as an executor finishes them; a few are under way at a time."""
@@ -136,7 +118,7 @@ def _by_processes(job: Job, blocks: Iterable[int], workers: int) -> Iterator[tup
     while left:
         with _pool(workers) as pool:
             try:
-                for block, part in spread(partial(work, packed), list(left), pool, workers):
+                for block, part in _spread(partial(_work, packed), list(left), pool, workers):
                     del left[block]
                     deaths = 0
                     yield block, part
@@ -176,7 +158,7 @@ def _follow() -> None:
         os._exit(1)
 
 
-def work(packed: bytes, block: int) -> Part:
+def _work(packed: bytes, block: int) -> Part:
     """In a worker: the part of a block of a pickled job, which is prepared once."""
     return _prepared(packed)(block)
 
@@ -185,16 +167,3 @@ def work(packed: bytes, block: int) -> Part:
 def _prepared(packed: bytes) -> Callable[[int], Part]:
     job: Job = pickle.loads(packed)
     return job.prepare()
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Processes and threads started inside never hear Ctrl-C: they inherit that it is blocked (not on Windows)."""
-    if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover - Windows: a worker ignores it once it runs
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

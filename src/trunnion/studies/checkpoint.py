@@ -24,7 +24,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
-    from trunnion.studies.batch import Job, Part
+    from trunnion.studies.job import Job, Part
 
 __all__ = ["Checkpoint", "settings"]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.batch import DEATHS, undisturbed
+from trunnion.studies.job import DEATHS, undisturbed
 from trunnion.version import __version__
 
 try:

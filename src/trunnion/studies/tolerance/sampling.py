@@ -22,7 +22,7 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.studies.batch import Part
+from trunnion.studies.job import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import batch_of, many_of
 

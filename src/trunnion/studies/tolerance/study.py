@@ -95,6 +95,7 @@ def tolerance(
             kept = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
             raise KeyboardInterrupt(*kept) from None
         drawn = job.joined(parts)
+        del parts  # as large as the samples
         notes += [*chosen, *trouble]
     if "sobol" in methods:
         own = found.sampling("quasi-monte-carlo", samples, seed, _engine(found, stated, samples, cluster=None)[0])

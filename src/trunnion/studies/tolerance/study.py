@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -29,7 +29,7 @@ from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "Method", "tolerance"]
 
-Method = Literal["linear", "rss", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
+Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
 MOST_SAMPLES = 10**8  # whose figures are kept, 9 bytes a measure
@@ -72,7 +72,7 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
-    (methods, notes), stated = _known(methods), engine
+    methods, notes, stated = tuple(dict.fromkeys(methods)), list[Finding](), engine
     _check(methods, samples, seed, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
@@ -102,13 +102,6 @@ def tolerance(
         own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
         shares = indices(own.prepare(), samples, seed)
     return dataset(Outcome(found, tuple(methods), worst, drawn, shares, target), [*found.told, *notes])
-
-
-def _known(methods: Sequence[Method]) -> tuple[tuple[Method, ...], list[Finding]]:
-    """The methods by their own names, and a note of another that was used."""
-    notes = [finding_for("tolerance.method_alias", "method", method="linear")] if "rss" in methods else []
-    names: Iterator[Method] = ("linear" if method == "rss" else method for method in methods)
-    return tuple(dict.fromkeys(names)), notes
 
 
 def _engine(found: ToleranceStudy, engine: Engine, samples: int, cluster: str | None) -> tuple[Engine, list[Finding]]:

@@ -31,7 +31,6 @@ from benchmarks.side import version
 from trunnion.dynamics.batch import figures_in_time
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
-from trunnion.studies.tolerance import runner
 from trunnion.studies.tolerance.first_order import study
 
 DURATION, TOLERANCE = 1.0, 1e-9
@@ -129,7 +128,7 @@ def many(console: Console, samples: int, plain: float) -> None:
     job = study(mechanism).sampling("monte-carlo", samples, 1)
     for jobs in (1, 2):
         start = time.perf_counter()
-        runner.run(job, jobs=jobs)
+        run(job, jobs=jobs)
         wall = time.perf_counter() - start
         table.add_row(f"{samples} samples, {jobs} process{'es' if jobs > 1 else ''}", "", "", f"{wall:.1f}")
     console.print(table)

@@ -25,7 +25,7 @@ import trunnion
 from benchmarks import durango as d
 from benchmarks.run import peak_memory
 from trunnion.model.mechanism import Mechanism
-from trunnion.studies.tolerance import runner
+from trunnion.studies.batch import run
 from trunnion.studies.tolerance.first_order import ToleranceStudy, study
 from trunnion.studies.tolerance.sampling import Method, Sampling
 
@@ -33,7 +33,6 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 LIMITS = {"AB": "±1 mm", "BC": "±1 mm", "CD": "±1 mm", "AD": "±1 mm"}
 BOTH = ("angle:rocker", "effort:A")
 MOST_SAMPLES = 10_000_000
-PART = 300_000  # samples of the largest run that are really worked out
 
 
 def fourbar(friction: bool = True) -> Mechanism:
@@ -71,44 +70,13 @@ def workers(console: Console, samples: int) -> None:
     shown = table(f"{samples:,} samples × 360 positions, angle and torque with friction", "jobs", "s", "µs/config", "×")
     first = math.nan
     for jobs in dict.fromkeys((1, 2, os.cpu_count() or 1)):
-        seconds = spent(lambda jobs=jobs: runner.run(job, jobs=jobs))
+        seconds = spent(lambda jobs=jobs: run(job, jobs=jobs))
         first = seconds if jobs == 1 else first
         shown.add_row(str(jobs), f"{seconds:.2f}", f"{seconds / samples / 360 * 1e6:.3f}", f"{first / seconds:.2f}")
     console.print(shown)
 
 
 # ---- memory ---------------------------------------------------------------------------------------------------
-
-
-def alone(samples: int, steps: int, part: int) -> None:
-    """In a fresh process: seconds and peak memory of a run, of which a part is worked out; printed as JSON."""
-    found = study(fourbar(), BOTH, steps=steps)
-    job = sampling(found, samples)
-    sampler = found.sampler(job)
-    blocks = min(job.blocks, math.ceil(part / job.block_size))
-    tally = job.empty()
-    start = time.perf_counter()
-    step = max(1, blocks // 20)
-    for low in range(0, blocks, step):
-        tally = tally.merge(sampler.evaluate(low, min(low + step, blocks)))
-    seconds = time.perf_counter() - start
-    done = min(samples, blocks * job.block_size)
-    size = sum(array.nbytes for array in tally.to_arrays().values())
-    print(json.dumps({"seconds": seconds, "done": done, "bytes": peak_memory(), "tally": size}))
-
-
-def memory(console: Console) -> None:
-    """Peak memory of one process with the number of samples; the largest run in part, its time extrapolated."""
-    shown = table(
-        "One process: angle and torque with friction", "samples × positions", "worked out", "s, all", "MB", "tally, MB"
-    )
-    for samples, steps in ((10_000, 360), (100_000, 360), (MOST_SAMPLES, 36)):
-        command = [sys.executable, "-m", "benchmarks.tolerances", "--alone", str(samples), str(steps), str(PART)]
-        told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1])
-        whole = told["seconds"] * samples / told["done"]
-        row = (f"{samples:,} × {steps}", f"{told['done']:,}", f"{whole:.1f}", f"{told['bytes'] / 1e6:.0f}")
-        shown.add_row(*row, f"{told['tally'] / 1e6:.2f}")
-    console.print(shown)
 
 
 def whole(samples: int) -> None:
@@ -165,9 +133,9 @@ def peer(console: Console) -> None:
         found = study(mechanism, measures, steps=steps)
         for engine in ("numpy", "compiled"):
             job = found.sampling("monte-carlo", samples, 1, engine)
-            sampler = found.sampler(job)
-            sampler.evaluate(0, 1)
-            best = min(spent(lambda: sampler.evaluate(0, job.blocks)) for _ in range(3))  # noqa: B023
+            sampler = job.prepare()
+            sampler(0)
+            best = min(spent(lambda: [sampler(block) for block in range(job.blocks)]) for _ in range(3))  # noqa: B023
             rows.append((f"{label}, {engine}", best / samples / steps))
     shown = table("One process, 360 positions: against the peer", "study", "µs/config", "peer/this")
     for label, one in rows:
@@ -186,17 +154,8 @@ def accuracy(console: Console) -> None:
 
     def figures(method: Method, samples: int, seed: int) -> tuple[float, float, float]:
         job = sampling(found, samples, method, seed)
-        tally = found.sampler(job).evaluate(0, job.blocks)
-        total = tally.trees[0].total()
-        assert total is not None
-        for tree in tally.trees[1:]:
-            other = tree.total()
-            assert other is not None
-            total = total.merged(other)
-        sigma, mean = float(total.deviation[0]), float(total.mean[0])
-        from trunnion.statistics.histogram import quantile
-
-        return mean, sigma, float(quantile(np.sum(tally.histogram, axis=0), job.bins, 0.99)[0])
+        (figure,) = job.joined(run(job)[0]).figure
+        return float(np.mean(figure)), float(np.std(figure, ddof=1)), float(np.quantile(figure, 0.99))
 
     exact = np.mean([figures("quasi-monte-carlo", 1 << 20, 1000 + seed) for seed in range(2)], axis=0)
     shown = table(
@@ -220,7 +179,6 @@ def accuracy(console: Console) -> None:
 
 PARTS: dict[str, Callable[[Console], None]] = {
     "workers": lambda console: workers(console, 100_000),
-    "memory": memory,
     "growth": growth,
     "peer": peer,
     "accuracy": accuracy,
@@ -230,14 +188,10 @@ PARTS: dict[str, Callable[[Console], None]] = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="all if none is named")
-    parser.add_argument("--alone", nargs=3, type=int, metavar=("SAMPLES", "STEPS", "PART"), help=argparse.SUPPRESS)
     parser.add_argument("--whole", type=int, metavar="SAMPLES", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.whole:
         whole(options.whole)
-        return
-    if options.alone:
-        alone(*options.alone)
         return
     console = Console(width=120)
     console.print(

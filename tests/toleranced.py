@@ -205,10 +205,9 @@ def many(mechanism: Mechanism, samples: int = 512, **options: Any) -> tuple[Tole
 
 def sampler(found: ToleranceStudy, samples: int = 512, method: Any = "monte-carlo", seed: int = 1) -> Sampler:
     """What draws samples of a study, without the first order that a run of it starts with."""
-    unknown = [(np.zeros(1), np.ones(1))] * len(found.measures)
     job = Sampling(
         found.run.system.mechanism.data(), found.measures, found.steps, method, samples, seed, "numpy", found.friction,
-        len(found.plan.times), ((0.0, 1.0),) * len(found.measures), tuple(unknown),
+        len(found.plan.times),
     )  # fmt: skip
     return job.prepare()
 

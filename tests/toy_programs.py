@@ -18,14 +18,16 @@ POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 SCRIPT = """
 import sys
 from toy_job import ToyJob
-from trunnion.studies.tolerance.runner import run
+from trunnion.studies.batch import run
 
 if __name__ == "__main__":
     job = ToyJob(blocks=400, pause=0.02)
-    tell = lambda samples: print(samples, flush=True)
+    tell = lambda share: print(share, flush=True)
     jobs, cluster, path = int(sys.argv[1]), sys.argv[2] or None, sys.argv[3]
-    done = run(job, jobs=jobs, chunk=500, cluster=cluster, checkpoint=path, progress=tell)
-    print("stopped" if done.stopped else "whole", done.tally.blocks[0][0] == 0)
+    try:
+        run(job, jobs=jobs, cluster=cluster, checkpoint=path, progress=tell)
+    except KeyboardInterrupt:
+        print("stopped")
 """
 
 
@@ -33,7 +35,7 @@ def interrupted(folder: Path, jobs: int, cluster: str) -> tuple[list[str], str]:
     """Lines and complaints of a program that is sent a Ctrl-C, with all its processes, in mid-run."""
     script = folder / "script.py"
     script.write_text(SCRIPT)
-    command = [sys.executable, "-W", "error", str(script), str(jobs), cluster, str(folder / "run.npz")]
+    command = [sys.executable, "-W", "error", str(script), str(jobs), cluster, str(folder / "run.trn")]
     pipe = subprocess.PIPE
     with subprocess.Popen(
         command, stdout=pipe, stderr=pipe, text=True, env=ENVIRONMENT, start_new_session=True

@@ -22,11 +22,18 @@ _STATISTICS = (
         ("tests/statistics",),
     ),
     Fault(
-        "merged-third-moment-sign",
-        "statistics/tally.py",
-        "3 * (rest * other.M2 - part * self.M2)",
-        "3 * (rest * other.M2 + part * self.M2)",
-        ("tests/statistics/test_tally.py",),
+        "deviation-by-the-number",
+        "statistics/moments.py",
+        "np.sqrt(second * number / (number - 1))",
+        "np.sqrt(second)",
+        ("tests/statistics/test_moments.py",),
+    ),
+    Fault(
+        "damaged-block-is-taken",
+        "studies/checkpoint.py",
+        "or zlib.crc32(raw) != check",
+        "",
+        ("tests/tolerance/test_checkpoint.py",),
     ),
     Fault(
         "cost-slope-unit-dropped",

@@ -124,7 +124,7 @@ def test_what_is_made_of_the_model_needs_the_file_no_more(tmp_path: Path) -> Non
     assert np.ptp(swept["drive_effort_rms"].values) > 0
     assert Mechanism(**mechanism.data()) == mechanism
     varied = Mechanism(**{**mechanism.data(), "tolerances": {"r": "±0.1 mm"}})
-    options = {"methods": ("monte-carlo",), "samples": 40, "steps": 12, "chunk": 20}
+    options = {"methods": ("monte-carlo",), "samples": 40, "steps": 12}
     one, two = (trunnion.tolerance(varied, ["maximum:effort:O"], jobs=jobs, **options) for jobs in (1, 2))
     np.testing.assert_array_equal(one["mean"], two["mean"])
     mechanism.write(tmp_path / "copy.yaml")

@@ -207,9 +207,7 @@ def test_kept_code_of_another_law_is_not_taken(monkeypatch: pytest.MonkeyPatch, 
 def test_samples_are_the_same_by_any_number_of_threads() -> None:
     mechanism = trunnion.read(EXAMPLES / "toleranced-fourbar.yaml")
     one, other = (
-        trunnion.tolerance(
-            mechanism, methods=["monte-carlo"], samples=9000, steps=30, engine="compiled", jobs=jobs, chunk=2048
-        )
+        trunnion.tolerance(mechanism, methods=["monte-carlo"], samples=9000, steps=30, engine="compiled", jobs=jobs)
         for jobs in (1, 3)
     )
     assert {"engine", "mean", "histogram"} <= {*one.attrs, *one.data_vars}

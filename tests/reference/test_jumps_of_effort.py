@@ -166,7 +166,7 @@ def test_a_jump_above_the_top_of_a_sample_is_met() -> None:
     found = study(model, ["maximum:effort:O"], steps=180)
     known, batch = found.references["maximum:effort:O"], sampler(found)
     u = np.array([[0.01, 0.3, 0.5, 0.7, 0.99]])
-    figures, wide = batch.figures(u)[0][0], np.ravel(batch.inputs.values(u)["dimensions.wide"])
+    figures, wide = batch.figures(u)["figure"][0], np.ravel(batch.inputs.values(u)["dimensions.wide"])
     tops = []
     for i in range(u.shape[1]):
         run = prepare(alone(model, batch.inputs.values(u), i))

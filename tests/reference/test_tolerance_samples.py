@@ -45,7 +45,7 @@ def normal(width: float) -> Law:
 
 def figures(mechanism: Mechanism, u: Array, **options: Any) -> Array:
     """Of the first measure."""
-    return sampler(study(mechanism, **options)).figures(u)[0][0]
+    return sampler(study(mechanism, **options)).figures(u)["figure"][0]
 
 
 # ---- sample by sample -----------------------------------------------------------------------------------------

@@ -97,7 +97,8 @@ def test_batches_against_mechanisms_of_their_own(name: str) -> None:
     found = study(mechanism, measures_of(prepare(mechanism)), STEPS)
     batch = sampler(found)
     u = uniforms(11, 0, batch.inputs.dims, 2)
-    figures, _, _, status = batch.figures(u)
+    part = batch.figures(u)
+    figures, status = part["figure"], part["status"]
     values = batch.inputs.values(u)
     measures = found.measures
     seen = 0
@@ -161,7 +162,7 @@ def test_derivatives_against_samples(name: str) -> None:
     shares = 0.5 + 1e-3 * np.eye(count)  # a number alone, to either side by a thousandth of its limits
     u = np.concatenate([shares, 1 - shares], axis=1)
     moves = np.array([np.ravel(batch.inputs.values(u)[one.path]) - one.nominal for one in found.inputs.tolerances])
-    figures = batch.figures(u)[0]
+    figures = batch.figures(u)["figure"]
     assert np.max(np.abs(moves)) > 0
     for k, of in enumerate(found.linear.measures):
         for i in range(count):

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mechanisms_parts import prismatic, revolute, slide
+from mechanisms_parts import prismatic, slide
 from toleranced import clutch, rssr, slider_crank
 from trunnion import Mechanism, save, tolerance
 from trunnion.results.dataset import units_along
@@ -172,35 +172,6 @@ def test_tolerances_of_what_no_model_may_have(
     assert [(code, where) for code, where, _ in told] == [(code, where) for code, where, _ in expected]
     for (_, _, own), (_, _, reached) in zip(told, expected, strict=True):
         assert own["least" if reached < 0 else "value"] == pytest.approx(reached, abs=1e-12)
-
-
-@pytest.mark.parametrize(("swing", "load", "pressed"), [(40, -10.0, True), (100, -10.0, False), (40, 0.0, False)])
-def test_pins_that_are_pressed_to_one_side_throughout_are_told(swing: int, load: float, pressed: bool) -> None:
-    """A weight on a lever, whose hole turns with it: to either side of the mean by half of what the lever swings."""
-    model = Mechanism(
-        trunnion=1,
-        links={"ground": {"points": {"A": [0, 0]}}, "lever": {"points": {"A": [0, 0], "P": [1, 0]}}},
-        joints={"A": {**revolute("ground", "lever"), "pin": {"clearance": 1e-4}}},
-        drivers={"A": {"speed": 1.0, "range": ["0 deg", f"{swing} deg"]}},
-        loads={"weight": {"link": "lever", "at": "P", "force": [0, load]}},
-    )
-    found = tolerance(model, ["lever.P.y"], methods=("linear",), steps=12).trunnion.findings
-    told = [one for one in found if one.code == "tolerance.pressed"]
-    assert [one.figures["joints"] for one in told] == ([["A"]] if pressed else [])
-    assert all("one side of their holes, at every position;" in one.what for one in told)
-
-
-def test_where_pins_are_pressed_that_a_load_presses_for_a_part_of_the_way_is_told() -> None:
-    model = Mechanism(
-        trunnion=1,
-        links={"ground": {"points": {"A": [0, 0]}}, "lever": {"points": {"A": [0, 0], "P": [1, 0]}}},
-        joints={"A": {**revolute("ground", "lever"), "pin": {"clearance": 1e-4}}},
-        drivers={"A": {"speed": 1.0, "range": ["0 deg", "40 deg"]}},
-        loads={"weight": {"link": "lever", "at": "P", "force": [0, "-10 N * between(drive, 10 deg, 20 deg)"]}},
-    )
-    found = tolerance(model, ["lever.P.y"], methods=("linear",), steps=12).trunnion.findings
-    (told,) = [one for one in found if one.code == "tolerance.pressed"]
-    assert "one side of their holes, wherever they are loaded: between 10" in told.what
 
 
 @pytest.mark.parametrize(

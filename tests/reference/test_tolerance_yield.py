@@ -105,14 +105,14 @@ def test_quadrature() -> None:
 def intervals(mechanism: Mechanism, method: str, samples: int) -> dict[str, Array]:
     """(seed, measure) each: ends of the intervals, of the yields with that of all measures together."""
     found = study(mechanism)
-    first = found.sampler(found.sampling(method, samples, 0))
+    first = found.sampling(method, samples, 0).prepare()
     rows = [_arrays(found, first, seed) for seed in range(SEEDS)]
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
 def _arrays(found: ToleranceStudy, first: Any, seed: int) -> dict[str, Array]:
     batch = replace(first, job=replace(first.job, seed=seed))
-    arrays = sampled(batch.job, batch.evaluate(0, batch.job.blocks), found).arrays
+    arrays = sampled(batch.job.joined([batch(block) for block in range(batch.job.blocks)]), found).arrays
     keys = ("mean", "deviation", "quantile")
     kept = {f"{key}_{end}": arrays[f"{key}_{end}"] for key in keys for end in ("low", "high")}
     for end in ("low", "high"):
@@ -177,7 +177,7 @@ def quantiles_are_covered(rows: dict[str, Array]) -> None:
 def test_sobol_points_reach_a_million_plain_samples() -> None:
     """At 32 768 points: root mean square errors over seeds against σ/√n and its like for 10⁶ plain samples."""
     found = study(fourbar(measures=LIMITS))
-    first = found.sampler(found.sampling("quasi-monte-carlo", 32_768, 0))
+    first = found.sampling("quasi-monte-carlo", 32_768, 0).prepare()
     assert first.job.samples == 32_768
     mean, sigma, kurtosis = moments()
     true_yield = below(HIGH) - below(LOW)
@@ -187,7 +187,7 @@ def test_sobol_points_reach_a_million_plain_samples() -> None:
     errors = []
     for seed in range(12):
         batch = replace(first, job=replace(first.job, seed=seed))
-        arrays = sampled(batch.job, batch.evaluate(0, batch.job.blocks), found).arrays
+        arrays = sampled(batch.job.joined([batch(block) for block in range(batch.job.blocks)]), found).arrays
         errors.append([
             arrays["mean"][0] - mean, arrays["deviation"][0] - sigma, arrays["quantile_value"][0, -1] - place,
             arrays["yield"][0] - true_yield,

@@ -13,25 +13,23 @@ from pathlib import Path
 
 import pytest
 
-from toy_job import ToyJob
+from toy_job import ToyJob, bits
 from toy_programs import ENVIRONMENT, POSIX, interrupted
 from trunnion import MechanismError
-from trunnion.studies.tolerance.runner import run
+from trunnion.studies.batch import run
 
 pytest.importorskip("distributed")
 
-EXPECTED = run(ToyJob()).tally.bits()
+EXPECTED = bits(run(ToyJob())[0])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("jobs", "chunk"), [(1, None), (2, 1), (3, 3500)])
-def test_same_bits_on_a_local_cluster(jobs: int, chunk: int | None, capfd: pytest.CaptureFixture[str]) -> None:
-    told: list[int] = []
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_same_bits_on_a_local_cluster(jobs: int, capfd: pytest.CaptureFixture[str]) -> None:
+    shares: list[float] = []
     level = logging.getLogger("distributed").level
-    done = run(ToyJob(), jobs=jobs, chunk=chunk, cluster="local", progress=told.append)
-    assert done.tally.bits() == EXPECTED
-    assert not done.stopped
-    assert told[-1] == ToyJob().samples
+    assert bits(run(ToyJob(), jobs=jobs, cluster="local", progress=shares.append)[0]) == EXPECTED
+    assert shares[-1] == 1
     assert capfd.readouterr() == ("", "")
     assert logging.getLogger("distributed").level == level
 
@@ -39,17 +37,16 @@ def test_same_bits_on_a_local_cluster(jobs: int, chunk: int | None, capfd: pytes
 @pytest.mark.slow
 @POSIX
 def test_a_killed_worker_costs_time_only(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    done = run(ToyJob(fatal=17, folder=tmp_path), jobs=2, chunk=1500, cluster="local")
+    assert bits(run(ToyJob(fatal=17, folder=tmp_path), jobs=2, cluster="local")[0]) == EXPECTED
     assert (tmp_path / "perished").exists()
-    assert done.tally.bits() == EXPECTED
     assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.slow
 @POSIX
-def test_blocks_that_kill_every_worker_are_an_error(capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(MechanismError, match=r"blocks \d+ to \d+ ended 3 workers in turn"):
-        run(ToyJob(fatal=17), jobs=1, chunk=2000, cluster="local")
+def test_a_block_that_kills_every_worker_is_an_error(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(MechanismError, match="a block ended 3 workers of the cluster in turn"):
+        run(ToyJob(fatal=17), jobs=1, cluster="local")
     assert capfd.readouterr() == ("", "")
 
 
@@ -57,10 +54,10 @@ def test_blocks_that_kill_every_worker_are_an_error(capfd: pytest.CaptureFixture
 def test_what_a_job_raises_arrives(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(MechanismError, match=r"links\.x: no such link"):
         run(ToyJob(fault="prepare"), cluster="local")
-    path = tmp_path / "run.npz"
+    path = tmp_path / "run.trn"
     with pytest.raises(ZeroDivisionError, match="block 5"):
-        run(ToyJob(fault="evaluate"), chunk=500, cluster="local", checkpoint=path)
-    assert run(ToyJob(), checkpoint=path, resume=True).tally.bits() == EXPECTED
+        run(ToyJob(fault="evaluate"), cluster="local", checkpoint=path)
+    assert bits(run(ToyJob(), checkpoint=path)[0]) == EXPECTED
     assert capfd.readouterr() == ("", "")
 
 
@@ -68,10 +65,10 @@ def test_what_a_job_raises_arrives(tmp_path: Path, capfd: pytest.CaptureFixture[
 @POSIX
 def test_ctrl_c_from_the_terminal_is_quiet(tmp_path: Path) -> None:
     lines, complaints = interrupted(tmp_path, 2, "local")
-    assert lines[-1] == "stopped True"
+    assert lines[-1] == "stopped"
     assert complaints == ""
     job = ToyJob(blocks=400)
-    assert run(job, checkpoint=tmp_path / "run.npz", resume=True).tally.bits() == run(job).tally.bits()
+    assert bits(run(job, checkpoint=tmp_path / "run.trn")[0]) == bits(run(job)[0])
 
 
 @contextmanager
@@ -103,8 +100,7 @@ def cluster(folder: Path, threads: int) -> Iterator[tuple[str, subprocess.Popen[
 @pytest.mark.slow
 def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with cluster(tmp_path, 2) as (address, _):
-        for chunk in (None, 1000):
-            assert run(ToyJob(), cluster=address, chunk=chunk).tally.bits() == EXPECTED
+        assert bits(run(ToyJob(), cluster=address)[0]) == EXPECTED
     assert capfd.readouterr() == ("", "")
 
 
@@ -112,23 +108,23 @@ def test_a_cluster_by_its_address(tmp_path: Path, capfd: pytest.CaptureFixture[s
 def test_a_scheduler_that_goes_away_is_an_error_and_nothing_is_lost(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "run.npz"
+    path = tmp_path / "run.trn"
     with cluster(tmp_path, 1) as (address, scheduler):
 
-        def kill(samples: int) -> None:
-            if samples > 5000:
+        def kill(share: float) -> None:
+            if share > 0.3:
                 scheduler.kill()
 
         with pytest.raises(MechanismError, match="connection with the scheduler"):
-            run(ToyJob(pause=0.01), cluster=address, chunk=500, checkpoint=path, progress=kill)
-    told: list[int] = []
-    assert run(ToyJob(), checkpoint=path, resume=True, progress=told.append).tally.bits() == EXPECTED
-    assert told[0] > 5000
+            run(ToyJob(pause=0.01), cluster=address, checkpoint=path, progress=kill)
+    shares: list[float] = []
+    assert bits(run(ToyJob(), checkpoint=path, progress=shares.append)[0]) == EXPECTED
+    assert shares[0] > 0.3
     assert capfd.readouterr() == ("", "")
 
 
 def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
-    from trunnion.studies.tolerance import cluster as module
+    from trunnion.studies import cluster as module
 
     monkeypatch.setattr(module, "CONNECT", 0.5)
     with pytest.raises(MechanismError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9") as caught:
@@ -139,7 +135,7 @@ def test_no_scheduler_is_one_finding(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_dask_the_remedy_is_told() -> None:
     script = (
         "import sys; sys.modules['distributed'] = None\n"
-        "from toy_job import ToyJob\nfrom trunnion.studies.tolerance.runner import run\n"
+        "from toy_job import ToyJob\nfrom trunnion.studies.batch import run\n"
         "run(ToyJob(), cluster='local')"
     )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=False)
@@ -149,6 +145,6 @@ def test_without_dask_the_remedy_is_told() -> None:
 
 
 def test_dask_is_not_imported_unasked() -> None:
-    script = "import sys, trunnion.studies.tolerance.runner; print('distributed' in sys.modules)"
+    script = "import sys, trunnion.studies.batch; print('distributed' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, check=True)
     assert ended.stdout == "False\n"

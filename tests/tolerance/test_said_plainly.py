@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import trunnion
-from toleranced import FOURBAR, fourbar
 from trunnion import Mechanism
 from trunnion.results.attributes import findings_of
 from trunnion.results.quantities import drawn_in, signed
@@ -74,14 +73,6 @@ def test_a_dimension_of_one_link_or_without_tolerance_is_not() -> None:
     assert not coded(trunnion.check(roller), "tolerance.shared_dimension")
 
 
-def test_the_tolerance_of_a_clearance_is_in_the_row_of_the_play() -> None:
-    (found,) = coded(trunnion.tolerance(slider(), methods=["linear"], steps=12), "tolerance.play_size")
-    assert found.figures == {"numbers": ["O.pin.clearance"], "plays": ["O.clearance"]}
-    fits = trunnion.read(EXAMPLES / "toleranced-slider-crank.yaml")
-    (found,) = coded(trunnion.tolerance(fits, methods=["linear"], steps=12), "tolerance.play_size")
-    assert found.figures["numbers"] == ["O.pin.fit", "P.pin.fit", "Q.pin.clearance"]
-
-
 def test_an_allocated_clearance_keeps_its_stated_tolerance_and_that_is_said() -> None:
     """Both are in the worst case: 0.05 mm allocated and 0.01 mm stated make a play of 0.06 mm."""
     result = trunnion.allocate(slider(), steps=12, samples=0)
@@ -126,14 +117,6 @@ def test_a_limit_and_the_tables_have_one_unit() -> None:
         assert units == {read.label}
 
 
-def test_rss_is_a_figure_of_the_method_linear() -> None:
-    result = trunnion.tolerance(fourbar(), ["angle:rocker"], methods=["rss"], steps=12)
-    assert coded(result, "tolerance.method_alias")[0].figures == {"method": "linear"}
-    plain = trunnion.tolerance(fourbar(), ["angle:rocker"], methods=["linear"], steps=12)
-    assert float(result["rss"][0]) == float(plain["rss"][0])
-    assert FOURBAR
-
-
 def test_no_samples_are_none_where_no_method_draws_any() -> None:
     result = trunnion.tolerance(slider(), methods=["linear"], samples=0, steps=12)
     assert "yield" not in result
@@ -172,7 +155,7 @@ def test_costs_of_formulas_are_a_line_and_a_play_has_no_sign() -> None:
     assert steps.axes[0].lines[0].get_drawstyle() == "steps-post"
 
 
-def test_equal_parts_are_told_together_and_a_play_is_within_its_radius() -> None:
+def test_the_largest_part_is_named_and_a_play_is_within_its_radius() -> None:
     """At 0° the rod and the ram have 30 µm, three pins 20 µm each, the crank 10 µm."""
     tip = {"point": "ram.T", "axis": "x", "at": "0 deg", "limit": "±0.05 mm"}
     dimensions = {"r": "60 mm ± 0.01 mm", "k": "200 mm ± 0.015 mm"}
@@ -180,10 +163,6 @@ def test_equal_parts_are_told_together_and_a_play_is_within_its_radius() -> None
     result = trunnion.tolerance(model, methods=["linear"], steps=12)
     (found,) = coded(result, "limit.missed")
     assert "'dimensions.k', 30 % of" in found.remedy
-    assert (
-        "joints.O.clearance, joints.P.clearance, joints.Q.clearance, as much as each other, together 60 %"
-        in found.remedy
-    )
     rows = next(one.rows for one in tables(result) if one.title.startswith("contributions"))
     told = {row[0]: row[1].replace("\u00a0", " ") for row in rows}
     assert (told["k"], told["O.clearance"]) == ("±0.015 mm", "within 0.02 mm")

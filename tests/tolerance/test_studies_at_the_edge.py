@@ -111,7 +111,8 @@ def test_samples_that_lock() -> None:
     mechanism = trunnion.Mechanism(**data)
     found, batch = many(mechanism, steps=12)
     u = uniforms(1, 0, batch.inputs.dims, 12)
-    figures, passed, _, status = batch.figures(u)
+    part = batch.figures(u)
+    figures, passed, status = part["figure"], part["passed"], part["status"]
     values = batch.inputs.values(u)
     for i in range(0, 12, 3):
         single = trunnion.analyse(alone(mechanism, values, i), 360)["status"].values
@@ -248,7 +249,8 @@ def test_limits_to_one_side_and_without_the_nominal() -> None:
         "nothing": {"angle": "rocker", "at": "60 deg", "limit": "±0 deg"},
     }
     found, batch = many(fourbar(measures=measures), 1000)
-    figures, passed, _, _ = batch.figures(uniforms(1, 0, 4, 1000))
+    part = batch.figures(uniforms(1, 0, 4, 1000))
+    figures, passed = part["figure"], part["passed"]
     change = np.degrees(figures[0] - found.linear.measures[0].reference.figure)
     np.testing.assert_array_equal(passed[0], (change >= 0) & (change <= 0.02))
     np.testing.assert_array_equal(passed[1], (change >= 0.01) & (change <= 0.05))
@@ -259,9 +261,10 @@ def test_limits_of_a_measure_over_the_turn() -> None:
     """Its largest |deviation| is the figure; limits hold of the signed deviation at every position."""
     measures = {"angle": {"angle": "rocker", "limit": "+0.06/-0.1 deg"}}
     found, batch = many(fourbar(measures=measures), 500, steps=120)
-    figures, passed, curves, _ = batch.figures(uniforms(1, 0, 4, 500))
+    part = batch.figures(uniforms(1, 0, 4, 500), 500)
+    figures, passed = part["figure"], part["passed"]
     assert found.linear.measures[0].reference.figure == 0
-    change = np.degrees(curves[0])
+    change = np.degrees(part["curve0"])
     near = np.abs(np.degrees(figures[0]) - np.max(np.abs(change), axis=1))
     assert np.max(near) < 1e-4  # between positions it is no more than that higher
     clear = (np.abs(np.max(change, axis=1) - 0.06) > 1e-4) & (np.abs(np.min(change, axis=1) + 0.1) > 1e-4)
@@ -337,4 +340,4 @@ def test_draws_of_a_study_are_those_of_its_sampler() -> None:
     found = study(fourbar(measures=LIMIT))
     job = found.sampling("monte-carlo", 300, 7)
     own = sampler(found, 300, seed=7)
-    np.testing.assert_array_equal(found.sampler(job).drawn(0), own.drawn(0))
+    np.testing.assert_array_equal(job.prepare().drawn(0), own.drawn(0))

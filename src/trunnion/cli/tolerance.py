@@ -73,16 +73,14 @@ def tolerance(
     seed: Seed = 1,
     steps: Steps = 360,
     jobs: Jobs = None,
-    chunk: Annotated[
-        int | None,
-        typer.Option("--chunk", help="Samples per chunk of work; about one second's by default.", show_default=False),
-    ] = None,
     engine: Engine = "auto",
     cluster: Cluster = None,
     checkpoint: Annotated[
-        Path | None, typer.Option("--checkpoint", help="File to save the samples done so far.", show_default=False)
+        Path | None,
+        typer.Option(
+            "--checkpoint", help="File that keeps the samples done; the same command continues.", show_default=False
+        ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint.")] = False,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -105,8 +103,8 @@ def tolerance(
     counted = samples if any(one in SAMPLINGS for one in methods) else 0
     with lines_of(file), bar("samples", counted, least=1000) as progress:
         result = run(
-            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, chunk=chunk, engine=engine,  # type: ignore[arg-type]
-            cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress, target=target,
+            mechanism, measure, methods, samples, seed, steps, at, jobs=jobs, engine=engine,  # type: ignore[arg-type]
+            cluster=cluster, checkpoint=checkpoint, progress=progress, target=target,
         )  # fmt: skip
     shown = shown_of(result, mechanism.name, file, out or [], units_row, kind, report)
     shown.finish()

@@ -1,12 +1,12 @@
 """Distributions of a deviation from nominal between limits, each by its quantile function.
 
 A deviation and its limits (lower ≤ upper, signed, measured from nominal) have the unit of the number they belong to.
-A distribution is one entry of `DISTRIBUTIONS`: functions of (u or x, lower, upper, options) where options are the
+A distribution is one entry of `DISTRIBUTIONS`: functions of (u, lower, upper, options) where options are the
 numbers of the entry's `parameters`; those left out have the default there (None: worked out from the others, as the
 function says). Every quantile is finite for u in (0, 1) and keeps the precision of 1 − u near 1 as that of u near 0.
 
-By hand and not by scipy.stats, which takes 1.6 s to import, 8 times as long for a truncated draw and 27 for a beta one,
-and loses six digits of the deviation where a normal distribution is cut far out.
+By hand and not by scipy.stats, which takes 1.6 s to import and loses six digits of the deviation where a normal
+distribution is cut far out.
 """
 
 from __future__ import annotations
@@ -32,14 +32,13 @@ class Distribution:
     """A kind of distribution of deviations.
 
     parameters: names of the options with their defaults; None: worked out, or (`values`) must be given.
-    quantile, cdf: (u or x, lower, upper, options) → array of the same shape; mean, variance: (lower, upper, options).
+    quantile: (u, lower, upper, options) → array of the shape of u; mean, variance: (lower, upper, options).
     bounded: whether no deviation lies outside its limits; sample and direction are bounded by their own values.
     """
 
     name: str
     long_name: str
     quantile: Callable[[Floats, float, float, Options], Floats]
-    cdf: Callable[[Floats, float, float, Options], Floats]
     mean: Callable[[float, float, Options], float]
     variance: Callable[[float, float, Options], float]
     parameters: Mapping[str, float | None] = field(default_factory=dict)
@@ -74,25 +73,11 @@ def _normal_quantile(u: Floats, lower: float, upper: float, options: Options) ->
     return np.asarray(mean + sigma * special.ndtri(u), dtype=np.float64)
 
 
-def _normal_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    mean, sigma = normal_parameters(lower, upper, options)
-    return np.asarray(special.ndtr(_standard(np.asarray(x) - mean, sigma)), dtype=np.float64)
-
-
-def _standard(distance: Floats, scale: float) -> Floats:
-    """distance/scale; ±∞ where the scale is 0, so that a number without spread steps from 0 to 1 at its value."""
-    return distance / scale if scale > 0 else np.where(distance < 0, -np.inf, np.inf)
-
-
 # ---- uniform, direction ---------------------------------------------------------------------------------------
 
 
 def _uniform_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
     return lower + (upper - lower) * np.asarray(u)
-
-
-def _uniform_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    return np.clip(_standard(np.asarray(x) - lower, upper - lower), 0.0, 1.0)
 
 
 def _uniform_variance(lower: float, upper: float, options: Options) -> float:
@@ -102,10 +87,6 @@ def _uniform_variance(lower: float, upper: float, options: Options) -> float:
 def _direction_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
     """An angle that is any with the same chance, −π to π; the limits do not matter."""
     return _uniform_quantile(u, -math.pi, math.pi, options)
-
-
-def _direction_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    return _uniform_cdf(x, -math.pi, math.pi, options)
 
 
 # ---- triangular -----------------------------------------------------------------------------------------------
@@ -121,17 +102,6 @@ def _triangular_quantile(u: Floats, lower: float, upper: float, options: Options
     left = lower + np.sqrt(u * (width * (mode - lower)))
     right = upper - np.sqrt((1 - u) * (width * (upper - mode)))
     return np.clip(np.where(u * width < mode - lower, left, right), lower, upper)
-
-
-def _triangular_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    mode, width = _mode(lower, upper, options), upper - lower
-    x = np.asarray(x)
-    if width == 0:
-        return _uniform_cdf(x, lower, upper, options)
-    x = np.clip(x, lower, upper)
-    left = (x - lower) ** 2 / (width * (mode - lower)) if mode > lower else np.zeros_like(x)
-    right = 1 - (upper - x) ** 2 / (width * (upper - mode)) if mode < upper else np.ones_like(x)
-    return np.where(x < mode, left, right)
 
 
 def _triangular_mean(lower: float, upper: float, options: Options) -> float:
@@ -180,18 +150,6 @@ def _truncated_quantile(u: Floats, lower: float, upper: float, options: Options)
     return np.asarray(np.clip(mean + (sign * sigma) * z, lower, upper), dtype=np.float64)
 
 
-def _truncated_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    if upper == lower:
-        return _uniform_cdf(x, lower, upper, options)
-    mean, sigma, a, b, sign = _truncation(lower, upper, options)
-    z = np.clip(sign * (np.asarray(x) - mean) / sigma, a, b)
-    # With Φ(b) taken out as a factor nothing underflows, however far out in the tail the limits lie.
-    end = special.log_ndtr(b)
-    start = math.exp(special.log_ndtr(a) - end)
-    share = np.clip((np.exp(special.log_ndtr(z) - end) - start) / (1 - start), 0.0, 1.0)
-    return np.asarray(share if sign > 0 else 1 - share, dtype=np.float64)
-
-
 def _truncated_moments(lower: float, upper: float, options: Options) -> tuple[float, float]:
     """Mean and variance by Gauss-Legendre quadrature; closed forms lose their digits when the cut is narrow or far out.
 
@@ -226,59 +184,11 @@ def _shapes(options: Options) -> tuple[float, float]:
 
 
 def _beta_quantile(u: Floats, lower: float, upper: float, options: Options) -> Floats:
-    """lower + w x, x = I⁻¹(u; α, β), from a table of ln(x/(1 − x)) over Φ⁻¹(u): I⁻¹ costs fifty times as much.
-
-    Cubic between entries 1/128 apart with the exact slope: x and 1 − x are true to about 1e-10 of their value. What is
-    rarer than 2⁻⁶⁰ is taken as that.
-    """
-    shapes, u = _shapes(options), np.maximum(u, 2.0**-60)
-    table = _beta_table(*shapes)
-    if table is None:
-        odds = _beta_odds(u, *shapes)
-    else:
-        score = (special.ndtri(u) + _REACH) * _DENSITY
-        place = score.astype(np.intp)
-        part = score - place
-        c0, c1, c2, c3 = table[:, place]
-        odds = c0 + part * (c1 + part * (c2 + part * c3))
-    share = special.expit(-np.abs(odds)) * (upper - lower)
-    return np.asarray(np.where(odds < 0, lower + share, upper - share), dtype=np.float64)
-
-
-_REACH, _DENSITY = 9, 128
-"""The table reaches over ±9 standard deviations with 128 entries in each."""
-
-
-def _beta_odds(u: Floats, alpha: float, beta: float) -> Floats:
-    """ln(x/(1 − x)) of the quantile x, with x and 1 − x each found by itself: neither is lost beside the other."""
-    low, tail = u <= 0.5, np.minimum(u, 1 - u)
-    first, second = np.where(low, alpha, beta), np.where(low, beta, alpha)
-    near, far = special.betaincinv(first, second, tail), special.betainccinv(second, first, tail)
-    with np.errstate(divide="ignore"):
-        odds = np.log(near) - np.log(far)
-    return np.asarray(np.where(low, odds, -odds), dtype=np.float64)
-
-
-@lru_cache(maxsize=64)
-def _beta_table(alpha: float, beta: float) -> Floats | None:
-    """Coefficients (4, intervals) of the cubics; None where a tail leaves the range of floats (α or β far below 1)."""
-    s = np.arange(-_REACH * _DENSITY, _REACH * _DENSITY + 1) / _DENSITY
-    odds = np.where(s <= 0, _beta_odds(special.ndtr(s), alpha, beta), -_beta_odds(special.ndtr(-s), beta, alpha))
-    log_x, log_rest = special.log_expit(odds), special.log_expit(-odds)
-    # d odds/ds = φ(s)/(f(x) x (1 − x)), f(x) = x^(α − 1) (1 − x)^(β − 1)/B(α, β).
-    with np.errstate(invalid="ignore", over="ignore"):
-        log_slope = (
-            special.betaln(alpha, beta) - alpha * log_x - beta * log_rest - s * s / 2 - math.log(2 * math.pi) / 2
-        )
-        slope = np.exp(log_slope) / _DENSITY
-    if not (np.isfinite(odds).all() and np.isfinite(slope).all()):
-        return None
-    rise, start, end = np.diff(odds), slope[:-1], slope[1:]
-    return np.stack([odds[:-1], start, 3 * rise - 2 * start - end, start + end - 2 * rise])
-
-
-def _beta_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    return np.asarray(special.betainc(*_shapes(options), _uniform_cdf(x, lower, upper, options)), dtype=np.float64)
+    """lower + w I⁻¹(u; α, β), above the middle upper − w I⁻¹(1 − u; β, α): neither tail is lost beside the other."""
+    (alpha, beta), u, width = _shapes(options), np.maximum(u, 2.0**-60), upper - lower  # of rarer ones there is none
+    below = lower + width * special.betaincinv(alpha, beta, np.minimum(u, 0.5))
+    above = upper - width * special.betaincinv(beta, alpha, np.minimum(1 - u, 0.5))
+    return np.asarray(np.where(u <= 0.5, below, above), dtype=np.float64)
 
 
 def _beta_mean(lower: float, upper: float, options: Options) -> float:
@@ -306,11 +216,6 @@ def _sample_quantile(u: Floats, lower: float, upper: float, options: Options) ->
     return values[np.clip(place, 0, values.size - 1)]
 
 
-def _sample_cdf(x: Floats, lower: float, upper: float, options: Options) -> Floats:
-    values = _values(options)
-    return np.searchsorted(values, np.asarray(x), side="right") / values.size
-
-
 def _sample_mean(lower: float, upper: float, options: Options) -> float:
     return float(_values(options).mean())
 
@@ -327,7 +232,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "normal",
             "normal, spread by the capability of the process",
             _normal_quantile,
-            _normal_cdf,
             mean=lambda lower, upper, options: normal_parameters(lower, upper, options)[0],
             variance=lambda lower, upper, options: normal_parameters(lower, upper, options)[1] ** 2,
             parameters={"cp": 1.0, "cpk": None, "shift": None},
@@ -337,7 +241,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "uniform",
             "uniform between the limits",
             _uniform_quantile,
-            _uniform_cdf,
             mean=lambda lower, upper, options: (lower + upper) / 2,
             variance=_uniform_variance,
         ),
@@ -345,7 +248,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "triangular",
             "triangular between the limits",
             _triangular_quantile,
-            _triangular_cdf,
             _triangular_mean,
             _triangular_variance,
             parameters={"mode": None},
@@ -354,7 +256,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "truncated",
             "normal, cut off at the limits",
             _truncated_quantile,
-            _truncated_cdf,
             mean=lambda lower, upper, options: _truncated_moments(lower, upper, options)[0],
             variance=lambda lower, upper, options: _truncated_moments(lower, upper, options)[1],
             parameters={"cp": 1.0, "cpk": None, "shift": None},
@@ -363,7 +264,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "beta",
             "beta between the limits",
             _beta_quantile,
-            _beta_cdf,
             _beta_mean,
             _beta_variance,
             parameters={"alpha": 2.0, "beta": 2.0},
@@ -372,7 +272,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "sample",
             "drawn from measured values",
             _sample_quantile,
-            _sample_cdf,
             _sample_mean,
             _sample_variance,
             parameters={"values": None},
@@ -381,7 +280,6 @@ DISTRIBUTIONS: dict[str, Distribution] = {
             "direction",
             "any angle with the same chance",
             _direction_quantile,
-            _direction_cdf,
             mean=lambda lower, upper, options: 0.0,
             variance=lambda lower, upper, options: math.pi**2 / 3,
         ),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 from trunnion.errors import agreeing
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
@@ -14,14 +12,6 @@ NOT_STEADY = "within {duration:~s} {driver} does not come to run steadily, or it
 LONGER = "state a longer duration of the measure in the model; `trunnion simulate` with these values shows the motion"
 MAGNITUDES = "check the orders of magnitude of costs and bounds"
 WIDER = "allow narrower tolerances, widen a limit or ask for a lower yield"
-
-
-def _carried(ratios: Mapping[str, float], links: Mapping[str, Sequence[str]], joint: str) -> str:
-    """ratios: of the deviation with the pin's place on its other link, by joint; links: of the joints."""
-    other = ", ".join(f"'{links[name][0]}' in {name}: {ratio:.3g} times" for name, ratio in ratios.items())
-    holes = ", ".join(f"'{links[name][1]}' in {name}" for name in ratios)
-    what = f"scatter and yield assume that the position of the pin is fixed on the link with the hole ({holes}); if it "
-    return f"{what}is fixed on the other link, the deviation differs ({other}); the worst case covers both"
 
 
 def _curve(points: int, lost: int, least: float | None) -> str:
@@ -146,7 +136,6 @@ ASSEMBLY = {
 }
 
 TOLERANCE = {
-    "tolerance.method_alias": Sentence(NOTE, "RSS is a figure of the method {method}, which was used", "name {method}"),
     "limit.missed": Sentence(ERROR, "limits not met: {told}; {limits}", "{remedy}"),
     "limit.missed_yield": Sentence(
         ERROR, "limits not met: {told}, required {target_percent:.6g} %; {limits}", "{remedy}"
@@ -163,12 +152,6 @@ TOLERANCE = {
         "loaded) is left out, and scatter and limits are about the mechanism with every pin in the middle of its hole",
         "`trunnion analyse` has the shift by that seat; pins that are always pressed one way: state seat: {{xi: …}}",
     ),
-    "tolerance.pressed": Sentence(
-        NOTE,
-        "the loads press the pins of {joints} to one side of their holes, {where}; nominal value, mean and scatter are "
-        "about pins in the middle of their holes",
-        "`trunnion analyse --seat loaded` has the effect; pins that lie so in every piece: state seat: {{xi: …}}",
-    ),
     "tolerance.correlations_left_out": Sentence(
         NOTE,
         "RSS and worst case ignore the correlations; standard deviation, shares of variance and samples include them",
@@ -177,11 +160,6 @@ TOLERANCE = {
         NOTE,
         "one tolerance sets points of {links} ({shown}): these links deviate together, by the same amount",
         "if the links are made separately, give each a dimension of its own with its own tolerance",
-    ),
-    "tolerance.play_size": Sentence(
-        NOTE,
-        "the tolerance of {numbers} enlarges the play: its effect is in the row of {plays}, whose limit is the largest "
-        "play",
     ),
     "tolerance.indices_lost": Sentence(
         WARNING,
@@ -243,11 +221,6 @@ TOLERANCE = {
         "first order and its contributions do not describe this measure: use the samples, and --method sobol for the "
         "contributions",
     ),
-    "play.carried": Sentence(
-        NOTE,
-        _carried,
-        lambda ratios, links, joint: f"state joints.{joint}.seat_on: {links[joint][0]} or {links[joint][1]}",
-    ),
     "samples.no_answer": Sentence(
         ERROR,
         "{count:,} of {samples:#sample} ({share:.2%}) could not be solved: {why}",
@@ -259,11 +232,6 @@ TOLERANCE = {
         "begin with few samples or points",
     ),
     "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}", quiet=True),
-    "samples.machines": Sentence(
-        NOTE,
-        "the samples were computed on {kinds} kinds of machines, whose sines or logarithms differ in the last bit",
-        "use machines of one kind if results must be reproducible to the last bit",
-    ),
 }
 
 ALLOCATION = {

@@ -312,11 +312,6 @@ class FirstOrder:
             ]
         return found
 
-    def scatters(self, joint: str) -> list[Array]:
-        """Standard deviation that the play of a joint makes, the seat on each link that may carry it."""
-        i = len(self.inputs.tolerances) + self.inputs.loose.index(joint)
-        return [zones.scatter(*one) for one in self._plays(i)]
-
     def corner(self, sign: float, at: Mapping[str, float] | None = None) -> dict[str, float]:
         """Numbers that make a measure largest (sign 1) or least (−1), to first order; zones at their rim.
 

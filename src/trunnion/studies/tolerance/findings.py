@@ -21,11 +21,10 @@ from trunnion.model.tolerances import variations
 from trunnion.results.figure import Figure
 from trunnion.results.scales import extreme_place
 from trunnion.results.sentences import finding_for
-from trunnion.studies.tolerance.sampling import CAUSES
+from trunnion.studies.tolerance.sampled import CAUSES
 from trunnion.studies.tolerance.targets import limited, missed, scatters
 
 if TYPE_CHECKING:
-    from trunnion.studies.tolerance.first_order import ToleranceStudy
     from trunnion.studies.tolerance.linear import Of
     from trunnion.studies.tolerance.outcome import Outcome
     from trunnion.studies.tolerance.sampled import Sampled
@@ -33,12 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["findings_of", "summary"]
 
 Array = NDArray[np.float64]
-CARRIED = 0.02  # of the standard deviation: what it may change with the link that carries a seat before it is told
 TURNED = 0.01  # of the size of the mechanism: a shorter length may well turn round, as the offset of a slide
-LOOKED = 360  # positions at which loads of pins are looked at
-UNLOADED = 1e-3  # of the largest load of a pin: less does not press it
-ONE_SIDE = 0.7  # cosine of the angle about its mean direction in which a load presses to one side
-SIZES = ("pin.clearance", "guide.clearance", "pin.hole_radius", "pin.radius")  # what the size of a play depends on
 FAR_OFF = 0.2  # between first order and what is found, of which it is said
 
 
@@ -118,67 +112,20 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     loaded = [seat.joint for seat in study.run.seats if seat.given is None]
     if loaded:
         yield finding_for("tolerance.seats_not_taken", "joints", joints=loaded)
-    elif pressed := _pressed(study):
-        yield finding_for("tolerance.pressed", "joints", phrases={"where": pressed[1]}, joints=pressed[0])
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from shared_dimensions(mechanism)
     yield from slow_motions(study.run, (of.measure for of in study.linear.measures), study.inputs.names)
-    yield from _play_sizes(outcome)
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _range_ends(outcome)
     yield from _nominal(outcome)
     for of in study.linear.measures:
         yield from _first_order(outcome, of)
-        yield from _carried(outcome, of)
     if counted is not None:
         yield from _samples(outcome, counted)
     if outcome.indices is not None and outcome.indices.lost:
         yield finding_for("tolerance.indices_lost", count=outcome.indices.lost)
-
-
-def _pressed(study: ToleranceStudy) -> tuple[list[str], str] | None:
-    """Of planar pins that may lie anywhere, those that the nominal loads press to one side of their holes, wherever
-    they are loaded, and where that is."""
-    found: list[str] = []
-    if study.run.system.mechanism.space != "planar" or not study.inputs.loose:
-        return None
-    times, loaded = study.run.cycle.times(LOOKED), np.zeros(LOOKED, bool)
-    with np.errstate(all="ignore"):
-        back = study.run.solve(times)
-        for joint in study.inputs.loose:
-            if study.run.system.joints[joint][0] != "revolute":
-                continue
-            force = np.array([np.broadcast_to(primal(part), LOOKED) for part in back.on_hole(joint)[0]])
-            size = np.hypot(*force)
-            pressing = size > UNLOADED * np.nanmax(size, initial=0.0)
-            ways = (force / size)[:, pressing]
-            mean = np.mean(ways, axis=1) if ways.shape[1] else np.zeros(2)
-            if np.min(mean @ ways, initial=np.inf) > ONE_SIDE * np.hypot(*mean) > 0:
-                found.append(joint)
-                loaded |= pressing
-    if not found:
-        return None
-    part = "" if np.all(loaded) else "wherever they are loaded: "
-    return found, part + study.run.system.dial(study.run.values, times).intervals(np.flatnonzero(loaded))
-
-
-def _play_sizes(outcome: Outcome) -> Iterator[Finding]:
-    """Tolerances of clearances, and fits, whose pins may lie anywhere: their effect is that of the play."""
-    inputs = outcome.study.inputs
-    varied, fits = {one.path for one in inputs.tolerances}, outcome.study.run.system.mechanism.effective_joints
-    numbers: dict[str, str] = {}  # what sizes a play, and the play
-    for joint in inputs.loose:
-        for key in (key for key in SIZES if f"joints.{joint}.{key}" in varied):
-            pin = fits[joint].pin
-            radius = key.endswith("radius")
-            if radius and (pin is None or pin.fit is None):
-                continue
-            numbers[f"{joint}.{'pin.fit' if radius else key}"] = f"{joint}.clearance"
-    if numbers:
-        plays = list(dict.fromkeys(numbers.values()))
-        yield finding_for("tolerance.play_size", "tolerances", numbers=list(numbers), plays=plays)
 
 
 def _measured(outcome: Outcome) -> Iterator[Finding]:
@@ -274,21 +221,6 @@ def _first_order(outcome: Outcome, of: Of) -> Iterator[Finding]:
     size, found = max(-lower, upper), max(-least.value, most.value)
     if np.isfinite(found) and abs(found - size) > FAR_OFF * max(size, found) and max(size, found) > 0:
         yield finding_for("first_order.worst_case_differs", where, ratio=found / size if size else np.inf)
-
-
-def _carried(outcome: Outcome, of: Of) -> Iterator[Finding]:
-    """Plays whose part in the scatter is another if the pin keeps its place on the other link."""
-    study, whole = outcome.study, float(of.total.deviation)
-    others: list[tuple[str, float]] = []
-    for joint in study.inputs.loose:
-        taken, *more = (float(part) for part in of.figure.scatters(joint))
-        ratios = [np.sqrt(max(1 + (other**2 - taken**2) / whole**2, 0.0)) for other in more if whole > 0]
-        others += [(joint, ratio) for ratio in ratios if abs(ratio - 1) > CARRIED]
-    if others:
-        joints = study.run.system.mechanism.effective_joints
-        links = {name: list(joints[name].links) for name, _ in others}
-        where, first = f"measures.{of.measure.name}", others[0][0]
-        yield finding_for("play.carried", where, ratios=dict(others), links=links, joint=first)
 
 
 def _scatter(outcome: Outcome, counted: Sampled) -> Iterator[Finding]:

@@ -24,7 +24,7 @@ from trunnion.studies.tolerance.effects import Effects, effects_of
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import many_of
 from trunnion.studies.tolerance.linear import Linear, Reference, linear, references, searched
-from trunnion.studies.tolerance.sampling import Sampler, Sampling, towards
+from trunnion.studies.tolerance.sampling import Sampling, towards
 from trunnion.studies.tolerance.search import Corner
 
 __all__ = ["FEW", "ToleranceStudy", "placed", "study"]
@@ -82,13 +82,6 @@ class ToleranceStudy:
 
     def sampling(self, method: Any, samples: int, seed: int, engine: str = "numpy") -> Sampling:
         """The run of a sampling method."""
-        spread, curves = [], []
-        for of in self.linear.measures:
-            known = of.reference
-            centre = known.figure + _finite(of.total.shift)
-            spread.append((centre, _finite(of.total.deviation)))
-            middle = 0.0 * of.curve if known.against else of.curve  # what `shown` gives of the nominal mechanism
-            curves.append((np.nan_to_num(middle), np.nan_to_num(of.course.total.deviation)))
         model = self.run.system.mechanism.data()
         rotation = None
         if method == "quasi-monte-carlo" and self.inputs.tolerances:
@@ -96,16 +89,8 @@ class ToleranceStudy:
             rotation = towards(np.array([of.figure.gradient()[:count] for of in self.linear.measures]))
         return Sampling(
             model, self.measures, self.steps, method, samples, seed, engine, self.friction, len(self.plan.times),
-            tuple(spread), tuple(curves), rotation,
+            rotation,
         )  # fmt: skip
-
-    def sampler(self, job: Sampling) -> Sampler:
-        """What draws and analyses blocks, in this process."""
-        return job.prepare()
-
-
-def _finite(number: Any) -> float:
-    return float(np.nan_to_num(number, posinf=0.0, neginf=0.0))
 
 
 def study(

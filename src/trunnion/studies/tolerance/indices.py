@@ -57,11 +57,9 @@ def indices(sampler: Sampler, samples: int, seed: int) -> Indices:
 
     def analysed(points: Array) -> Array:
         size = sampler.job.block_size
-        found = np.empty((len(sampler.job.measures), points.shape[1]))
-        for low in range(0, points.shape[1], size):
-            with np.errstate(all="ignore"):
-                found[:, low : low + size] = sampler.figures(points[:, low : low + size])[0]
-        return found
+        with np.errstate(all="ignore"):
+            parts = [sampler.figures(points[:, low : low + size]) for low in range(0, points.shape[1], size)]
+        return np.concatenate([part["figure"] for part in parts], axis=1)
 
     y_one, y_two = analysed(one), analysed(two)
     mixed = np.empty((len(parts), *y_one.shape))

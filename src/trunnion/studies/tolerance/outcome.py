@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from trunnion.studies.tolerance.first_order import ToleranceStudy
 from trunnion.studies.tolerance.indices import Indices
-from trunnion.studies.tolerance.sampling import SampleTally, Sampling
+from trunnion.studies.tolerance.sampling import Samples
 from trunnion.studies.tolerance.search import Corner
 
 __all__ = ["Outcome"]
@@ -20,7 +20,6 @@ class Outcome:
     study: ToleranceStudy
     methods: tuple[str, ...]
     worst: Sequence[tuple[Corner, Corner]] | None = None
-    job: Sampling | None = None
-    tally: SampleTally | None = None
+    samples: Samples | None = None
     indices: Indices | None = None
     target: float | None = None

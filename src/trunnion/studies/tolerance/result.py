@@ -119,7 +119,8 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
     """The numbers of all methods with all that is said of them."""
     found = outcome.study
     system, mechanism = found.run.system, found.run.system.mechanism
-    counted = None if outcome.tally is None or outcome.job is None else sampled(outcome.job, outcome.tally, found)
+    counted = sampled(outcome.samples, found) if outcome.samples else None
+    job = outcome.samples.job if outcome.samples else None
     stated = [*findings_of(outcome, counted), *told]
     arrays = {**_linear(found), **_worst(outcome), **(counted.arrays if counted else {}), **_shares(outcome)}
     units = [measure.figure_unit(system, found.run.values) for measure in found.measures]
@@ -141,9 +142,9 @@ def dataset(outcome: Outcome, told: Sequence[Finding]) -> xr.Dataset:
         **origin(mechanism, system.plan.formula),
         **cited(references(mechanism)),
         "methods": outcome.methods,
-        "sampling": outcome.job.method if outcome.job else "",
-        "engine": outcome.job.engine if outcome.job else "numpy",
-        "seed": outcome.job.seed if outcome.job else -1,
+        "sampling": job.method if job else "",
+        "engine": job.engine if job else "numpy",
+        "seed": job.seed if job else -1,
         **_of_measures(found),
         "distributions": [
             *(one.distribution for one in found.inputs.tolerances),

@@ -1,4 +1,4 @@
-"""What a tally says: moments, quantiles, yield and capability of every figure, with their confidence intervals.
+"""What samples say: moments, quantiles, yield and capability of every figure, with their confidence intervals.
 
 Of plain samples the intervals are those of independent values; of Sobol points they come from the spread of the
 independently scrambled replicates (Student's t).
@@ -12,17 +12,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.errors import Status
+from trunnion.measures.measures import Measure
 from trunnion.statistics import intervals
-from trunnion.statistics.histogram import Bins, quantile
-from trunnion.statistics.tally import Moments
+from trunnion.statistics.moments import Moments, moments_of
 from trunnion.studies.tolerance.first_order import ToleranceStudy
-from trunnion.studies.tolerance.sampling import SampleTally, Sampling
+from trunnion.studies.tolerance.sampling import Samples
 
-__all__ = ["QUANTILES", "Sampled", "sampled"]
+__all__ = ["CAUSES", "QUANTILES", "Sampled", "limits_of", "sampled"]
 
 Array = NDArray[np.float64]
-FEWEST = 4.0  # points of a replicate expected beyond a quantile, from which its interval is told
+Interval = tuple[Any, Any]
 QUANTILES = (0.00135, 0.005, 0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975, 0.995, 0.99865)
+CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
+FEWEST = 4.0  # points of a replicate expected beyond a quantile, from which its interval is given
+BINS = 240
+CORE, FAR = 0.005, 1.5  # share of the samples at either end, and widths of the others, beyond which bins do not reach
+LEAST = 1e-9, 1e-12  # width of the bins of a figure that does not scatter: of the figure, and SI
+SIZES = 12  # at which it is shown how figures converge
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,120 +41,130 @@ class Sampled:
     passed: int
 
 
-def sampled(job: Sampling, tally: SampleTally, study: ToleranceStudy) -> Sampled | None:
-    """All figures of a tally; None of an empty one."""
-    count = len(job.measures)
-    totals = [total for tree in tally.trees if (total := tree.total()) is not None]
-    if not totals:
-        return None
-    whole = totals[0]
-    for one in totals[1:]:
-        whole = whole.merged(one)
-    figures, passes = _part(whole, slice(0, count)), _part(whole, slice(count, None))
-    done = int(np.max(passes.count))
-    replicated = job.replicates > 1 and len(totals) == job.replicates
+def sampled(samples: Samples, study: ToleranceStudy) -> Sampled:
+    """All figures of the samples."""
+    job, figure, passed = samples.job, samples.figure, samples.passed
+    count, done = figure.shape
+    everything = np.concatenate([passed, np.all(passed, axis=0)[None]])
+    moments = moments_of(figure)
+    ordered = [np.sort(row[~np.isnan(row)]) for row in figure]
+    replicates = (job.replicates, -1)
+    each = [moments_of(part) for part in np.moveaxis(figure.reshape(count, *replicates), 1, 0)]
+    yields = np.mean(everything, axis=1)
+    if job.replicates > 1:
+        ends = {
+            "mean": intervals.by_replicates(np.array([one.mean for one in each]), axis=0),
+            "deviation": intervals.by_replicates(np.array([_of_even_points(one) for one in each]), axis=0),
+        }
+        right = np.sum(everything.reshape(count + 1, *replicates), axis=2)
+        # turned to where a measure changes most, a replicate's count is all but one of two numbers: on the safe side
+        ends["yield"] = intervals.share_by_replicates(right, done // job.replicates, axis=1, least=0.25)
+    else:
+        ends = {
+            "mean": intervals.of_mean(moments.mean, moments.deviation, moments.number),
+            "deviation": intervals.of_deviation(moments.deviation, moments.kurtosis, moments.number),
+            "yield": intervals.share(np.sum(everything, axis=1), done),
+        }
+    ends["quantile"] = _quantile_ends(ordered, figure.reshape(count, *replicates))
+    histogram, edge = _histogram(ordered)
     arrays: dict[str, Any] = {
         "samples": np.array(done),
-        "mean": np.where(figures.count > 0, figures.mean, np.nan),
-        "deviation": figures.deviation,
-        "skewness": figures.skewness,
-        "kurtosis": figures.kurtosis,
-        "least": np.where(figures.count > 0, figures.least, np.nan),
-        "most": np.where(figures.count > 0, figures.most, np.nan),
-        "failed": tally.failed,
-        "histogram": np.sum(tally.histogram, axis=0),
-        "edge": job.bins.edges(),
+        "mean": moments.mean,
+        "deviation": moments.deviation,
+        "skewness": moments.skewness,
+        "kurtosis": moments.kurtosis,
+        "least": np.array([row[0] if row.size else np.nan for row in ordered]),
+        "most": np.array([row[-1] if row.size else np.nan for row in ordered]),
+        "failed": _failed(samples),
+        "histogram": histogram,
+        "edge": edge,
+        "quantile_value": np.array([_quantiles(row, np.array(QUANTILES)) for row in ordered]),
+        "yield": yields[:-1],
+        "yield_all": yields[-1],
+        "yield_all_low": ends["yield"][0][-1],
+        "yield_all_high": ends["yield"][1][-1],
+        **_capability(job.measures, study, moments),
+        "band": _bands(samples, study),
+        **_convergence(samples),
     }
-    ends = _replicated(totals, count) if replicated else _independent(figures, done)
-    for key, (low, high) in ends.items():
-        arrays |= {f"{key}_low": low, f"{key}_high": high}
-    arrays |= _quantiles(job, tally, figures, replicated)
-    arrays |= _yields(totals, passes, done, count, replicated)
-    arrays |= _capability(job, study, figures)
-    arrays["band"] = _bands(job, tally, study)
-    arrays |= _convergence(job, tally, count)
-    passed = int(np.rint(passes.mean[-1] * done)) if done else 0
-    return Sampled(_cut(arrays), done, passed)
-
-
-def _part(moments: Moments, rows: slice) -> Moments:
-    return Moments.unpacked(moments.packed()[:, rows])
-
-
-def _independent(figures: Moments, done: int) -> dict[str, Any]:
-    return {
-        "mean": intervals.of_mean(figures.mean, figures.deviation, figures.count),
-        "deviation": intervals.of_deviation(figures.deviation, figures.kurtosis, figures.count),
-    }
-
-
-def _replicated(totals: list[Moments], count: int) -> dict[str, Any]:
-    own = [_part(total, slice(0, count)) for total in totals]
-    return {
-        "mean": intervals.by_replicates(np.array([one.mean for one in own]), axis=0),
-        "deviation": intervals.by_replicates(np.array([_of_even_points(one) for one in own]), axis=0),
-    }
+    for name, (low, high) in ends.items():
+        arrays |= {f"{name}_low": low[:count], f"{name}_high": high[:count]}
+    return Sampled(arrays, done, int(np.sum(everything[-1])))
 
 
 def _of_even_points(one: Moments) -> Array:
     """Standard deviation of the points of a replicate, by n: their mean is all but true and uses none up."""
-    return one.deviation * np.sqrt(np.maximum(one.count - 1, 0) / np.maximum(one.count, 1))
+    return one.deviation * np.sqrt(np.maximum(one.number - 1, 0) / np.maximum(one.number, 1))
 
 
-def _quantiles(job: Sampling, tally: SampleTally, figures: Moments, replicated: bool) -> dict[str, Any]:
-    q = np.array(QUANTILES)
-    counts = np.sum(tally.histogram, axis=0)
-    found = quantile(counts, job.bins, q, figures.least, figures.most)
-    if replicated:
-        each = np.array([quantile(own, job.bins, q, figures.least, figures.most) for own in tally.histogram])
+def _failed(samples: Samples) -> NDArray[np.int64]:
+    """Samples without an answer, by the gravest status of their positions."""
+    gravest = samples.status[np.any(np.isnan(samples.figure), axis=0)]
+    return np.bincount(np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1), minlength=CAUSES)
+
+
+def _quantiles(ordered: Array, shares: Array) -> Array:
+    """Quantiles of figures in order, of which the k-th stands for the share (k − ½)/n; linear between two of them."""
+    if not ordered.size:
+        return np.full(shares.shape, np.nan)
+    found = np.quantile(ordered, np.clip(np.nan_to_num(shares), 0.0, 1.0), method="hazen")
+    found = np.where(np.isnan(found), _of_rank(ordered, shares), found)
+    return np.where(np.isnan(shares), np.nan, found)
+
+
+def _of_rank(ordered: Array, shares: Array) -> Array:
+    """The figures that so large shares do not exceed, NaN of a share that is not known."""
+    rank = np.ceil(np.nan_to_num(shares) * len(ordered) - 1e-9).astype(int) - 1
+    return np.where(np.isnan(shares), np.nan, ordered[np.clip(rank, 0, len(ordered) - 1)])
+
+
+def _quantile_ends(ordered: list[Array], figure: Array) -> Interval:
+    """Intervals of the quantiles. figure: (measure, replicate, sample)."""
+    shares = np.array(QUANTILES)
+    ends = np.full((2, len(ordered), len(shares)), np.nan)
+    for i, row in enumerate(ordered):
+        if not row.size:
+            continue
+        if figure.shape[1] == 1:
+            ends[:, i] = [_of_rank(row, end) for end in intervals.of_quantile(shares, len(row))]
+            continue
+        each = np.array([_quantiles(np.sort(part[~np.isnan(part)]), shares) for part in figure[i]])
         low, high = intervals.by_replicates(each, axis=0)
         # even points tell a share to half of one: an error that the replicates have in common
-        half = 0.5 * job.replicates / np.maximum(np.max(figures.count), 1.0)
-        below, above = (quantile(counts, job.bins, q + sign * half, figures.least, figures.most) for sign in (-1, 1))
-        low, high = np.minimum(low, below), np.maximum(high, above)
+        half = 0.5 * figure.shape[1] / len(row)
+        low, high = np.minimum(low, _quantiles(row, shares - half)), np.maximum(high, _quantiles(row, shares + half))
         # the quantile of a replicate with hardly a point beyond it is its extreme
-        few = figures.count[:, None] / job.replicates * np.minimum(q, 1 - q) < FEWEST
-        low, high = np.where(few, np.nan, low), np.where(few, np.nan, high)
-    else:
-        low, high = np.empty_like(found), np.empty_like(found)
-        for i, n in enumerate(figures.count):
-            shares = intervals.of_quantile(q, n)
-            for ends, share in zip((low, high), shares, strict=True):
-                ends[i] = quantile(counts[i], _alone(job.bins, i), share, figures.least[i], figures.most[i])
-    return {"quantile_value": found, "quantile_low": low, "quantile_high": high}
+        few = len(row) / figure.shape[1] * np.minimum(shares, 1 - shares) < FEWEST
+        ends[:, i] = np.where(few, np.nan, [low, high])
+    return ends[0], ends[1]
 
 
-def _alone(bins: Bins, i: int) -> Bins:
-    return Bins(float(np.ravel(bins.centre)[i]), float(np.ravel(bins.scale)[i]), bins.fineness, bins.octaves)
+def _histogram(ordered: list[Array]) -> tuple[NDArray[np.int64], Array]:
+    """Samples in even bins, (measure, bin), and their edges; what lies far out is in the outermost bins."""
+    counts, edges = np.zeros((len(ordered), BINS), np.int64), np.empty((len(ordered), BINS + 1))
+    for i, row in enumerate(ordered):
+        finite = row[np.isfinite(row)]
+        least, low, high, most = np.quantile(finite, [0.0, CORE, 1 - CORE, 1.0]) if finite.size else np.zeros(4)
+        room = FAR * (high - low)
+        least, most = max(least, low - room), min(most, high + room)
+        if not most - least > (slight := max(LEAST[0] * abs(least), LEAST[1])):
+            least, most = least - slight, most + slight
+        edges[i] = np.linspace(least, most, BINS + 1)
+        counts[i] = np.histogram(np.clip(row, edges[i, 0], edges[i, -1]), edges[i])[0]
+    return counts, edges
 
 
-def _yields(totals: list[Moments], passes: Moments, done: int, count: int, replicated: bool) -> dict[str, Any]:
-    passed = np.rint(passes.mean * passes.count)
-    if replicated:
-        each = np.array([np.rint(one.mean[count:] * one.count[count:]) for one in totals])
-        # turned to where a measure changes most, a replicate's count is all but one of two numbers: on the safe side
-        low, high = intervals.share_by_replicates(each, int(np.max(totals[0].count)), axis=0, least=0.25)
-    else:
-        low, high = intervals.share(passed, passes.count)
-    share = passed / done if done else np.full(count + 1, np.nan)
-    return {
-        "yield": share[:-1], "yield_low": low[:-1], "yield_high": high[:-1],
-        "yield_all": share[-1], "yield_all_low": low[-1], "yield_all_high": high[-1],
-    }  # fmt: skip
-
-
-def _capability(job: Sampling, study: ToleranceStudy, figures: Moments) -> dict[str, Any]:
+def _capability(measures: tuple[Measure, ...], study: ToleranceStudy, moments: Moments) -> dict[str, Any]:
     """C_p and C_pk of the figure between its limits; of a largest |deviation|, towards the limits' smaller side."""
-    cp, cpk = np.full(len(job.measures), np.nan), np.full(len(job.measures), np.nan)
-    for i, measure in enumerate(job.measures):
-        nominal = study.references[measure.name].figure
-        low, high = limits_of(measure, nominal)
+    cp, cpk = np.full(len(measures), np.nan), np.full(len(measures), np.nan)
+    for i, measure in enumerate(measures):
+        low, high = limits_of(measure, study.references[measure.name].figure)
         if np.isfinite(low) or np.isfinite(high):
-            cp[i], cpk[i] = intervals.capability(low, high, figures.mean[i], figures.deviation[i])
+            cp[i], cpk[i] = intervals.capability(low, high, moments.mean[i], moments.deviation[i])
     return {"cp": cp, "cpk": cpk}
 
 
-def limits_of(measure: Any, nominal: float) -> tuple[float, float]:
+def limits_of(measure: Measure, nominal: float) -> tuple[float, float]:
     """Least and largest figure within limits and bounds; ±∞ where there is none."""
     low = -np.inf if measure.at_least is None else measure.at_least
     high = np.inf if measure.at_most is None else measure.at_most
@@ -162,42 +179,29 @@ def limits_of(measure: Any, nominal: float) -> tuple[float, float]:
     return low, high
 
 
-def _bands(job: Sampling, tally: SampleTally, study: ToleranceStudy) -> Array:
-    """Quantiles of the deviation of the course at every position."""
-    found = np.full((len(job.measures), len(QUANTILES), job.positions), np.nan)
-    for i, measure in enumerate(job.measures):
-        index = study.plan.windows[measure.name].index
-        counts = tally.band[i, : len(index)]
-        found[i][:, index] = quantile(counts, job.curve_bins(i), np.array(QUANTILES)).T
+def _bands(samples: Samples, study: ToleranceStudy) -> Array:
+    """Quantiles of the deviation of the course at every position, of the samples whose curves are kept."""
+    found = np.full((len(samples.curves), len(QUANTILES), samples.job.positions), np.nan)
+    for i, (curves, of) in enumerate(zip(samples.curves, study.linear.measures, strict=True)):
+        nominal = 0.0 if of.reference.against else np.nan_to_num(of.curve)
+        ordered = np.sort(curves - nominal, axis=0)  # NaN last
+        index = study.plan.windows[of.measure.name].index
+        for position, column in zip(index, ordered.T, strict=True):
+            found[i, :, position] = _quantiles(column[~np.isnan(column)], np.array(QUANTILES))
     return found
 
 
-def _convergence(job: Sampling, tally: SampleTally, count: int) -> dict[str, Any]:
-    """Figures of the first 1, 2, 4, … blocks, and of all; of replicates, of the first blocks of each together."""
-    levels = sorted(set.intersection(*(set(tree.prefixes) for tree in tally.trees)))
-    rows = []
-    for level in levels:
-        whole = tally.trees[0].prefixes[level]
-        for tree in tally.trees[1:]:
-            whole = whole.merged(tree.prefixes[level])
-        rows.append(whole)
-    ends = [total for tree in tally.trees if (total := tree.total()) is not None]
-    if ends:
-        last = ends[0]
-        for one in ends[1:]:
-            last = last.merged(one)
-        if not rows or np.max(last.count) > np.max(rows[-1].count):
-            rows.append(last)
+def _convergence(samples: Samples) -> dict[str, Any]:
+    """Figures of all samples, of half of them, of a quarter, …; of replicates, of the first of each together."""
+    count, done = samples.figure.shape
+    each = done // samples.job.replicates
+    sizes = sorted({-(-each >> k) for k in range(SIZES)} - {0, 1}) or [each]
+    replicates = (count, samples.job.replicates, each)
+    figure, passed = samples.figure.reshape(replicates), samples.passed.reshape(replicates)
+    rows = [moments_of(figure[..., :size].reshape(count, -1)) for size in sizes]
     return {
-        "convergence_samples": np.array([np.max(row.count[count:]) for row in rows], np.int64),
-        "convergence_mean": np.array([row.mean[:count] for row in rows]).reshape(-1, count).T,
-        "convergence_deviation": np.array([row.deviation[:count] for row in rows]).reshape(-1, count).T,
-        "convergence_yield": np.array([row.mean[count : 2 * count] for row in rows]).reshape(-1, count).T,
+        "convergence_samples": np.array(sizes, np.int64) * samples.job.replicates,
+        "convergence_mean": np.array([row.mean for row in rows]).T,
+        "convergence_deviation": np.array([row.deviation for row in rows]).T,
+        "convergence_yield": np.array([np.mean(passed[..., :size], axis=(1, 2)) for size in sizes]).T,
     }
-
-
-def _cut(arrays: dict[str, Any]) -> dict[str, Any]:
-    """Without the bins that no measure uses, at both ends."""
-    used = np.flatnonzero(np.any(arrays["histogram"] > 0, axis=0))
-    low, high = (used[0], used[-1] + 1) if len(used) else (0, 1)
-    return {**arrays, "histogram": arrays["histogram"][:, low:high], "edge": arrays["edge"][:, low : high + 1]}

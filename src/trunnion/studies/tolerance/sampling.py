@@ -1,8 +1,7 @@
-"""Random mechanisms by the block: drawn, analysed, counted; nothing of a sample is kept.
+"""Random mechanisms by the block: drawn, analysed, and all their figures kept.
 
-A block is a fixed number of samples, chosen by the number of positions alone, and is drawn, analysed and summed up by
-itself: its bits depend neither on what is worked out beside it nor where. So a run has the same answer to the last bit
-for any portions of blocks and any number of workers.
+A block is a fixed number of samples, chosen by the number of positions and the engine alone. Its random numbers come of
+the seed and its own number, so that a study has the same answer to the last bit with any number of workers.
 """
 
 from __future__ import annotations
@@ -10,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Status
 from trunnion.measures.figures import within_limits
 from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure
@@ -23,91 +21,45 @@ from trunnion.measures.positions import plan
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.statistics.histogram import Bins, count
 from trunnion.statistics.streams import SobolStream, uniforms
-from trunnion.statistics.tally import Tree, moments_of
+from trunnion.studies.job import Part
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import batch_of, many_of
-from trunnion.version import __version__
 
-__all__ = ["METHODS", "SampleTally", "Sampling", "towards"]
+__all__ = ["METHODS", "Sampler", "Samples", "Sampling", "towards"]
 
 Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Method = Literal["monte-carlo", "quasi-monte-carlo"]
 METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
-BATCHES = 8  # of the kernel in a block, so that summing up costs little beside the analysis
-MOST = 2048  # samples in a block, so that few of them show how figures converge
+BATCHES = 8  # of the kernel in a block, so that what a block costs by itself is little beside the analysis
+MOST = 2048  # samples in a block
 MOTIONS = 480  # the same of motions in time, each of which takes as long as a cycle of many positions
 REPLICATES = 8  # independent scramblings, whose spread is the error
-CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
-NOTHING, COARSE = 1e-9, 1e-2  # of the peak of a curve: scatter to first order that is none, and the scale of bins there
-BAND = {"fineness": 4, "octaves": 8}  # of the histograms at every position
+CURVES = 1 << 22  # numbers of the curves of a measure that are kept, for the bands over the cycle
 
 
 @dataclass(frozen=True, eq=False)
-class SampleTally:
-    """What is counted of some blocks.
+class Samples:
+    """What is known of every sample.
 
-    histogram (replicate, measure, bin), band (measure, position, bin), failed (cause): counts. trees: by replicate,
-    moments over its blocks of the figures, of whether each is within its limits, and of whether all are.
+    figure and passed, whether it is within the limits, are (measure, sample), figures that do not exist NaN; status is
+    the gravest of a sample's positions, (sample,); curves of each measure those of the first samples,
+    (sample, position). Samples of one replicate stand together.
     """
 
-    histogram: Counts
-    band: Counts
-    failed: Counts
-    trees: tuple[Tree, ...]
-    per_replicate: int
-
-    @property
-    def blocks(self) -> Sequence[tuple[int, int]]:
-        """The blocks done, as ranges."""
-        size = self.per_replicate
-        found: list[tuple[int, int]] = []
-        for i, tree in enumerate(self.trees):
-            for low, high in tree.ranges:
-                if found and found[-1][1] == i * size + low:
-                    found[-1] = (found[-1][0], i * size + high)
-                else:
-                    found.append((i * size + low, i * size + high))
-        return found
-
-    def merge(self, other: Self) -> Self:
-        """The tally of both; integers add up, moments merge in the fixed order of the tree."""
-        trees = tuple(one.merge(two) for one, two in zip(self.trees, other.trees, strict=True))
-        return type(self)(
-            self.histogram + other.histogram, self.band + other.band, self.failed + other.failed, trees,
-            self.per_replicate,
-        )  # fmt: skip
-
-    def to_arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything as arrays by name."""
-        found: dict[str, NDArray[Any]] = {
-            "histogram": self.histogram, "band": self.band, "failed": self.failed,
-            "per_replicate": np.array(self.per_replicate),
-        }  # fmt: skip
-        for i, tree in enumerate(self.trees):
-            found |= {f"tree{i}.{name}": array for name, array in tree.to_arrays().items()}
-        return found
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """From `to_arrays`."""
-        trees = []
-        for i in range(len(arrays["histogram"])):
-            own = {name.partition(".")[2]: array for name, array in arrays.items() if name.startswith(f"tree{i}.")}
-            trees.append(Tree.from_arrays(own))
-        size = int(arrays["per_replicate"])
-        return cls(arrays["histogram"], arrays["band"], arrays["failed"], tuple(trees), size)
+    job: Sampling
+    figure: Array
+    passed: NDArray[np.bool_]
+    status: NDArray[np.int8]
+    curves: Sequence[Array]
 
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
     """A whole run: which mechanism, what is measured where, how many samples and how they are drawn.
 
-    model: plain data of the mechanism; spread: for each measure where its figures are expected, (centre, deviation),
-    for the bins; curve_spread: nominal value and deviation of its curve over its window. rotation: see `towards`.
+    model: plain data of the mechanism; rotation: see `towards`.
     """
 
     model: Mapping[str, Any]
@@ -119,8 +71,6 @@ class Sampling:
     engine: str
     friction: FrictionMethod
     positions: int
-    spread: tuple[tuple[float, float], ...]
-    curve_spread: tuple[tuple[Array, Array], ...]
     rotation: Array | None = None
 
     @cached_property
@@ -155,14 +105,9 @@ class Sampling:
         return self.asked if self.method == "monte-carlo" else REPLICATES * self._points
 
     @property
-    def per_replicate(self) -> int:
-        """Blocks of a replicate."""
-        return -(-self.samples // (self.block_size * self.replicates))
-
-    @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return self.per_replicate * self.replicates
+        return -(-self.samples // (self.block_size * self.replicates)) * self.replicates
 
     def identity(self) -> Mapping[str, Any]:
         """All that the answer depends on."""
@@ -176,34 +121,8 @@ class Sampling:
             "engine": self.engine,
             "friction": asdict(self.friction),
             "block": self.block_size,
-            "spread": self.spread,
-            "curve_spread": self.curve_spread,
             "rotation": self.rotation,
-            "version": __version__,
         }
-
-    def empty(self) -> SampleTally:
-        """The tally of no blocks."""
-        return SampleTally(
-            np.zeros((self.replicates, len(self.measures), Bins(0.0, 1.0).number), np.int64),
-            np.zeros((len(self.measures), self.positions, Bins(0.0, 1.0, **BAND).number), np.int64),
-            np.zeros(CAUSES, np.int64),
-            tuple(Tree() for _ in range(self.replicates)),
-            self.per_replicate,
-        )
-
-    @cached_property
-    def bins(self) -> Bins:
-        """Bins of the figures."""
-        centres, deviations = np.array(self.spread).reshape(-1, 2).T
-        return Bins.around(centres, deviations)
-
-    def curve_bins(self, i: int) -> Bins:
-        """Bins of the deviation of the curve of a measure from nominal at every position of its window."""
-        nominal, deviation = self.curve_spread[i]
-        peak = float(np.max(np.abs(np.nan_to_num(nominal)), initial=0.0))
-        some = np.nan_to_num(deviation, posinf=0.0) > NOTHING * peak
-        return Bins.around(0.0 * nominal, np.where(some, deviation, COARSE * peak), **BAND)
 
     def prepare(self) -> Sampler:
         """The mechanism read and prepared; once in every process."""
@@ -212,6 +131,14 @@ class Sampling:
         windows = plan(run, self.measures, self.steps).windows
         times = {name: window.time for name, window in windows.items()}
         return Sampler(self, inputs, many_of(run, self.measures, inputs, self.friction, self.engine), times)
+
+    def joined(self, parts: Sequence[Part]) -> Samples:
+        """The samples of all blocks, in their order."""
+        curves = [np.concatenate([part[f"curve{i}"] for part in parts]) for i in range(len(self.measures))]
+        figure, passed, status = (
+            np.concatenate([part[name] for part in parts], axis=-1) for name in ("figure", "passed", "status")
+        )
+        return Samples(self, figure, passed, status, curves)
 
 
 def towards(gradients: Array) -> Array:
@@ -243,48 +170,37 @@ class Sampler:
     def drawn(self, block: int) -> Array:
         """The uniform numbers of a block, (dims, sample)."""
         job = self.job
-        replicate, place = divmod(block, job.per_replicate)
         if job.method == "quasi-monte-carlo":
+            replicate, place = divmod(block, job.blocks // job.replicates)
             return self._streams[replicate].points(place * job.block_size, job.block_size)
         first, last = block * job.block_size, min((block + 1) * job.block_size, job.samples)
         parts = [
             uniforms(job.seed, low // job.drawing, self.inputs.dims, min(job.drawing, last - low))
             for low in range(first, last, job.drawing)
         ]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+        return np.concatenate(parts, axis=1)
 
-    def figures(self, u: Array) -> tuple[Array, Array, list[Array], NDArray[np.int8]]:
-        """Of samples drawn: figures and whether they conform, (measure, sample), curves, gravest status, (sample,)."""
-        reads = self.many.read(self.inputs.values(u, self.job.rotation), self.times)
+    def figures(self, u: Array, curves: int = 0) -> Part:
+        """Figures, whether they conform and gravest status of samples drawn, and the curves of the first of them."""
+        reads = self.many.read(self.inputs.values(u, self.job.rotation), self.times if curves else {})
         count, measures = u.shape[1], self.job.measures
-        found, passed, curves = np.empty((len(measures), count)), np.empty((len(measures), count)), []
-        status = np.zeros(count, np.int8)
+        part: Part = {
+            "figure": np.empty((len(measures), count)),
+            "passed": np.empty((len(measures), count), bool),
+            "status": np.zeros(count, np.int8),
+        }
         for i, measure in enumerate(measures):
             read = reads[measure.name]
-            found[i], status = read.figure, np.maximum(status, read.status)
-            passed[i] = within_limits(measure, found[i], read.least, read.most)
-            curves.append(np.broadcast_to(np.asarray(read.shown), (count, len(self.times[measure.name]))))
-        return found, passed, curves, status
+            part["figure"][i] = read.figure
+            part["passed"][i] = within_limits(measure, part["figure"][i], read.least, read.most)
+            part["status"] = np.maximum(part["status"], read.status)
+            shape = (count, len(self.times[measure.name]))
+            shown = np.asarray(read.shown) if curves else np.empty((count, 1))
+            part[f"curve{i}"] = np.broadcast_to(shown, shape)[:curves]
+        return part
 
-    def evaluate(self, first: int, last: int) -> SampleTally:
-        """The tally of blocks first, …, last − 1."""
-        tally = self.job.empty()
-        for block in range(first, last):
-            self._add(tally, block)
-        return tally
-
-    def _add(self, tally: SampleTally, block: int) -> None:
-        replicate, place = divmod(block, self.job.per_replicate)
+    def __call__(self, block: int) -> Part:
+        """What is known of the samples of a block."""
         with np.errstate(all="ignore"):
-            found, passed, curves, status = self.figures(self.drawn(block))
-            lost = np.any(np.isnan(found), axis=0)
-            tally.histogram[replicate] += count(found, self.job.bins)
-            for i, (own, curve) in enumerate(zip(tally.band, curves, strict=True)):
-                apart = np.broadcast_to(curve, (found.shape[1], curve.shape[-1])) - self.job.curve_spread[i][0]
-                own[: curve.shape[-1]] += count(apart.T, self.job.curve_bins(i))
-            if np.any(lost):
-                gravest = status[lost]
-                cause = np.where(gravest >= Status.NOT_CONVERGED, gravest, CAUSES - 1)
-                tally.failed[:] += np.bincount(cause, minlength=CAUSES)
-            everything = np.concatenate([found, passed, np.min(passed, axis=0)[None]])
-            tally.trees[replicate].add(place, moments_of(everything))
+            kept = CURVES // self.job.positions
+            return self.figures(self.drawn(block), max(kept - block * self.job.block_size, 0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -15,7 +15,7 @@ from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
-from trunnion.studies.tolerance import runner
+from trunnion.studies import batch
 from trunnion.studies.tolerance.indices import indices
 from trunnion.studies.tolerance.sampling import METHODS as SAMPLINGS
 
@@ -29,10 +29,10 @@ from trunnion.studies.tolerance.result import dataset
 
 __all__ = ["DEFAULT_METHODS", "Method", "tolerance"]
 
-Method = Literal["linear", "rss", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
+Method = Literal["linear", "worst-case", "monte-carlo", "quasi-monte-carlo", "sobol"]
 DEFAULT_METHODS: tuple[Method, ...] = ("linear", "worst-case", "monte-carlo")
 DEFAULT_SAMPLES = 10_000
-MOST_SAMPLES = 10**15
+MOST_SAMPLES = 10**8  # whose figures are kept, 9 bytes a measure
 
 
 @strict_arguments
@@ -48,11 +48,9 @@ def tolerance(
     *,
     friction_method: FrictionMethod | None = None,
     jobs: int | None = None,
-    chunk: int | None = None,
     engine: Engine = "auto",
     cluster: str | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
-    resume: bool = False,
     progress: Callable[[int], None] | None = None,
     target: float | None = None,
 ) -> xr.Dataset:
@@ -63,7 +61,8 @@ def tolerance(
     samples: of the sampling method, and of the variance-based indices; seed: of its random numbers. steps: positions of
     a whole cycle; at: the place (driver coordinate or time) of measures that state neither a place nor a figure.
     friction_method: how friction and reactions are settled; Newton's method if not given.
-    jobs: processes, one a core if not given and worth it; chunk, cluster, checkpoint, resume, progress: `runner.run`.
+    jobs: processes, one a core if not given and worth it; cluster, checkpoint: see `batch.run`; progress: called with
+    the samples done.
     engine: numpy, compiled, or auto: compiled where it pays and can do the mechanism.
     target: the yield that is asked for; limits are missed below it, and if none is given where a worst case, a yield
     below 1 or a C_pk below 1 breaks them: errors among the findings.
@@ -73,40 +72,36 @@ def tolerance(
     counted, and are outside every limit.
     Raises MechanismError if nothing varies, for an unknown measure or method, or as `analyse` does.
     """
-    (methods, notes), stated = _known(methods), engine
+    methods, notes, stated = tuple(dict.fromkeys(methods)), list[Finding](), engine
     _check(methods, samples, seed, target)
     found = study(mechanism, measures, steps, at, friction_method)
     worst = found.worst() if "worst-case" in methods else None
-    job, tally, shares = None, None, None
+    drawn, shares = None, None
     if (method := next((one for one in methods if one in SAMPLINGS), None)) is not None:
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         if jobs is None:
             jobs = 1 if job.samples * job.positions < FEW and cluster is None else None
+
+        def tell(share: float) -> None:
+            if progress is not None:
+                progress(round(share * job.samples))
+
         try:
-            ran = runner.run(
-                job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,
-                threads=engine == "compiled",
-            )  # fmt: skip
-            if ran.stopped:
-                raise KeyboardInterrupt
+            parts, trouble = batch.run(
+                job, jobs=jobs, threads=engine == "compiled", cluster=cluster, checkpoint=checkpoint, progress=tell
+            )
         except KeyboardInterrupt:
-            kept = (f"samples are in {checkpoint}: --resume continues from them",) if checkpoint else ()
+            kept = (f"samples are in {checkpoint}: the same command goes on from them",) if checkpoint else ()
             raise KeyboardInterrupt(*kept) from None
-        tally = ran.tally
-        notes += [*chosen, *ran.notes]
+        drawn = job.joined(parts)
+        del parts  # as large as the samples
+        notes += [*chosen, *trouble]
     if "sobol" in methods:
         own = found.sampling("quasi-monte-carlo", samples, seed, _engine(found, stated, samples, cluster=None)[0])
         own = replace(own, rotation=None)  # each number is to have its own coordinates of the points
-        shares = indices(found.sampler(own), samples, seed)
-    return dataset(Outcome(found, tuple(methods), worst, job, tally, shares, target), [*found.told, *notes])
-
-
-def _known(methods: Sequence[Method]) -> tuple[tuple[Method, ...], list[Finding]]:
-    """The methods by their own names, and a note of another that was used."""
-    notes = [finding_for("tolerance.method_alias", "method", method="linear")] if "rss" in methods else []
-    names: Iterator[Method] = ("linear" if method == "rss" else method for method in methods)
-    return tuple(dict.fromkeys(names)), notes
+        shares = indices(own.prepare(), samples, seed)
+    return dataset(Outcome(found, tuple(methods), worst, drawn, shares, target), [*found.told, *notes])
 
 
 def _engine(found: ToleranceStudy, engine: Engine, samples: int, cluster: str | None) -> tuple[Engine, list[Finding]]:

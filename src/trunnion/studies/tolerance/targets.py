@@ -28,7 +28,6 @@ __all__ = ["ENOUGH", "MISSED", "OTHERWISE", "against", "limited", "limits", "mis
 Array = NDArray[np.float64]
 MISSED = "limit.missed"  # with which the code of such a finding begins
 CLOSE, SLIGHT = 1e-6, 1e-3  # of a limit: rounding, and what first order leaves out where it was kept
-EQUAL = 1e-3  # parts of a worst case that are alike
 OTHERWISE, ENOUGH = 1.5, 100  # ratio of standard deviations that first order does not explain, and samples for it
 HALF = 0.5  # of the room: a nominal figure that is further off its middle is to be brought there first
 
@@ -212,10 +211,10 @@ def _remedy(outcome: Outcome, of: Of, say: _Words, otherwise: bool) -> str:
         return f"{what}: centre them or change the nominal mechanism, narrower ones cannot correct it"
     off = _off_middle(lower, upper, middle)
     first = f"bring the nominal mechanism {say.say(-off)} nearer to the middle of the limits, and " if off else ""
-    name, share, equals = _largest(outcome, of)
+    name, share = _largest(outcome, of)
     priced = bool(outcome.study.run.system.mechanism.costs)
     whole = "variance" if outcome.target is not None else "worst case"
-    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the {whole}{equals}"
+    narrow = f"{first}narrow first '{name}', {100 * share:.3g} % of the {whole}"
     if not priced:
         return f"{narrow}; `trunnion allocate` finds the cheapest tolerances if the model states `costs`"
     if not fixed and outcome.target is None:
@@ -243,22 +242,11 @@ def _off_middle(lower: float, upper: float, middle: float) -> float:
     return off if np.isfinite(room) and abs(off) > HALF * room else 0.0
 
 
-def _largest(outcome: Outcome, of: Of) -> tuple[str, float, str]:
-    """The number with the largest part in the worst case, its share, and what equal ones have together, if it is more.
+def _largest(outcome: Outcome, of: Of) -> tuple[str, float]:
+    """The number with the largest part in the worst case, and its share.
 
     Where a yield is asked for, in the variance: that decides it, and the worst case knows no correlation.
     """
-    study = outcome.study
-    worst = np.nan_to_num(of.figure.covariances if outcome.target is not None else of.figure.spread.worst)
-    top = int(np.argmax(worst))
-    total = float(np.sum(worst))
-    if not total > 0:
-        return study.inputs.names[top], 0.0, ""
-    groups = np.abs(worst - worst[:, None]) <= EQUAL * worst[:, None]
-    same = groups[int(np.argmax(groups @ worst))]
-    together = float(same @ worst)
-    names, first = study.inputs.names, study.inputs.names[top]
-    others = ", ".join(name for name, like in zip(names, same, strict=True) if like and name != first)
-    equals = f", and {others} as much, together " if same[top] else f", or {others}, as much as each other, together "
-    equals += f"{100 * together / total:.3g} %"
-    return first, float(worst[top]) / total, equals if together > worst[top] else ""
+    parts = np.nan_to_num(of.figure.covariances if outcome.target is not None else of.figure.spread.worst)
+    top, total = int(np.argmax(parts)), float(np.sum(parts))
+    return outcome.study.inputs.names[top], float(parts[top]) / total if total > 0 else 0.0

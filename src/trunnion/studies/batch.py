@@ -1,0 +1,169 @@
+"""Work cut into numbered blocks: done in this process, in threads, in processes of this machine or on a cluster.
+
+A block depends on its job and its number alone, and the answer of a run is the parts of all blocks in their order. So
+the bits of the answer depend neither on the number of workers nor on which of them does what.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
+from functools import lru_cache, partial
+from itertools import islice
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.studies.checkpoint import Checkpoint
+from trunnion.studies.job import DEATHS, Job, Part, undisturbed
+
+__all__ = ["run"]
+
+AHEAD = 2  # blocks given to every worker: the one under way and the next
+PAUSE = 0.5  # s; Windows hears Ctrl-C only between two waits
+
+
+def run(
+    job: Job,
+    *,
+    jobs: int | None = 1,
+    threads: bool = False,
+    cluster: str | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[Part], list[Finding]]:
+    """All parts of a job in their order, and a finding if the checkpoint could not be written to the end.
+
+    Parameters
+    ----------
+    jobs
+        Processes on this machine, one a core if None; with one, all is done in this process.
+    threads
+        Whether threads take the place of processes: for what leaves Python's interpreter lock most of the time.
+    cluster
+        "local", a Dask cluster of so many processes here, or the address of a Dask scheduler.
+    checkpoint
+        File that every finished block is added to; the blocks that it holds already are not done again.
+    progress
+        Called with the share of the blocks done, in this thread.
+
+    Raises
+    ------
+    MechanismError
+        The checkpoint is of another job or cannot be read, workers die one after another, or no cluster answers.
+    """
+    if jobs is not None and jobs < 1:
+        raise MechanismError(Finding(f"{jobs} jobs", "jobs", "state 1 or more, or none for all cores"))
+    tell = progress or (lambda share: None)
+    with Checkpoint(checkpoint, job) as done:
+        tell(len(done.parts) / job.blocks)
+        left = [block for block in range(job.blocks) if block not in done.parts]
+        with closing(_worked(job, left, jobs or os.cpu_count() or 1, threads, cluster)) as parts:
+            for block, part in parts:
+                done.add(block, part)
+                tell(len(done.parts) / job.blocks)
+    return [done.parts[block] for block in range(job.blocks)], [done.trouble] if done.trouble else []
+
+
+def _worked(job: Job, blocks: list[int], jobs: int, threads: bool, cluster: str | None) -> Generator[tuple[int, Part]]:
+    """Blocks with their parts, as they are finished."""
+    workers = min(jobs, len(blocks))
+    if cluster is not None and blocks:
+        from trunnion.studies.cluster import connected  # its package is an extra
+
+        with connected(cluster, workers) as (executor, count):
+            yield from _spread(partial(_work, pickle.dumps(job)), blocks, executor, count)
+    elif workers <= 1:
+        part_of = job.prepare() if blocks else None
+        for block in blocks:
+            assert part_of is not None
+            yield block, part_of(block)
+    elif threads:
+        with ThreadPoolExecutor(workers) as executor:
+            yield from _spread(job.prepare(), blocks, executor, workers)
+    else:
+        yield from _by_processes(job, blocks, workers)
+
+
+def _spread(
+    part_of: Callable[[int], Part], blocks: Iterable[int], executor: Executor, workers: int
+) -> Iterator[tuple[int, Part]]:
+    """Blocks with their parts as an executor finishes them; a few are under way at a time."""
+    waiting, under_way = iter(blocks), dict[Future[Part], int]()
+    try:
+        while True:
+            for block in islice(waiting, AHEAD * workers - len(under_way)):
+                with undisturbed():  # it may start a process or a thread
+                    under_way[executor.submit(part_of, block)] = block
+            if not under_way:
+                return
+            for future in wait(under_way, PAUSE, FIRST_COMPLETED).done:
+                yield under_way.pop(future), future.result()
+    finally:
+        for future in under_way:
+            future.cancel()
+
+
+# ---- processes ------------------------------------------------------------------------------------------------
+
+
+def _by_processes(job: Job, blocks: Iterable[int], workers: int) -> Iterator[tuple[int, Part]]:
+    """Parts by processes. Those that die are replaced, and the blocks under way are done again."""
+    left, deaths, packed = dict.fromkeys(blocks), 0, pickle.dumps(job)
+    while left:
+        with _pool(workers) as pool:
+            try:
+                for block, part in _spread(partial(_work, packed), list(left), pool, workers):
+                    del left[block]
+                    deaths = 0
+                    yield block, part
+            except BrokenProcessPool:
+                deaths += 1
+        if deaths >= DEATHS:
+            what = f"{DEATHS} workers died in turn, the next block being {next(iter(left))}"
+            remedy = (
+                "often too little memory: fewer --jobs, fewer --steps; "
+                "a script calls this under `if __name__ == '__main__':`"
+            )
+            raise MechanismError(Finding(what, "jobs", remedy))
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that are started anew (`spawn`), as Windows and macOS do it everywhere, and are gone at the end."""
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin)
+    try:
+        yield pool
+    finally:
+        for process in list((pool._processes or {}).values()):
+            process.kill()  # one may be in the middle of a long block, or deaf to being terminated
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin() -> None:
+    """In a worker: leave Ctrl-C to the main process, and end when that ends, however it does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_follow, daemon=True).start()
+
+
+def _follow() -> None:
+    main = multiprocessing.parent_process()
+    if main is not None:
+        main.join()
+        os._exit(1)
+
+
+def _work(packed: bytes, block: int) -> Part:
+    """In a worker: the part of a block of a pickled job, which is prepared once."""
+    return _prepared(packed)(block)
+
+
+@lru_cache(maxsize=1)
+def _prepared(packed: bytes) -> Callable[[int], Part]:
+    job: Job = pickle.loads(packed)
+    return job.prepare()

@@ -9,9 +9,9 @@ from fractions import Fraction
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.expression import LITERAL, literal, normalise
+from trunnion.model.expression import LITERAL, literal
 from trunnion.model.quantity import Quantity, deviation_spans
-from trunnion.model.units import Kind, UnitError
+from trunnion.model.units import Kind, UnitError, normalise
 
 __all__ = ["DIGITS", "half_width", "limits_text", "number_with", "written"]
 

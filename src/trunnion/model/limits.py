@@ -10,9 +10,8 @@ import numpy as np
 from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
 from trunnion.model.entry import problem
-from trunnion.model.expression import normalise
 from trunnion.model.quantity import Quantity, term
-from trunnion.model.units import UnitError
+from trunnion.model.units import UnitError, normalise
 
 __all__ = ["LimitText", "Limits"]
 

@@ -7,6 +7,7 @@ whether it can be assembled) is checked where the structure is known.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,7 +103,9 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
         if missing := [name for name in names if name not in sayable]:
             unreadable.add(entry.path)
             for name in missing:
-                yield unknown_name(mechanism, name, entry.where, entry.quantity.source, known)
+                finding = unknown_name(mechanism, name, entry.where, entry.quantity.source, known)
+                respelt = entry.quantity.respelt(entry.kind)
+                yield replace(finding, remedy=f"write {respelt}") if respelt else finding
             continue
         if entry.varies and entry.quantity.tolerance:
             what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"

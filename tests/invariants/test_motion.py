@@ -374,7 +374,7 @@ BAD: list[tuple[Data, str, str]] = [
     ({**RISE, "range": [1, 1]}, "drivers.A.range", "begins and ends at 1"),
     ({**RISE, "law": "cycloid"}, "drivers.A.law", "'cycloid' is not a motion law"),
     ({**RISE, "return": True}, "drivers.A.return", "the key 'return' is unknown"),
-    ({"law": "table", "points": [[0, 0], [0.2, 1], [0.1, 2]]}, "drivers.A.points.2", "does not come after 0.2 s"),
+    ({"law": "table", "points": [[0, 0], [0.2, 1], [0.1, 2]]}, "drivers.A.points.2", "does not come after 0.2"),
     ({"law": "table", "points": [[0.1, 0], [0.2, 1]]}, "drivers.A.points.0", "begins at 0.1 s"),
     ({"law": "table", "points": [[0, 0]]}, "drivers.A.points", "at least 2 are needed"),
     ({"law": "table", "points": [[0, 1], [1, 1]]}, "drivers.A.points", "never moves"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
@@ -10,6 +10,7 @@ from trunnion.model.entry import Direction, Part
 from trunnion.model.limits import LimitText
 from trunnion.model.measure_table import MEASURES, MeasureKind
 from trunnion.model.quantity import AnyQuantity
+from trunnion.model.rules import Positive
 
 __all__ = ["STATISTICS", "Measure", "Statistic"]
 
@@ -71,7 +72,7 @@ class Measure(_Subject):
         default=None,
         description="the range of it, two coordinates of the first driver or two times; the whole motion if not given",
     )
-    duration: AnyQuantity | None = Field(
+    duration: Annotated[AnyQuantity | None, Positive] = Field(
         default=None,
         description=(
             "of a measure of a motion in time: how long it is followed from its start; ten cycles if not given"

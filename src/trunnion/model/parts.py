@@ -6,6 +6,7 @@ left out stay unset, so that a model is written back with what was stated and no
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -61,6 +62,7 @@ from trunnion.model.quantity import (
     Stiffness,
     Time,
 )
+from trunnion.model.rules import NotNegative, NotZero, Positive, Rising, Within
 from trunnion.model.tolerance_parts import Correlation, Variation, VariationDefaults
 from trunnion.model.units import KINDS
 
@@ -157,7 +159,7 @@ class Link(Part):
     """
 
     points: Mapping[Name, Point] = {}
-    mass: Mass = Quantity(0, KINDS["mass"])
+    mass: Annotated[Mass, NotNegative] = Quantity(0, KINDS["mass"])
     centre: (
         Annotated[
             Annotated[Position, Tag(":list")] | Annotated[PolarPoint, Tag(":group")],
@@ -185,25 +187,25 @@ class Motor(Part):
     kind: Annotated[str, _check_motor, _schema_motor]
     effort: ForceOrMoment | None = None
     stall_effort: ForceOrMoment | None = None
-    no_load_speed: Rate | None = None
-    breakdown_effort: ForceOrMoment | None = None
-    breakdown_slip: Dimensionless | None = None
-    synchronous_speed: Rate | None = None
-    points: Annotated[tuple[tuple[AnyQuantity, ForceOrMoment], ...], Field(min_length=2)] | None = None
+    no_load_speed: Annotated[Rate | None, NotZero("the motor has no speed")] = None
+    breakdown_effort: Annotated[ForceOrMoment | None, Positive] = None
+    breakdown_slip: Annotated[Dimensionless | None, Positive] = None
+    synchronous_speed: Annotated[Rate | None, NotZero("the motor has no speed")] = None
+    points: Annotated[tuple[tuple[AnyQuantity, ForceOrMoment], ...], Field(min_length=2), Rising("place")] | None = None
     over: Literal["speed", "time"] = "speed"
     target: Rate | None = None
-    proportional: AnyQuantity | None = None
-    integral: AnyQuantity | None = None
-    limit: ForceOrMoment | None = None
-    ratio: Dimensionless | None = None
-    efficiency: Dimensionless | None = None
-    inertia: AnyQuantity | None = None
-    off_from: Time | None = None
-    brake: ForceOrMoment | None = None
-    brake_from: Time | None = None
-    clutch: ForceOrMoment | None = None
-    clutch_from: Time | None = None
-    clutch_until: Time | None = None
+    proportional: Annotated[AnyQuantity | None, NotNegative] = None
+    integral: Annotated[AnyQuantity | None, NotNegative] = None
+    limit: Annotated[ForceOrMoment | None, Positive] = None
+    ratio: Annotated[Dimensionless | None, NotZero("the motor would not turn")] = None
+    efficiency: Annotated[Dimensionless | None, Within(0, 1, "(]", "such as 0.95")] = None
+    inertia: Annotated[AnyQuantity | None, NotNegative] = None
+    off_from: Annotated[Time | None, NotNegative] = None
+    brake: Annotated[ForceOrMoment | None, NotNegative] = None
+    brake_from: Annotated[Time | None, NotNegative] = None
+    clutch: Annotated[ForceOrMoment | None, Positive] = None
+    clutch_from: Annotated[Time | None, NotNegative] = None
+    clutch_until: Annotated[Time | None, NotNegative] = None
 
     @property
     def of(self) -> MotorKind:
@@ -225,22 +227,22 @@ class Driver(Part):
     """
 
     law: Annotated[str, _check_motion, _schema_motion] = "constant"
-    speed: Rate | None = None
+    speed: Annotated[Rate | None, NotZero("the driver does not move", "give a speed, however small")] = None
     start: AngleOrLength | None = None
     range: tuple[AngleOrLength, AngleOrLength] | None = None
     mean: AngleOrLength | None = None
-    amplitude: AngleOrLength | None = None
-    period: Time | None = None
+    amplitude: Annotated[AngleOrLength | None, NotZero("it never moves", "give it an extent")] = None
+    period: Annotated[Time | None, Positive] = None
     phase: Angle | None = None
-    duration: Time | None = None
-    return_duration: Time | None = None
-    dwell: Time | None = None
+    duration: Annotated[Time | None, Positive] = None
+    return_duration: Annotated[Time | None, Positive] = None
+    dwell: Annotated[Time | None, NotNegative] = None
     returns: bool = True
-    points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2)] | None = None
+    points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2), Rising("time")] | None = None
     file: str | None = None
     periodic: bool = False
     ends: Literal["clamped", "natural"] = "clamped"
-    delay: Time | None = None
+    delay: Annotated[Time | None, NotNegative] = None
     free: bool = False
     motor: Motor | None = None
     initial: Initial | None = None
@@ -303,8 +305,8 @@ class Load(Part):
     ) = None
     frame: Literal["global", "link"] = "global"
     joint: str | None = None
-    resisting_torque: Moment | None = None
-    resisting_force: Force | None = None
+    resisting_torque: Annotated[Moment | None, NotNegative] = None
+    resisting_force: Annotated[Force | None, NotNegative] = None
     only: Literal["positive", "negative"] | None = None
     useful: bool = False
 
@@ -316,7 +318,7 @@ class Table(Part):
     """
 
     over: Literal["drive", "time"] = "drive"
-    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2)] = ()
+    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2), Rising("at")] = ()
     file: str | None = None
     interpolation: Literal["linear", "spline"] = "linear"
     periodic: bool = False
@@ -337,10 +339,10 @@ class Spring(Part):
 
     between: tuple[str, str] | None = None
     joint: str | None = None
-    stiffness: Stiffness | None = None
-    free_length: Length | None = None
+    stiffness: Annotated[Stiffness | None, NotNegative] = None
+    free_length: Annotated[Length | None, NotNegative] = None
     free_angle: Angle | None = None
-    damping: Damping | None = None
+    damping: Annotated[Damping | None, NotNegative] = None
     preload: ForceOrMoment | None = None
     only: Literal["pull", "push"] | None = None
     useful: bool = False
@@ -357,10 +359,10 @@ class Gear(Part):
     """
 
     joints: tuple[str, str]
-    ratio: Dimensionless
+    ratio: Annotated[Dimensionless, NotZero("the second joint would not turn at all")]
     phase: Angle = Quantity(0, KINDS["angle"])
     teeth: bool = True
-    pressure_angle: Angle | None = None
+    pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)", "20 deg is usual")] = None
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""

@@ -124,17 +124,6 @@ def contact_values(joint: Joint, values: Mapping[str, float], where: str) -> Ite
     if restitution < 0 or restitution > 1 or (restitution == 0 and not contact.of.rigid):
         what = f"is {restitution:g}, which is not {least} and at most 1"
         yield Finding(what, f"{path}.restitution", "give the speed after over the speed before an impact, such as 0.8")
-    for key, low, high, say in (
-        ("stiffness", 0.0, np.inf, "above 0"),
-        ("modulus", 0.0, np.inf, "above 0"),
-        ("hole_modulus", 0.0, np.inf, "above 0"),
-        ("exponent", 1.0 - 1e-12, 10.0, "from 1 to 10"),
-        ("poisson_ratio", -1.0, 0.5 + 1e-12, "above −1 and at most 0.5"),
-        ("hole_poisson_ratio", -1.0, 0.5 + 1e-12, "above −1 and at most 0.5"),
-    ):
-        number = values.get(f"{path}.{key}", np.nan)
-        if key in contact.model_fields_set and (number <= low or number > high):
-            yield Finding(f"is {number:g}", f"{path}.{key}", f"give a number {say}")
     if contact.modulus is not None and values.get(f"{path}.exponent", 1.5) != 1.5:
         what = "the stiffness by a modulus goes with the exponent 1.5"
         yield Finding(what, f"{path}.exponent", "remove it, or state the stiffness itself")

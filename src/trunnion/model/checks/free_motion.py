@@ -63,37 +63,14 @@ def free_motion(driver: Driver, where: str) -> Iterator[Finding]:
         yield Finding(what, f"{where}.motor.clutch", "add inertia: 0.02 kg m^2, on the motor's side")
 
 
-ABOVE_0 = ("breakdown_effort", "breakdown_slip", "limit", "efficiency", "clutch")
-NOT_BELOW_0 = (
-    *("inertia", "brake", "proportional", "integral"),
-    *("off_from", "brake_from", "clutch_from", "clutch_until"),
-)
-NOT_0 = ("ratio", "no_load_speed", "synchronous_speed")
-
-
-def motor_values(driver: Driver, values: Mapping[str, float], where: str) -> Iterator[Finding]:
+def motor_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:
     """Whether the numbers of a motor can be those of one."""
     where = f"{where}.motor"
-    for keys, limit in ((ABOVE_0, "above 0"), (NOT_BELOW_0, "of at least 0"), (NOT_0, "other than 0")):
-        for key in keys:
-            number = values.get(f"{where}.{key}", np.nan)
-            if {ABOVE_0: number <= 0, NOT_BELOW_0: number < 0, NOT_0: number == 0}[keys]:
-                yield Finding(f"is {number:g}", f"{where}.{key}", f"give a number {limit}")
     for effort, speed in (("stall_effort", "no_load_speed"), ("breakdown_effort", "synchronous_speed")):
         if values.get(f"{where}.{effort}", np.nan) * values.get(f"{where}.{speed}", np.nan) < 0:
             what = f"the motor drives away from its {speed}: their signs differ"
             yield Finding(what, f"{where}.{effort}", f"give {effort} and {speed} the same sign")
     yield from _clutch_values(values, where)
-    if values.get(f"{where}.efficiency", 1.0) > 1.0:
-        what = f"is {values[f'{where}.efficiency']:g}, above 1"
-        yield Finding(what, f"{where}.efficiency", "give a share of at most 1, such as 0.95")
-    if driver.motor is not None and driver.motor.points is not None:
-        over = driver.motor.over
-        places = [values[f"{where}.points.{k}.place"] for k in range(len(driver.motor.points))]
-        for k in range(1, len(places)):
-            if places[k] <= places[k - 1]:
-                what = f"its {over} {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
-                yield Finding(what, f"{where}.points.{k}", f"sort the points by {over}")
 
 
 def _clutch_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:

@@ -54,12 +54,10 @@ def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
 
 
 def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Finding]:
-    """Ratios and pressure angles that no gear has."""
+    """Gears without a pitch point, or on one centre."""
     for name, gear in mechanism.gears.items():
         where = f"gears.{name}"
         ratio = values.get(f"{where}.ratio", np.nan)
-        if ratio == 0:
-            yield Finding("is 0: the second joint would not turn at all", f"{where}.ratio", "give another ratio")
         known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
         carriers = mechanism.carriers(name) if known else None
         if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
@@ -68,10 +66,6 @@ def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Fi
         if gear.teeth and carriers and not _apart(mechanism, name, carriers, values):
             what = "both joints are at the same point of the link that carries them: the centre distance is zero"
             yield Finding(what, where, "move one, or state teeth: false for gears inside each other or a belt")
-        angle = values.get(f"{where}.pressure_angle", 0.0)
-        if angle < 0 or angle >= np.pi / 2:
-            what = f"is {np.degrees(angle):.4g}°"
-            yield Finding(what, f"{where}.pressure_angle", "give an angle from 0 to below 90°; 20 deg is usual")
 
 
 def _apart(mechanism: Numbers, name: str, carriers: tuple[int, int], values: Mapping[str, Number]) -> bool:

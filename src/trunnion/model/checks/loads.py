@@ -156,18 +156,14 @@ def unread(file: str, where: str) -> Finding:
 
 
 def table_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
-    """Whether the points of each table come in order and a periodic one ends as it begins."""
+    """Whether a periodic table ends as it begins."""
     for name, table in mechanism.tables.items():
         where = f"tables.{name}.points"
         rows = range(len(table.points))
         if not rows:
             continue
         places, column = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("at", "value"))
-        jumbled = [k for k in rows[1:] if places[k] <= places[k - 1]]
-        for k in jumbled:
-            what = f"its place {places[k]:g} does not come after {places[k - 1]:g} of the point before (SI)"
-            yield Finding(what, f"{where}.{k}", "sort the points; make a jump steep, not upright")
-        if table.repeats and not jumbled:
+        if table.repeats and all(places[k] > places[k - 1] for k in rows[1:]):
             yield from _repeated(mechanism, name, (places, column), values)
 
 
@@ -309,10 +305,6 @@ def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
     """Signs, the sense of a preload, and a free angle that would count whole turns where nothing counts them."""
     for name, spring in mechanism.springs.items():
         where = f"springs.{name}"
-        for key in ("stiffness", "damping", *(["free_length"] if spring.between else [])):
-            number = values.get(f"{where}.{key}", np.nan)
-            if number < 0:
-                yield Finding(f"is {number:g}, which is negative", f"{where}.{key}", "give a value of at least 0")
         if values.get(f"{where}.stiffness", np.nan) == 0 and not values.get(f"{where}.preload", 0.0):
             yield Finding("is 0: the spring does not pull", f"{where}.stiffness", "remove it", Severity.WARNING)
         preload = values.get(f"{where}.preload", np.nan)

@@ -156,8 +156,6 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
         if lower > upper:
             what = f"the lower limit {lower:g} is above the upper one {upper:g} (SI)"
             yield Finding(what, f"{where}.limit", "write ± before a number that is not negative")
-        if value("duration") <= 0:
-            yield Finding(f"a duration of {value('duration'):g} s", f"{where}.duration", "give a time above 0")
         least, most = value("at_least"), value("at_most")
         if least > most:
             yield Finding(f"at least {least:g} and at most {most:g} (SI)", f"{where}.at_least", "exchange them")
@@ -170,9 +168,6 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
             if value(key) >= up_to:
                 what = f"is {value(key):g}, but this measure is looked for up to {up_to:g} alone"
                 yield Finding(what, f"{where}.{key}", "give a number below that")
-        parts = [number for path, number in numbers.nominal.items() if path.startswith(f"{where}.along.")]
-        if parts and not any(parts):
-            yield Finding("the direction is zero", f"{where}.along", "give it a length, such as [1, 0]")
         start, end = value("over.from"), value("over.to")
         kinds = {one.kind.name for key, one in numbers.entries.items() if key.startswith(f"{where}.over.")}
         if len(kinds) > 1:

@@ -103,6 +103,11 @@ class Part(BaseModel):
         """Nothing."""
         _refuse()
 
+    def __dir__(self) -> list[str]:
+        """Its own names; those of pydantic work, and show the way to nothing."""
+        foreign = {name for name in dir(BaseModel) if not name.startswith("_")} - type(self).model_fields.keys()
+        return [name for name in super().__dir__() if name not in foreign]
+
     @model_validator(mode="after")
     def _freeze(self) -> Self:
         self.__dict__.update({key: _read_only(value) for key, value in vars(self).items() if isinstance(value, dict)})

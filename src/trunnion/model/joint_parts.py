@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     GetJsonSchemaHandler,
     PlainSerializer,
@@ -222,10 +221,10 @@ class Misalignment(Part):
         return self.model_copy(update={key: Quantity(0, KINDS[zeros[key]]) for key in missing})
 
 
-class Friction(BaseModel):
+class Friction(Part):
     """Friction of a joint: a law with its parameters, or one number, the coefficient (law: coulomb)."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, hide_input_in_errors=True)
+    model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, AnyQuantity]
 
     law: Annotated[str, _check_law, _schema_law] | None = None

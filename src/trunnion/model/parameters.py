@@ -20,6 +20,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.dimensions import evaluation_order
+from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind, placed_measures
@@ -390,6 +391,7 @@ class ParameterSet:
         self._nominal_names: dict[str, Number] = {}
         for entry in numbers:
             self._evaluate(entry, self.nominal, self._nominal_names)
+        self.entries, self.nominal = ReadOnlyDict(self.entries), ReadOnlyDict(self.nominal)
 
     @property
     def errors(self) -> tuple[str, ...]:

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["check_values"]
 
 Values = Mapping[str, Number]
-# Rounding in a file of four to six digits may violate the triangle inequality of a flat body by this much.
-INERTIA_SLACK = 1e-3
+# of the largest moment, by which a flat body may violate the triangle inequality: of four digits, of three or two
+INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2
 
 
 def check_values(
@@ -206,12 +206,13 @@ def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iter
         tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     if not np.isfinite(tensor).all():
         return
-    principal = np.linalg.eigvalsh(tensor)
-    slack = INERTIA_SLACK * float(np.abs(tensor).max())
-    if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
+    principal, size = np.linalg.eigvalsh(tensor), float(np.abs(tensor).max())
+    excess = principal[2] - principal[0] - principal[1]
+    if principal[0] < -INERTIA_SLACK * size or excess > INERTIA_SLACK * size:
+        rounded = principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_ROUNDING * size
         shown = ", ".join(f"{one:.4g}" for one in principal)
-        yield Finding(
-            f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others",
-            path,
-            "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)",
-        )
+        what = f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others"
+        remedy = "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)"
+        if rounded:
+            what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"
+        yield Finding(what, path, remedy, Severity.WARNING if rounded else Severity.ERROR)

@@ -369,7 +369,7 @@ BAD: list[tuple[Data, str, str]] = [
     ({"speed": 3.0, "duration": 0.2}, "drivers.A.duration", "has no effect on the motion law constant"),
     ({**RISE, "dwell": -0.1}, "drivers.A.dwell", "is -0.1 s, which is negative"),
     ({**RISE, "return_duration": 0}, "drivers.A.return_duration", "is 0 s, which is not above 0"),
-    ({**RISE, "return_duration": 1, "returns": False}, "drivers.A.return_duration", "does not return"),
+    ({**RISE, "return_duration": 1, "returns": False}, "drivers.A.return_duration", "has no effect without returns"),
     ({"speed": 3.0, "return_duration": 0.2}, "drivers.A.return_duration", "has no effect on the motion law constant"),
     ({**RISE, "range": [1, 1]}, "drivers.A.range", "begins and ends at 1"),
     ({**RISE, "law": "cycloid"}, "drivers.A.law", "'cycloid' is not a motion law"),

@@ -73,7 +73,7 @@ CASES = [
     ("  crank:\n", '  "cr\\u0007ank":\n', 9, "links", "control characters", "printable"),
     ("  crank:\n", '  "":\n', 9, "links", "empty", "remove"),
     ("[ground, crank]", "[ground, cranc]", 18, "joints.A.links", "there is no link 'cranc'", "'crank'"),
-    ("[ground, crank]", "[crank, crank]", 18, "joints.A", "joins the link 'crank' to itself", "two different"),
+    ("[ground, crank]", "[crank, crank]", 18, "joints.A.links", "names the link 'crank' twice", "two different"),
     ("B: [AB, 0]", "Bx: [AB, 0]", 19, "joints.B", "the link 'crank' has no point 'B'", "add B: [x, y]"),
     ("A: {speed", "E: {speed", 26, "drivers.E", "there is no joint 'E' to drive", "'A'"),
     ("{link: coupler, at", "{link: couplr, at", 28, "loads.work.link", "no link 'couplr'", "'coupler'"),

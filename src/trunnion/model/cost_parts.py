@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from trunnion.joints.fits import GRADES
 from trunnion.model.entry import Name, Part, known, problem
 from trunnion.model.quantity import AnyQuantity, Dimensionless
+from trunnion.model.rules import Refers
 
 __all__ = ["COST_MODELS", "Cost", "CostOption", "Grade", "Process"]
 
@@ -53,5 +54,5 @@ class Cost(Part):
     least: AnyQuantity | None = None
     most: AnyQuantity | None = None
     group: Name | None = None
-    process: str | None = None
+    process: Annotated[str | None, Refers("process")] = None
     options: Annotated[Mapping[Name, CostOption], Field(min_length=1)] | None = None

@@ -36,7 +36,7 @@ from trunnion.model.quantity import (
     Pressure,
     Quantity,
 )
-from trunnion.model.rules import NotNegative, NotZero, Positive, Within
+from trunnion.model.rules import NotNegative, NotZero, OnlyWith, Positive, Refers, Selects, Within
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
@@ -143,6 +143,10 @@ class Guide(Part):
     clearance: Annotated[Length | None, NotNegative] = None
 
 
+LAW = Selects("contact law", CONTACT_LAWS, {"restitution": "0.8"})
+MATERIAL = OnlyWith("modulus", "add modulus: 210 GPa, or remove it")
+
+
 class Contact(Part):
     """How pin and hole, or slider and guide, push on each other where they touch: for pins in play in `simulate`.
 
@@ -151,14 +155,16 @@ class Contact(Part):
     the pin if not stated); exponent: n. With law: rigid the restitution alone.
     """
 
-    law: Annotated[str, _check_contact, _schema_contact] = "restitution"
+    law: Annotated[
+        str, _check_contact, _schema_contact, Selects("contact law", CONTACT_LAWS, {"restitution": "0.8"})
+    ] = "restitution"
     restitution: Dimensionless | None = None
     stiffness: Annotated[AnyQuantity | None, Positive] = None
     exponent: Annotated[Dimensionless | None, Within(1, 10)] = None
     modulus: Annotated[Pressure | None, Positive] = None
-    poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]")] = None
-    hole_modulus: Annotated[Pressure | None, Positive] = None
-    hole_poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]")] = None
+    poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]"), MATERIAL] = None
+    hole_modulus: Annotated[Pressure | None, Positive, MATERIAL] = None
+    hole_poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]"), MATERIAL] = None
 
     @property
     def of(self) -> ContactLaw:
@@ -286,7 +292,7 @@ class Joint(Part):
     """
 
     type: JointType
-    links: tuple[str, str]
+    links: Annotated[tuple[str, str], Refers("link", distinct=True)]
     pitch: Pitch | None = None
     pin: Pin | None = None
     guide: Guide | None = None

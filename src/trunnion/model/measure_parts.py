@@ -10,7 +10,7 @@ from trunnion.model.entry import Direction, Part
 from trunnion.model.limits import LimitText
 from trunnion.model.measure_table import MEASURES, MeasureKind
 from trunnion.model.quantity import AnyQuantity
-from trunnion.model.rules import Positive
+from trunnion.model.rules import InSpace, Positive
 
 __all__ = ["STATISTICS", "Measure", "Statistic"]
 
@@ -47,7 +47,7 @@ class Measure(_Subject):
             "space, the global axis that the link turns about"
         ),
     )
-    along: Direction | None = Field(
+    along: Annotated[Direction | None, InSpace()] = Field(
         default=None, description="direction of the component, global axes, any length; instead of `axis`"
     )
     at: AnyQuantity | None = Field(

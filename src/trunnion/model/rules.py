@@ -6,10 +6,10 @@ A marker stands in the `Annotated` type of a field. Checks, the JSON Schema and 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cache
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Protocol, Union, get_args, get_origin
 
 from pydantic import BaseModel, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -17,6 +17,7 @@ from pydantic_core import CoreSchema
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding
+from trunnion.model.names import nearest
 from trunnion.model.units import KINDS, Kind
 
 __all__ = [
@@ -155,6 +156,127 @@ def group_findings(path: str, part: BaseModel, values: Values) -> Iterator[Findi
                     yield from rule.check(f"{where}.{key}", values)
 
 
+# ---- of names and keys ----------------------------------------------------------------------------------------
+
+
+class Model(Protocol):
+    """What these rules ask of a model."""
+
+    @property
+    def coordinates(self) -> int:
+        """How many a point has."""
+        ...
+
+    def named(self, noun: str) -> Collection[str]:
+        """The names of its links, joints, points …"""
+        ...
+
+
+@dataclass(frozen=True)
+class Refers:
+    """The name of another part, or several: of a link, joint, point, process …; distinct: no two alike."""
+
+    noun: str
+    distinct: bool = False
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """Findings about names that mean nothing. where: the part stands."""
+        value = getattr(part, key)
+        names, at = (value,) if isinstance(value, str) else value, f"{where}.{key}".lstrip(".")
+        for name in dict.fromkeys(names):
+            yield from self.missing(name, at, model)
+            if self.distinct and names.count(name) > 1:
+                yield Finding(
+                    f"names the {self.noun.removeprefix('any ')} '{name}' twice", at, "name two different ones"
+                )
+
+    def missing(self, name: str, where: str, model: Model) -> Iterator[Finding]:
+        """A finding if there is no part of this name."""
+        if name not in (names := model.named(self.noun)):
+            form = " (write link.point)" if self.noun == "point" else ""
+            what = f"there is no {self.noun.removeprefix('any ')} '{name}'"
+            yield Finding(what, where, nearest(name, names) + form)
+
+
+@dataclass(frozen=True)
+class InSpace:
+    """As many coordinates as a point of the model has."""
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """A finding about another number of coordinates; the position of a point is the point itself."""
+        yield from self.counted(getattr(part, key), where if key == "at" else f"{where}.{key}".lstrip("."), model)
+
+    def counted(self, value: object, where: str, model: Model) -> Iterator[Finding]:
+        """A finding about a list that has another number of coordinates."""
+        size = model.coordinates
+        if isinstance(value, tuple) and len(value) != size:
+            what = f"has {len(value)} coordinates, a {'planar' if size == 2 else 'spatial'} model needs {size}"
+            yield Finding(what, where, f"give {size}; a decimal comma would make two numbers of one")
+
+
+@dataclass(frozen=True)
+class OnlyWith:
+    """A key that has an effect only beside another. remedy: how to state that; words: what it is."""
+
+    key: str
+    remedy: str
+    words: str = ""
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """A finding if the other is not stated."""
+        if key in part.model_fields_set and not getattr(part, self.key):
+            yield Finding(f"has no effect without {self.words or self.key}", f"{where}.{key}", self.remedy)
+
+
+@dataclass(frozen=True, eq=False)
+class Selects:
+    """A word that says which other keys of its part are needed, and which have an effect.
+
+    table: by word, with `needs` and `takes`; also: keys beside any word; examples: of what is needed, by key; instead:
+    the key that may stand for one that is needed.
+    """
+
+    noun: str
+    table: Mapping[str, Any]
+    examples: Mapping[str, str]
+    also: tuple[str, ...] = ()
+    instead: Mapping[str, str] = field(default_factory=dict)
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """Findings about keys that are missing and keys without effect."""
+        word = getattr(part, key)
+        takes = {name: (*one.needs, *one.takes) for name, one in self.table.items()}
+        keys = {self.instead.get(one, one) for one in part.model_fields_set - {key, *self.also}}
+        yield from stray(keys, takes, key, word, self.noun, where)
+        for need in self.table[word].needs:
+            if getattr(part, need) is None and need not in keys:
+                example = f"add {need}: {self.examples[need]}"
+                yield Finding(f"'{need}' is missing", where, f"{example}, or state {key}: {' or '.join(self.table)}")
+
+
+def stray(
+    keys: Iterable[str], takes: Mapping[str, Collection[str]], key: str, word: str, noun: str, where: str
+) -> Iterator[Finding]:
+    """Findings about keys that have no effect beside a word; takes: keys by word."""
+    for one in sorted({*keys} - {*takes[word]}):
+        others = [name for name, taken in takes.items() if one in taken]
+        other = f", or state {key}: {' or '.join(others)}" if others else ""
+        own = ", ".join(takes[word]) or "nothing but limits"
+        remedy = f"remove it{other}; the parameters of {word} are {own}"
+        yield Finding(f"'{one}' has no effect on the {noun} {word}", f"{where}.{one}", remedy)
+
+
+def stated_findings(model: Any) -> Iterator[Finding]:
+    """Findings about names and keys, of every part of a model: its joints with their defaults."""
+    sections = {key: getattr(model, key) for key in type(model).model_fields if key not in ("joints", "loop")}
+    every: list[tuple[str, BaseModel]] = [("", model), *parts("", {**sections, "joints": model.effective_joints})]
+    for where, part in every:
+        for key, rules in markers(type(part)).items():
+            for rule in rules:
+                if isinstance(rule, Refers | InSpace | OnlyWith | Selects) and getattr(part, key) is not None:
+                    yield from rule.stated(key, part, where, model)
+
+
 # ---- where rules stand ----------------------------------------------------------------------------------------
 
 
@@ -166,7 +288,7 @@ def markers(kind: type[BaseModel]) -> Mapping[str, tuple[Any, ...]]:
 
 
 def _is_rule(marker: object) -> bool:
-    return isinstance(marker, Within | NotZero | Directed | Rising)
+    return isinstance(marker, Within | NotZero | Directed | Rising | Refers | InSpace | OnlyWith | Selects)
 
 
 def _marked(annotation: Any) -> Iterator[Any]:
@@ -188,4 +310,4 @@ def parts(path: str, value: object) -> Iterator[tuple[str, BaseModel]]:
         below = value if isinstance(value, Mapping) else {}
     for key, one in below.items():
         if isinstance(one, BaseModel | Mapping):
-            yield from parts(f"{path}.{key}", one)
+            yield from parts(f"{path}.{key}".lstrip("."), one)

@@ -11,7 +11,7 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.fits import standard_tolerance
 from trunnion.model.contact import has_play
 from trunnion.model.cost_parts import COST_MODELS, Cost
-from trunnion.model.names import as_key, nearest
+from trunnion.model.names import as_key
 from trunnion.model.parameters import ParameterSet, measured
 from trunnion.model.prices import FORMULA, Price, cost_paths, price
 from trunnion.model.tolerances import tolerated
@@ -44,9 +44,6 @@ def cost_names(mechanism: Numbers) -> Iterator[Finding]:
                 if getattr(cost, key) is not None:
                     what = f"'{key}' has no effect on a choice"
                     yield Finding(what, f"{where}.{key}", f"remove it, or state model: {' or '.join(COST_MODELS)}")
-        if cost.process is not None and cost.process not in mechanism.processes:
-            what = f"there is no process '{cost.process}'"
-            yield Finding(what, f"{where}.process", nearest(cost.process, mechanism.processes))
 
 
 FORMS = {"power": "A + B/(t/unit)^k", "exponential": "A + B exp(-k t/unit)"}

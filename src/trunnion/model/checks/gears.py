@@ -9,7 +9,6 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding
-from trunnion.model.names import nearest
 from trunnion.model.parts import freedoms
 
 if TYPE_CHECKING:
@@ -28,15 +27,10 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
             continue
         if name in joints:
             yield Finding("a joint has this name too", where, "rename the gear pair")
-        missing = [joint for joint in gear.joints if joint not in joints]
-        for joint in missing:
-            yield Finding(f"there is no joint '{joint}'", f"{where}.joints", nearest(joint, joints))
         for joint in gear.joints:
             if joint in joints and "rotation" not in freedoms(joints[joint].type):
                 yield Finding(f"the joint '{joint}' does not turn", f"{where}.joints", "name a revolute joint")
-        if gear.joints[0] == gear.joints[1]:
-            yield Finding(f"couples the joint '{gear.joints[0]}' with itself", f"{where}.joints", "name two joints")
-        elif not missing:
+        if gear.joints[0] != gear.joints[1] and all(joint in joints for joint in gear.joints):
             yield from _teeth(mechanism, name, where)
 
 
@@ -49,8 +43,6 @@ def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
     elif gear.teeth and not shared:
         what = f"'{gear.joints[0]}' and '{gear.joints[1]}' have no link in common that carries both gears"
         yield Finding(what, where, "state teeth: false for a train, belt or chain that passes torques alone")
-    elif not gear.teeth and gear.pressure_angle is not None:
-        yield Finding("has no effect without teeth", f"{where}.pressure_angle", "remove it, or teeth: false")
 
 
 def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Finding]:

@@ -259,9 +259,12 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
             continue
         joints, joint = mechanism.effective_joints, spring.joint or ""
         if spring.between is not None:
-            yield from _ends(mechanism, spring.between, f"{where}.between")
+            ends = {end.partition(".")[0] for end in spring.between}
+            if len(ends) == 1:
+                yield Finding(
+                    f"both ends are on the link '{ends.pop()}'", f"{where}.between", "name points of two links"
+                )
         elif joint not in joints:
-            yield Finding(f"there is no joint '{joint}'", f"{where}.joint", nearest(joint, joints))
             continue
         elif not motions(joints[joint].type):
             what = f"a {joints[joint].type} joint has no one axis for a spring to act about or along"
@@ -270,15 +273,6 @@ def springs(mechanism: Numbers) -> Iterator[Finding]:
             continue
         turns = spring.between is None and "rotation" in freedoms(joints[joint].type)
         yield from _free(spring, turns, where)
-
-
-def _ends(mechanism: Numbers, ends: tuple[str, str], where: str) -> Iterator[Finding]:
-    known = [f"{link}.{point}" for link, points in mechanism.points.items() for point in points]
-    for end in ends:
-        if end not in known:
-            yield Finding(f"there is no point '{end}'", where, nearest(end, known) + " (write link.point)")
-    if ends[0].partition(".")[0] == ends[1].partition(".")[0]:
-        yield Finding(f"both ends are on the link '{ends[0].partition('.')[0]}'", where, "name points of two links")
 
 
 def _free(spring: Spring, turns: bool, where: str) -> Iterator[Finding]:

@@ -13,6 +13,7 @@ from trunnion.model.parameter_names import ParameterNames
 from trunnion.model.parameters import Entry, ParameterSet, measured
 from trunnion.model.prices import cost_entries
 from trunnion.model.quantity import Quantity
+from trunnion.model.rules import stray
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, OPTIONS, Variation
 from trunnion.model.tolerances import (
     DEFAULTS,
@@ -147,17 +148,8 @@ def _percent(variation: Variation, entry: Entry, kind: Kind, where: str) -> Iter
 def _shape(mechanism: Numbers, variation: Variation, where: str) -> Iterator[Finding]:
     """Whether the keys of an entry are those of its distribution."""
     name = variation.distribution or mechanism.tolerance_defaults.distribution
-    takes = DISTRIBUTIONS[name]
-    for key in OPTIONS:
-        if getattr(variation, key) is not None and key not in takes:
-            others = " or ".join(one for one, keys in DISTRIBUTIONS.items() if key in keys)
-            own = ", ".join(takes) or "nothing but limits"
-            what = f"'{key}' has no effect on the distribution {name}"
-            yield Finding(
-                what,
-                f"{where}.{key}",
-                f"remove it, or state distribution: {others}; the parameters of {name} are {own}",
-            )
+    keys = [key for key in OPTIONS if getattr(variation, key) is not None]
+    yield from stray(keys, DISTRIBUTIONS, "distribution", name, "distribution", where)
     if name == "sample" and variation.values is None:
         yield Finding(
             "the measured deviations are missing", where, "add values: [0.01 mm, …], or give them by --sample"
@@ -171,10 +163,8 @@ def _default_distribution(mechanism: Numbers) -> Iterator[Finding]:
     if defaults.distribution in ("sample", FULL_TURN):
         what = f"the distribution {defaults.distribution} is of one number, not of all"
         yield Finding(what, f"{where}.distribution", "state it in tolerances: {…}")
-    for key in OPTIONS:
-        if getattr(defaults, key, None) is not None and key not in DISTRIBUTIONS[defaults.distribution]:
-            what = f"'{key}' has no effect on the distribution {defaults.distribution}"
-            yield Finding(what, f"{where}.{key}", "remove it, or state its distribution")
+    keys = [key for key in OPTIONS if getattr(defaults, key, None) is not None]
+    yield from stray(keys, DISTRIBUTIONS, "distribution", defaults.distribution, "distribution", where)
 
 
 # ---- numbers --------------------------------------------------------------------------------------------------

@@ -9,8 +9,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from trunnion.model.contact import motions
-from trunnion.model.cost_parts import Process
-from trunnion.model.dimensions import nominal_dimensions
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.parts import (
@@ -32,8 +30,9 @@ from trunnion.model.parts import (
     Variation,
     VariationDefaults,
 )
-from trunnion.model.quantity import Acceleration, AnyQuantity
+from trunnion.model.quantity import Acceleration, AnyQuantity, nominal_dimensions
 from trunnion.model.rules import InSpace, Refers
+from trunnion.model.tolerance_parts import Process
 
 __all__ = ["Fields"]
 

@@ -19,15 +19,14 @@ from pydantic import BaseModel
 from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.dimensions import evaluation_order
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind, placed_measures
 from trunnion.model.merge import DEFAULT_LAW
-from trunnion.model.parameter_names import ERRORS, ParameterNames
+from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, Spring, freedoms
-from trunnion.model.quantity import Quantity
+from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 

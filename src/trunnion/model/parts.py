@@ -26,7 +26,6 @@ from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.joints.motors import MOTORS, MotorKind
-from trunnion.model.cost_parts import Cost, CostOption
 from trunnion.model.entry import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.joint_parts import (
     FRICTION_MODELS,
@@ -44,7 +43,7 @@ from trunnion.model.joint_parts import (
     Seat,
     freedoms,
 )
-from trunnion.model.measure_parts import Measure
+from trunnion.model.measure_table import Measure
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,
@@ -63,7 +62,7 @@ from trunnion.model.quantity import (
     Time,
 )
 from trunnion.model.rules import InSpace, NotNegative, NotZero, OnlyWith, Positive, Refers, Rising, Selects, Within
-from trunnion.model.tolerance_parts import Correlation, Variation, VariationDefaults
+from trunnion.model.tolerance_parts import Correlation, Cost, CostOption, Variation, VariationDefaults
 from trunnion.model.units import KINDS
 
 __all__ = [

@@ -1,8 +1,7 @@
-"""Quantities of a model file: a number in SI, a text with unit and tolerance, or an expression.
+"""Quantities of a model file: a number in SI, a text with unit and tolerance, or an expression; the named dimensions.
 
 `Quantity` keeps what was written, so that a model is written back as it was read. The annotated types `Length`,
-`Mass`, … say what a field of the model measures: pydantic reads a number or a text into a `Quantity` of that kind.
-"""
+`Mass`, … say what a field of the model measures: pydantic reads a number or a text into a `Quantity` of that kind."""
 
 from __future__ import annotations
 
@@ -12,6 +11,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
+from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Any
 
 import numpy as np
@@ -42,6 +42,8 @@ __all__ = [
     "Stiffness",
     "Time",
     "deviation_spans",
+    "evaluation_order",
+    "nominal_dimensions",
     "term",
 ]
 
@@ -287,3 +289,35 @@ Pressure = Annotated[Quantity, _Read(KINDS["pressure"])]
 Stiffness = Annotated[Quantity, _Read(KINDS["stiffness"] | KINDS["torsional stiffness"])]
 Damping = Annotated[Quantity, _Read(KINDS["damping"] | KINDS["torsional damping"])]
 AngleOrLength = Annotated[Quantity, _Read(KINDS["angle"] | KINDS["length"])]
+
+
+def evaluation_order(
+    dimensions: Mapping[str, Quantity], errors: Mapping[str, Quantity] | None = None
+) -> tuple[list[str], list[list[str]]]:
+    """Dimensions in an order in which each follows those it speaks of, and the circles that have none.
+
+    errors: deviations of some of them, which may speak of dimensions too.
+    """
+    graph = {name: {one for one in quantity.names if one in dimensions} for name, quantity in dimensions.items()}
+    for name, quantity in (errors or {}).items():
+        graph[name] |= {one for one in quantity.names if one in dimensions}
+    circles: list[list[str]] = []
+    while True:
+        try:
+            return list(TopologicalSorter(graph).static_order()), circles
+        except CycleError as error:
+            circle = list(reversed(error.args[1]))[:-1]
+            circles.append(circle)
+            graph = {name: set() if name in circle else needs for name, needs in graph.items()}
+
+
+def nominal_dimensions(dimensions: Mapping[str, Quantity]) -> dict[str, Number]:
+    """The dimensions without errors; nan where one has no value."""
+    order, circles = evaluation_order(dimensions)
+    lost = {name for circle in circles for name in circle}
+    names: dict[str, Number] = {}
+    for name in order:
+        quantity = dimensions[name]
+        sound = name not in lost and set(quantity.names) <= names.keys()
+        names[name] = quantity.evaluate(names) if sound else np.nan
+    return names

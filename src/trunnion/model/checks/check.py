@@ -15,25 +15,21 @@ import numpy as np
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.checks.angles import Bare, plain_dimensions, radians, unitless_angles
-from trunnion.model.checks.contacts import contact_law
-from trunnion.model.checks.costs import cost_names, cost_values
+from trunnion.model.checks.drivers import gears
 from trunnion.model.checks.errors import errors, joint_errors
-from trunnion.model.checks.gears import gears
+from trunnion.model.checks.joints import contact_law
 from trunnion.model.checks.loads import losses, motion_dimensions, springs, tables, unknown_name, unread
-from trunnion.model.checks.magnitudes import magnitudes
+from trunnion.model.checks.magnitudes import Bare, magnitudes, plain_dimensions, radians, unitless_angles
 from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.space import contact, coordinates, driven, loop, pitch, resisted, space
-from trunnion.model.checks.tolerances import stated_entries, tolerance_names, tolerance_values
+from trunnion.model.checks.tolerances import cost_names, cost_values, stated_entries, tolerance_names, tolerance_values
 from trunnion.model.checks.values import check_values
 from trunnion.model.contact import motions
-from trunnion.model.dimensions import evaluation_order
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.model.names import as_key, nearest
-from trunnion.model.parameter_names import ERRORS
+from trunnion.model.names import ERRORS, as_key, nearest
 from trunnion.model.parameters import ParameterSet, dimension_errors
 from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
-from trunnion.model.quantity import UNREADABLE
+from trunnion.model.quantity import UNREADABLE, evaluation_order
 from trunnion.model.rules import InSpace, Refers, stated_findings
 from trunnion.model.units import ANY, Dimension, UnitError
 

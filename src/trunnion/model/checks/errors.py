@@ -13,11 +13,11 @@ from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import PLAY_PAIRS, TURNING_PAIRS, clearance, has_guide, has_pin, has_play, play
-from trunnion.model.dimensions import nominal_dimensions
 from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
 from trunnion.model.merge import stated
-from trunnion.model.parameter_names import ERRORS, ParameterNames
+from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parameters import ParameterSet
+from trunnion.model.quantity import nominal_dimensions
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers

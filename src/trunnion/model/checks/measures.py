@@ -9,8 +9,7 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.model.contact import motions
-from trunnion.model.measure_parts import Measure
-from trunnion.model.measure_table import MEASURES
+from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.rules import Refers
 

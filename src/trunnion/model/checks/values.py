@@ -10,10 +10,9 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.model.checks.contacts import contact_values
+from trunnion.model.checks.drivers import gear_values, motor_values
 from trunnion.model.checks.errors import error_sizes, play_values
-from trunnion.model.checks.free_motion import motor_values
-from trunnion.model.checks.gears import gear_values
+from trunnion.model.checks.joints import contact_values
 from trunnion.model.checks.loads import spring_values, table_values
 from trunnion.model.checks.space import direction_values
 from trunnion.model.parameters import ParameterSet

@@ -1,4 +1,4 @@
-"""Checks of a joint whose pin or slider is in play as it moves in time: its contact law and what that needs."""
+"""Checks of joints: their links, sizes of pins and guides, friction, losses and contacts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from trunnion.model.joint_parts import Contact, Joint
     from trunnion.model.numbers import Numbers
 
-__all__ = ["contact_law", "contact_values"]
+__all__ = [
+    "contact_law",
+    "contact_values",
+]
 
 
 def contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) -> Iterator[Finding]:

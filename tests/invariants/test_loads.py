@@ -176,7 +176,7 @@ def test_resistance_that_varies_and_one_that_drives() -> None:
         data["loads"]["cut"]["resisting_force"] = f"100 N * {touching}"
         assert not any(row["code"] == "load.drives" for row in findings(run(data)))
     data["loads"]["cut"]["resisting_force"] = "-3 N"
-    assert "loads.cut.resisting_force: is -3, which is negative" in refused(**data)
+    assert "loads.cut.resisting_force: is -3 N, which is negative" in refused(**data)
 
 
 def test_a_resistance_in_space_that_only_touches_0_does_not_drive() -> None:
@@ -447,9 +447,9 @@ def test_round_trip(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("spring", "words"),
     [
-        ({"stiffness": -5.0, "free_length": 0.1}, "springs.S.stiffness: is -5, which is negative"),
-        ({"damping": -5.0}, "springs.S.damping: is -5, which is negative"),
-        ({"stiffness": 5.0, "free_length": "-1 mm"}, "springs.S.free_length: is -0.001, which is negative"),
+        ({"stiffness": -5.0, "free_length": 0.1}, "springs.S.stiffness: is -5 N/m, which is negative"),
+        ({"damping": -5.0}, "springs.S.damping: is -5 N s/m, which is negative"),
+        ({"stiffness": 5.0, "free_length": "-1 mm"}, "springs.S.free_length: is -0.001 m, which is negative"),
         ({"stiffness": "5 N m", "free_length": 0.1}, "is a moment where a stiffness is needed"),
         ({"stiffness": "5 N", "free_length": 0.1}, "is a force where a stiffness or torsional stiffness is needed"),
         ({"damping": "5 N/m"}, "is a stiffness where a damping or torsional damping is needed"),

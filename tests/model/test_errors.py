@@ -198,7 +198,7 @@ def test_a_row_of_a_loop_has_misalignment_and_seat() -> None:
         (FOURBAR, {"B.misalignment.tilt": "1 deg"}, "joints.B.misalignment.tilt: a planar joint cannot tilt"),
         (SLIDER, {"S.misalignment.offset": "1 mm"}, "the misalignment of a prismatic joint is not modelled"),
         (RSSR, {"B.misalignment.tilt": "1 deg"}, "the misalignment of a spherical joint is not modelled"),
-        (RSSR, {"A.misalignment.tilt": "46 deg"}, "is 46 deg, an error can be at most 45 deg"),
+        (RSSR, {"A.misalignment.tilt": "46 deg"}, "is 46 deg, which is not at least -45 deg and at most 45 deg"),
         (RSSR, {"A.misalignment.tilt": "1 mm"}, "is a length where an angle is needed"),
     ],
 )
@@ -338,8 +338,8 @@ def test_choices_are_refused_with_those_there_are() -> None:
     ("mechanism", "values", "what"),
     [
         (FOURBAR, {"joints.B.seat": "loaded"}, "joints.B.seat: a seat without play"),
-        (FOURBAR, {"B.pin.clearance": "-1 mm"}, "is -0.001, which is negative"),
-        (FOURBAR, {"B.pin.cylindricity": "-1 um"}, "is -1e-06, which is negative"),
+        (FOURBAR, {"B.pin.clearance": "-1 mm"}, "is -0.001 m, which is negative"),
+        (FOURBAR, {"B.pin.cylindricity": "-1 um"}, "is -1e-06 m, which is negative"),
         (FOURBAR, {"B.pin.hole_radius": "7 mm"}, "is 7 mm, less than the radius 7.5 mm of the pin"),
         (FOURBAR, {"B.pin.hole_radius": "8 mm", "B.pin.clearance": "1 um"}, "by its radius and by the clearance"),
         (FOURBAR, {"B.pin.end_float": "1 mm"}, "an end float is the play along the axis of a revolute joint in space"),
@@ -349,7 +349,7 @@ def test_choices_are_refused_with_those_there_are() -> None:
         (SLIDER, {"O.pin.hole_radius": "11 mm"}, "a fit states radius and clearance already"),
         (SLIDER, {"O.pin.clearance": "11 um"}, "a fit states radius and clearance already"),
         (RSSR, {"B.pin.end_float": "1 mm"}, "an end float is the play along the axis of a revolute joint in space"),
-        (RSSR, {"D.seat.beta": "181 deg"}, "is 181 deg, the ends of a pin are at most 180 deg apart"),
+        (RSSR, {"D.seat.beta": "181 deg"}, "is 181 deg, which is not at least -180 deg and at most 180 deg"),
         (
             RSSR,
             {"B.pin.clearance": "1 um", "B.seat.xi": 1},

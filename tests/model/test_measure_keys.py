@@ -11,8 +11,7 @@ import pytest
 from varied import VARIED
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.measure_parts import STATISTICS, Measure
-from trunnion.model.measure_table import MEASURES
+from trunnion.model.measure_table import MEASURES, STATISTICS, Measure
 from trunnion.model.mechanism import Mechanism, read_mechanism
 
 FindingsOf = Callable[..., tuple[Finding, ...]]

@@ -250,6 +250,13 @@ def test_equal_mechanisms_have_equal_digests() -> None:
     assert len(DURANGO.digest) == 16
 
 
+def test_a_mechanism_shows_its_own_names() -> None:
+    names = {name for name in dir(DURANGO) if not name.startswith("_")}
+    assert {"dimensions", "joints", "with_values", "parameters", "read", "digest"} <= names
+    assert not any(name.startswith(("model_", "parse_")) or name in ("json", "copy", "dict") for name in names)
+    assert DURANGO.model_copy() == DURANGO
+
+
 @pytest.mark.parametrize("name", ["durango-fourbar", "double-cardan", "piston-by-cost"])
 @pytest.mark.parametrize("analysed", [False, True])
 def test_a_mechanism_cannot_be_changed_in_place(name: str, analysed: bool) -> None:
@@ -259,8 +266,11 @@ def test_a_mechanism_cannot_be_changed_in_place(name: str, analysed: bool) -> No
     link = next(iter(mechanism.links.values()))
     groups = [mechanism.dimensions, mechanism.springs, mechanism.effective_joints, mechanism.processes, link.points]
     groups += mechanism.processes.values()
-    groups += [joint.friction.parameters for joint in mechanism.effective_joints.values() if joint.friction]
+    groups += [mechanism.parameter_set.nominal, mechanism.parameter_set.entries]
     calls: list[Any] = [partial(setattr, mechanism, "name", "other"), partial(delattr, link, "mass")]
+    for friction in (joint.friction for joint in mechanism.effective_joints.values() if joint.friction):
+        groups.append(friction.parameters)
+        calls.append(partial(setattr, friction, "coefficient", 0.2))
     for group in groups:
         calls += [partial(operator.setitem, group, "L", 1.7), partial(group.update, {"L": 1.7}), group.clear]
     for call in calls:

@@ -13,9 +13,9 @@ import trunnion
 from trunnion import Mechanism, MechanismError
 from trunnion.model.csv_table import MAX_BYTES, MAX_OWN_ROWS, MAX_ROWS
 from trunnion.model.mechanism import read_mechanism
-from trunnion.model.named_file import MOST_FILES
 from trunnion.model.rewrite import rewrite_mechanism
 from trunnion.model.schema import json_schema
+from trunnion.model.text import MOST_FILES
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "slider-crank.yaml"  # driver O, table pressure
 SOURCE = EXAMPLE.read_text("utf-8")

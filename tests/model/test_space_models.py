@@ -143,6 +143,28 @@ def test_the_model_without_mistakes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("moments", "severity"),
+    [
+        ("xx: 27.6, yy: 34.5, zz: 6.91", None),
+        ("xx: 27.6, yy: 34.6, zz: 6.91", Severity.WARNING),  # a plate, of three digits
+        ("xx: 27.6, yy: 34.8, zz: 6.91", Severity.WARNING),
+        ("xx: 27.6, yy: 34.9, zz: 6.91", Severity.ERROR),
+        ("xx: 1e-6, yy: 1e-6, zz: -1e-8", Severity.ERROR),
+    ],
+)
+def test_moments_of_inertia_that_were_rounded(tmp_path: Path, moments: str, severity: Severity | None) -> None:
+    path = tmp_path / "plate.yaml"
+    path.write_text(RSSP.replace("xx: 1.0e-6, yy: 9.6e-4, zz: 9.6e-4", moments), encoding="utf-8")
+    try:
+        told = [one for one in Mechanism.read(path).checked if one.where == "links.rod.inertia"]
+    except MechanismError as error:
+        told = [*error.findings]
+    assert [one.severity for one in told] == ([severity] if severity else [])
+    if severity is Severity.WARNING:
+        assert "exceeds the sum of the others by 0." in told[0].what
+
+
+@pytest.mark.parametrize(
     ("change", "where", "what"),
     [
         ("over_constraint: refuse", "over_constraint", "is for spatial models"),

@@ -18,8 +18,7 @@ import trunnion
 from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.checks.check import check_model
-from trunnion.model.limit_texts import number_with
-from trunnion.model.limits import Limits
+from trunnion.model.limits import Limits, number_with
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.rewrite import rewrite_mechanism

@@ -168,7 +168,7 @@ def test_tables_and_walks_agree_while_it_slips(slips: float) -> None:
 @pytest.mark.parametrize(
     ("change", "path", "words"),
     [
-        ({"clutch": -3}, "clutch", "give a number above 0"),
+        ({"clutch": -3}, "clutch", "give a value above 0"),
         ({"clutch_from": 2, "clutch_until": 1}, "clutch_until", "give a time after clutch_from"),
         ({"clutch": None, "clutch_from": 1}, "clutch_from", "add clutch"),
         ({"inertia": None}, "clutch", "add inertia"),

@@ -122,11 +122,11 @@ def test_ratio_is_kept_over_all_turns() -> None:
     ("change", "where", "what"),
     [
         ({"joints": ["A", "X"]}, "gears.mesh.joints", "there is no joint 'X'"),
-        ({"joints": ["A", "A"]}, "gears.mesh.joints", "couples the joint 'A' with itself"),
+        ({"joints": ["A", "A"]}, "gears.mesh.joints", "names the joint 'A' twice"),
         ({"joints": ["A", "C"]}, "gears.mesh", "have no link in common"),
         ({"ratio": 0}, "gears.mesh.ratio", "is 0"),
         ({"ratio": -1}, "gears.mesh.ratio", "they have no pitch point"),
-        ({"pressure_angle": "95 deg"}, "gears.mesh.pressure_angle", "95°"),
+        ({"pressure_angle": "95 deg"}, "gears.mesh.pressure_angle", "is 95 deg"),
         ({"teeth": False, "pressure_angle": 0.3}, "gears.mesh.pressure_angle", "has no effect without teeth"),
     ],
 )

@@ -23,8 +23,7 @@ from trunnion.measures.evaluation import where_known
 from trunnion.measures.figures import within_limits
 from trunnion.measures.measures import Measure, coordinate_unit, named
 from trunnion.measures.positions import moved, plan
-from trunnion.model.measure_parts import STATISTICS
-from trunnion.model.measure_table import MEASURES
+from trunnion.model.measure_table import MEASURES, STATISTICS
 from trunnion.results.attributes import summary_of
 from trunnion.results.figure import MORE_THAN
 from trunnion.solve.friction_method import MARGIN

@@ -406,7 +406,7 @@ def test_estimates_are_written_with_the_digits_they_have(cardan: trunnion.Mechan
         ({"guard": 100}, "each is next to a friction reversal"),
         ({"hold_out": [f"run-{k}" for k in range(1, 6)]}, "all conditions are held out"),
         ({"start": {"mass": 1.0}}, "is not one of the parameters"),
-        ({"start": {FRICTION: -1.0}}, "least is 0"),
+        ({"start": {FRICTION: -1.0}}, "which is negative"),
     ],
 )
 def test_what_is_wrong_is_said(

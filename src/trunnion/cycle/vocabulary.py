@@ -15,7 +15,6 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.measures.curves import MOTIONS
 from trunnion.measures.evaluation import courses_of
 from trunnion.measures.measures import Measure, named
-from trunnion.model.checks.measures import subjects
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parameters import measured
@@ -124,7 +123,7 @@ def _others(run: Run) -> Iterator[Measure]:
     for kind, of in MEASURES.items():
         if of.space not in ("", mechanism.space):
             continue
-        for subject in subjects(mechanism, of.of):
+        for subject in mechanism.named(of.of) if isinstance(of.of, str) else of.of:
             if subject.partition(".")[0] == mechanism.fixed_link and of.of in ("point", "link"):
                 continue
             axes = ("x", "y", "z")[: mechanism.coordinates]

@@ -43,6 +43,17 @@ class ContactLaw:
     elastic: bool = False
     rigid: bool = False
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Keys that must be given; of a law that gives, the stiffness or the modulus too."""
+        return () if self.elastic else ("restitution",)
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """Keys that may be given."""
+        material = ("modulus", "poisson_ratio", "hole_modulus", "hole_poisson_ratio")
+        return () if self.rigid else ("stiffness", "exponent", *material)
+
 
 def normal_force(
     depth: Number, rate: Number, onset: Number, stiffness: float, exponent: float, factor: float

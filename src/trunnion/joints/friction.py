@@ -31,7 +31,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class LawParameter:
-    """One parameter of a law: its unit (pint notation, empty if none), default (None: must be given), range."""
+    """One parameter of a law: its unit (empty if none), default (None: must be given), range."""
 
     unit: str = ""
     default: float | None = None

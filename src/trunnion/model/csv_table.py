@@ -1,6 +1,6 @@
 """Points of drivers and tables from CSV files: those that the user names, and those that a model names.
 
-A model may name a file in its own folder only, see `named_file`.
+A model may name a file in its own folder only, see `text.in_folder`.
 
 Two columns, first time or drive coordinate, then value; separated by semicolon, tab or comma, the first of these that
 the first line has. With semicolon or tab a number may have a decimal comma. A first row of texts is a header, whose
@@ -21,10 +21,9 @@ from typing import Any, NamedTuple
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import literal
-from trunnion.model.named_file import MOST_FILES, in_folder, stated_files
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
-from trunnion.model.text import read_text
+from trunnion.model.text import MOST_FILES, in_folder, read_text, stated_files
 from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
 
 __all__ = ["TableFiles", "TablePoints", "column", "place_findings", "with_own_points", "with_points"]

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from trunnion.model.names import FORMULA, nearest
 from trunnion.model.quantity import Dimensionless, Length
+from trunnion.model.rules import Directed
 
 __all__ = ["FORMS", "Direction", "Name", "Part", "Position", "ReadOnlyDict", "forms", "known", "problem", "shape"]
 
@@ -64,7 +65,7 @@ def forms(text: str) -> Discriminator:
 
 Name = Annotated[str, AfterValidator(_name)]
 Position = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
-Direction = Annotated[tuple[Dimensionless, ...], Field(min_length=2, max_length=3)]
+Direction = Annotated[tuple[Dimensionless, ...], Field(min_length=2, max_length=3), Directed()]
 
 
 def _refuse(*_: object, **__: object) -> NoReturn:
@@ -101,6 +102,11 @@ class Part(BaseModel):
     def __delattr__(self, name: str) -> None:
         """Nothing."""
         _refuse()
+
+    def __dir__(self) -> list[str]:
+        """Its own names; those of pydantic work, and show the way to nothing."""
+        foreign = {name for name in dir(BaseModel) if not name.startswith("_")} - type(self).model_fields.keys()
+        return [name for name in super().__dir__() if name not in foreign]
 
     @model_validator(mode="after")
     def _freeze(self) -> Self:

@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, unit
+from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, normalise, unit
 
 __all__ = ["MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse"]
 
@@ -35,10 +35,7 @@ _NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*\.[^\W\d]\w*|\.[^\W\d]\w+)?"  # also S.slide 
 _TOKEN = re.compile(rf"\s*(?:(?P<literal>{LITERAL.pattern})|(?P<name>{_NAME})|(?P<operator>\*\*|[-+*/^(),]))")
 # 1500 min-1, as catalogues write a speed: here it is a difference
 _RECIPROCAL = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}[ /*·])?(?P<power>(?P<unit>min|s)-[12])(?![\w.])")
-# Signs an engineer's keyboard or word processor makes of - * ^2; the minus of a superscript included.
-_SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "⋅": "·"})
-_SUPERSCRIPT = re.compile("⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]")
-_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_FRACTION = re.compile(rf"(?:([0-9]+)[- ])?([0-9]+)/([1-9][0-9]*)\s*({_UNIT})")  # 1/2 in, 1-1/2 in
 
 Evaluator = Callable[[Mapping[str, Number]], Number]
 Dimensions = Mapping[str, "Dimension | None"]
@@ -142,15 +139,16 @@ def literal(number: str, unit_text: str) -> Literal:
     return Literal(value, dimension, unit_text)
 
 
-def normalise(text: str) -> str:
-    """The text with typographic signs as plain ones: − – × as - *, m² as m^2."""
-    return _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_DIGITS), text.translate(_SIGNS))
-
-
 def parse(text: str) -> Expression:
     """Read an expression; UnitError says what is wrong with it. Never runs code."""
     if len(text) > MAX_LENGTH:
         raise UnitError(f"an expression of {len(text)} characters, {MAX_LENGTH} at most", "split it in dimensions")
+    if fraction := _FRACTION.fullmatch(normalise(text).strip()):
+        whole, over, under, unit_text = fraction.groups()
+        literal(under, unit_text)  # UnitError for what is no unit
+        size = int(whole or 0) + int(over) / int(under)
+        remedy = f"write {size:.12g} {unit_text}, or {over}/({under} {unit_text})"
+        raise UnitError(f"'{text}' divides by {under} {unit_text}", remedy)
     source, operands = _tokens(normalise(text))
     try:
         tree = ast.parse(source, mode="eval").body

@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from trunnion.model.cost_parts import Process
-from trunnion.model.dimensions import nominal_dimensions
+from trunnion.model.contact import motions
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.parts import (
@@ -31,7 +30,9 @@ from trunnion.model.parts import (
     Variation,
     VariationDefaults,
 )
-from trunnion.model.quantity import Acceleration, AnyQuantity
+from trunnion.model.quantity import Acceleration, AnyQuantity, nominal_dimensions
+from trunnion.model.rules import InSpace, Refers
+from trunnion.model.tolerance_parts import Process
 
 __all__ = ["Fields"]
 
@@ -46,8 +47,8 @@ class Fields(Part):
     space: Literal["planar", "spatial"] = "planar"
     over_constraint: Literal["refuse", "minimum-norm"] = "refuse"
     fits: FitChoice = "mean"
-    gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3)] | None = None
-    ground: str | None = None
+    gravity: Annotated[tuple[Acceleration, ...], Field(min_length=2, max_length=3), InSpace()] | None = None
+    ground: Annotated[str | None, Refers("link")] = None
     dimensions: Mapping[Name, AnyQuantity] = {}
     errors: Mapping[str, AnyQuantity] = {}
     links: Mapping[Name, Link] = {}
@@ -126,6 +127,23 @@ class Fields(Part):
         return ReadOnlyDict(
             {name: tuple(dict.fromkeys([*link.points, *ends[name]])) for name, link in self.effective_links.items()}
         )
+
+    def named(self, noun: str) -> list[str]:
+        """The names of the parts that a noun means: `link`, `point` (link.point), `joint` that moves, `driver` …"""
+        joints, drivers, loads = self.effective_joints, self.drivers, self.loads
+        match noun:
+            case "point":
+                return [f"{link}.{point}" for link, points in self.points.items() for point in points]
+            case "joint":
+                return [name for name, joint in joints.items() if motions(joint.type)]
+            case "free driver":
+                return [name for name, driver in drivers.items() if driver.found]
+            case "load on a joint":
+                return [name for name, load in loads.items() if load.joint is not None]
+            case "driver or load":
+                return list(dict.fromkeys([*drivers, *loads]))
+        sections = {"link": self.effective_links, "any joint": joints, "driver": drivers, "spring": self.springs}
+        return list({**sections, "process": self.processes}[noun])
 
     def carriers(self, gear: str) -> tuple[int, int] | None:
         """On which side (0, 1) of each of its joints a gear pair has the link common to both; None without one."""

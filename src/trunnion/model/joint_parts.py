@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     GetJsonSchemaHandler,
     PlainSerializer,
@@ -36,6 +36,7 @@ from trunnion.model.quantity import (
     Pressure,
     Quantity,
 )
+from trunnion.model.rules import NotNegative, NotZero, OnlyWith, Positive, Refers, Selects, Within
 from trunnion.model.units import KINDS, UnitError
 
 __all__ = [
@@ -70,6 +71,7 @@ _check_contact, _schema_contact = known(tuple(CONTACT_LAWS), "contact law")
 _check_model, _schema_model = known(FRICTION_MODELS, "friction model")
 
 JointType = Annotated[str, _check_type, _schema_type]
+Pitch = Annotated[Length, NotZero("the thread does not advance", "give another pitch, or state type: revolute")]
 
 
 _FIT = re.compile(r"^(?P<size>.*\S)\s+(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
@@ -118,15 +120,15 @@ class Pin(Part):
     clearance lets it; end_float: play along the axis, end to end.
     """
 
-    radius: Length | None = None
-    hole_radius: Length | None = None
-    length: Length | None = None
-    bearing: Length | None = None
-    clearance: Length | None = None
+    radius: Annotated[Length | None, NotNegative] = None
+    hole_radius: Annotated[Length | None, NotNegative] = None
+    length: Annotated[Length | None, NotNegative] = None
+    bearing: Annotated[Length | None, NotNegative] = None
+    clearance: Annotated[Length | None, NotNegative] = None
     fit: FitText | None = None
     offset: Length | None = None
-    cylindricity: Length | None = None
-    end_float: Length | None = None
+    cylindricity: Annotated[Length | None, NotNegative] = None
+    end_float: Annotated[Length | None, NotNegative] = None
 
 
 class Guide(Part):
@@ -135,10 +137,14 @@ class Guide(Part):
     height: of the slider across its guide in the plane, of the corners that touch where it is in play; 0 if not stated.
     """
 
-    length: Length | None = None
-    height: Length | None = None
-    width: Length | None = None
-    clearance: Length | None = None
+    length: Annotated[Length | None, NotNegative] = None
+    height: Annotated[Length | None, NotNegative] = None
+    width: Annotated[Length | None, NotNegative] = None
+    clearance: Annotated[Length | None, NotNegative] = None
+
+
+LAW = Selects("contact law", CONTACT_LAWS, {"restitution": "0.8"})
+MATERIAL = OnlyWith("modulus", "add modulus: 210 GPa, or remove it")
 
 
 class Contact(Part):
@@ -149,14 +155,16 @@ class Contact(Part):
     the pin if not stated); exponent: n. With law: rigid the restitution alone.
     """
 
-    law: Annotated[str, _check_contact, _schema_contact] = "restitution"
+    law: Annotated[
+        str, _check_contact, _schema_contact, Selects("contact law", CONTACT_LAWS, {"restitution": "0.8"})
+    ] = "restitution"
     restitution: Dimensionless | None = None
-    stiffness: AnyQuantity | None = None
-    exponent: Dimensionless | None = None
-    modulus: Pressure | None = None
-    poisson_ratio: Dimensionless | None = None
-    hole_modulus: Pressure | None = None
-    hole_poisson_ratio: Dimensionless | None = None
+    stiffness: Annotated[AnyQuantity | None, Positive] = None
+    exponent: Annotated[Dimensionless | None, Within(1, 10)] = None
+    modulus: Annotated[Pressure | None, Positive] = None
+    poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]"), MATERIAL] = None
+    hole_modulus: Annotated[Pressure | None, Positive, MATERIAL] = None
+    hole_poisson_ratio: Annotated[Dimensionless | None, Within(-1, 0.5, "(]"), MATERIAL] = None
 
     @property
     def of(self) -> ContactLaw:
@@ -182,7 +190,7 @@ class Seat(Part):
     the cosines of these aside); direction: of a ball, in the frame of the joint on the second link.
     """
 
-    beta: Angle | None = None
+    beta: Annotated[Angle | None, Within(-math.pi, math.pi)] = None
     xi: Angle | None = None
     direction: Direction | None = None
 
@@ -207,7 +215,7 @@ class Misalignment(Part):
     offset, offset_towards: and is moved by this length along that one, `towards` if not stated.
     """
 
-    tilt: Angle | None = None
+    tilt: Annotated[Angle | None, Within(-math.pi / 4, math.pi / 4, remedy="turn the axis of the point instead")] = None
     towards: Angle | None = None
     offset: Length | None = None
     offset_towards: Angle | None = None
@@ -219,10 +227,10 @@ class Misalignment(Part):
         return self.model_copy(update={key: Quantity(0, KINDS[zeros[key]]) for key in missing})
 
 
-class Friction(BaseModel):
+class Friction(Part):
     """Friction of a joint: a law with its parameters, or one number, the coefficient (law: coulomb)."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, hide_input_in_errors=True)
+    model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, AnyQuantity]
 
     law: Annotated[str, _check_law, _schema_law] | None = None
@@ -262,8 +270,8 @@ class Losses(Part):
     constant: torque or force against the motion, an interval at rest; viscous: the same per speed.
     """
 
-    constant: ForceOrMoment | None = None
-    viscous: Damping | None = None
+    constant: Annotated[ForceOrMoment | None, NotNegative] = None
+    viscous: Annotated[Damping | None, NotNegative] = None
 
 
 class JointDefaults(Part):
@@ -284,8 +292,8 @@ class Joint(Part):
     """
 
     type: JointType
-    links: tuple[str, str]
-    pitch: Length | None = None
+    links: Annotated[tuple[str, str], Refers("link", distinct=True)]
+    pitch: Pitch | None = None
     pin: Pin | None = None
     guide: Guide | None = None
     contact: Contact | None = None
@@ -306,7 +314,7 @@ class LoopJoint(Part):
     distance: Length = Quantity(0, KINDS["length"])
     slide: Length | None = None
     rotation: Angle | None = None
-    pitch: Length | None = None
+    pitch: Pitch | None = None
     pin: Pin | None = None
     guide: Guide | None = None
     friction: Friction | None = None

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from trunnion.model.expression import MOTION, PLACED, RESERVED
 from trunnion.model.joint_parts import freedoms
-from trunnion.model.measure_parts import Measure
-from trunnion.model.measure_table import MEASURES
+from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError
 

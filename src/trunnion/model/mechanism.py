@@ -20,14 +20,13 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.motion import MotionLaw
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.assign import assign
+from trunnion.model.changes import assign, not_stated, with_law
 from trunnion.model.checks.check import check_model
 from trunnion.model.contact import has_play, play
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.findings import repair, schema_findings
-from trunnion.model.friction_override import with_law
-from trunnion.model.limit_texts import DIGITS
+from trunnion.model.limits import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import nearest
 from trunnion.model.numbers import Numbers
@@ -44,18 +43,17 @@ from trunnion.model.parts import (
     Variation,
 )
 from trunnion.model.prices import FORMULA, Price, cost_paths, prices
-from trunnion.model.samples import with_samples
 from trunnion.model.tolerances import (
     Tolerance,
     correlation,
     keep_limits,
     kept,
     tolerated,
+    with_samples,
     with_tolerances,
     written_limits,
 )
 from trunnion.model.units import Kind
-from trunnion.model.unstated import not_stated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

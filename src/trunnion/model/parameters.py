@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -19,14 +19,15 @@ from pydantic import BaseModel
 from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.dimensions import evaluation_order
+from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.expression import MOTION, PLACED
 from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind, placed_measures
 from trunnion.model.merge import DEFAULT_LAW
-from trunnion.model.parameter_names import ERRORS, ParameterNames
+from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, Spring, freedoms
-from trunnion.model.quantity import Quantity
+from trunnion.model.quantity import Quantity, evaluation_order
+from trunnion.model.rules import Within, markers
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ __all__ = [
 ]
 
 Location = tuple[str | int, ...]
+Rules = tuple[Any, ...]  # of model.rules
 LIMITS = ("lower", "upper")
 
 
@@ -54,6 +56,7 @@ class Entry:
     error: path of the deviation that is added to it.
     varies: it speaks of the motion: not a number of the set until an override makes it one, but an expression that
     the analysis evaluates at every position.
+    rules: what it must be, by its field; a deviation has none.
     """
 
     path: str
@@ -63,6 +66,7 @@ class Entry:
     alias: str = ""
     varies: bool = False
     error: str = ""
+    rules: Rules = ()
 
     @property
     def depends(self) -> tuple[str, ...]:
@@ -109,8 +113,7 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
     yield from _walk(mechanism.dimensions, "dimensions", ("dimensions",))
     for entry in _walk(mechanism.joint_defaults, "joint_defaults", ("joint_defaults",)):
         friction = mechanism.joint_defaults.friction if entry.location[1] == "friction" else None
-        kind = _law_kind(friction, str(entry.location[-1])) if friction else entry.kind
-        yield Entry(entry.path, entry.location, entry.quantity, kind)
+        yield _of_law(friction, entry) if friction else entry
     zero = Quantity(0, KINDS["acceleration"])
     size = mechanism.coordinates
     yield from _walk(mechanism.gravity or (zero,) * size, "gravity", ("gravity",))
@@ -135,7 +138,9 @@ def _numbers(mechanism: Fields) -> Iterator[Entry]:
                 moving = {*MOTION, *mechanism.tables}
                 quantity = _of_motion(entry.quantity, placed) if section == "loads" else entry.quantity
                 varies = section == "loads" and any(one in moving or PLACED in one for one in quantity.names)
-                yield Entry(entry.path, entry.location, quantity, kind, varies=varies)
+                signed = section == "springs" and part.between is None and entry.location[-1] == "free_length"
+                rules = () if signed else entry.rules  # a length along a slide has a sign
+                yield replace(entry, quantity=quantity, kind=kind, varies=varies, rules=rules)
 
 
 def _of_motion(quantity: Quantity, placed: Mapping[str, str]) -> Quantity:
@@ -145,21 +150,25 @@ def _of_motion(quantity: Quantity, placed: Mapping[str, str]) -> Quantity:
     return replace(quantity, expression=quantity.expression.renamed(placed))
 
 
-def _walk(value: object, path: str, location: Location) -> Iterator[Entry]:
-    """The quantities below a part of the model; coordinates are x, y, z and the position of a point is itself."""
+def _walk(value: object, path: str, location: Location, rules: Rules = ()) -> Iterator[Entry]:
+    """The quantities below a part of the model; coordinates are x, y, z and the position of a point is itself.
+
+    rules: those of the field.
+    """
     match value:
         case Quantity():
-            yield Entry(path, location, value, value.kind)
+            yield Entry(path, location, value, value.kind, rules=rules)
         case Limits():
             for key in LIMITS:
                 yield from _walk(getattr(value, key), f"{path}.{key}", (*location, key))
         case BaseModel():
             extra = value.parameters.items() if isinstance(value, Friction) else ()
+            stated = markers(type(value))
             for key, item in (*((key, getattr(value, key)) for key in type(value).model_fields), *extra):
                 if item is None or isinstance(item, str):
                     continue  # most of what could be stated is not
                 below = path if isinstance(value, Point) and key == "at" else f"{path}.{key}"
-                yield from _walk(item, below, (*location, key))
+                yield from _walk(item, below, (*location, key), stated.get(key, ()))
         case Mapping():
             for key, item in value.items():
                 yield from _walk(item, f"{path}.{key}", (*location, key))
@@ -195,20 +204,20 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
     """Numbers of a joint with its defaults: what is not its own follows `joint_defaults`."""
     rows = [row.joint for row in mechanism.loop]
     location: Location = ("loop", rows.index(name)) if name in rows else ("joints", name)
-    yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"))
+    yield from _walk(joint.pitch, f"joints.{name}.pitch", (*location, "pitch"), markers(Joint)["pitch"])
     for key in ("pin", "guide", "friction", "losses", "seat"):
         part, default = getattr(joint, key), getattr(mechanism.joint_defaults, key, None)
         own = f"joints.{name}.{key}"
         shared = {one.path: one.quantity for one in _walk(default, own, ())}
         for entry in _walk(part, own, (*location, key)):
-            number, kind = str(entry.location[-1]), entry.kind
             if isinstance(part, Friction):
-                kind = _law_kind(part, number)
+                entry = _of_law(part, entry)
             elif isinstance(part, Losses):
-                kind = _resistance_kind(number, "rotation" in freedoms(joint.type))
+                kind = _resistance_kind(str(entry.location[-1]), "rotation" in freedoms(joint.type))
+                entry = replace(entry, kind=kind)
             follows = shared.get(entry.path) is entry.quantity
             alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
-            yield Entry(entry.path, entry.location, entry.quantity, kind, alias)
+            yield replace(entry, alias=alias)
     for entry in _walk(joint.contact, f"joints.{name}.contact", (*location, "contact")):
         stiff = entry.location[-1] == "stiffness"
         yield replace(entry, kind=_contact_stiffness(joint.contact)) if stiff and joint.contact else entry
@@ -239,14 +248,18 @@ def _contact_stiffness(contact: Contact) -> Kind:
     return Kind("contact stiffness", text, f"60e9 {text}", (dimension,))
 
 
-def _law_kind(friction: Friction, parameter: str) -> Kind:
-    """What a parameter of a friction law measures, by the law's own declaration."""
+def _of_law(friction: Friction, entry: Entry) -> Entry:
+    """A parameter of a friction law with what it measures and its range, by the law's own declaration."""
+    parameter = str(entry.location[-1])
     declared = FRICTION_LAWS[friction.law or DEFAULT_LAW].parameters.get(parameter)
     if declared is None:
-        return ANY
+        return replace(entry, kind=ANY)
     wanted = declared.unit or "1"
-    known = next((kind for kind in KINDS.values() if kind.unit == wanted), None)
-    return known or Kind(parameter, wanted, f"1 {wanted}", (unit(wanted)[1],))
+    usual = next((kind for kind in KINDS.values() if kind.unit == wanted), None)
+    kind = usual or Kind(parameter, wanted, f"1 {wanted}", (unit(wanted)[1],))
+    none = parameter == "pair_factor"  # at 0 there would be no friction, which is stated as such
+    limits = Within(declared.minimum, declared.maximum, *(("(]", "friction: 0 is without friction") if none else ()))
+    return replace(entry, kind=kind, rules=(limits,))
 
 
 def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
@@ -377,6 +390,7 @@ class ParameterSet:
         self._nominal_names: dict[str, Number] = {}
         for entry in numbers:
             self._evaluate(entry, self.nominal, self._nominal_names)
+        self.entries, self.nominal = ReadOnlyDict(self.entries), ReadOnlyDict(self.nominal)
 
     @property
     def errors(self) -> tuple[str, ...]:

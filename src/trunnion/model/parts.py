@@ -6,6 +6,7 @@ left out stay unset, so that a model is written back with what was stated and no
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -25,7 +26,6 @@ from pydantic_core import CoreSchema
 
 from trunnion.joints.motion import MOTION_LAWS, MotionLaw
 from trunnion.joints.motors import MOTORS, MotorKind
-from trunnion.model.cost_parts import Cost, CostOption
 from trunnion.model.entry import FORMS, Direction, Name, Part, Position, forms, known, shape
 from trunnion.model.joint_parts import (
     FRICTION_MODELS,
@@ -43,7 +43,7 @@ from trunnion.model.joint_parts import (
     Seat,
     freedoms,
 )
-from trunnion.model.measure_parts import Measure
+from trunnion.model.measure_table import Measure
 from trunnion.model.quantity import (
     Angle,
     AngleOrLength,
@@ -61,7 +61,8 @@ from trunnion.model.quantity import (
     Stiffness,
     Time,
 )
-from trunnion.model.tolerance_parts import Correlation, Variation, VariationDefaults
+from trunnion.model.rules import InSpace, NotNegative, NotZero, OnlyWith, Positive, Refers, Rising, Selects, Within
+from trunnion.model.tolerance_parts import Correlation, Cost, CostOption, Variation, VariationDefaults
 from trunnion.model.units import KINDS
 
 __all__ = [
@@ -110,9 +111,9 @@ _check_motor, _schema_motor = known(tuple(MOTORS), "kind of motor")
 class Point(Part):
     """A point of a link in the link's frame: `[x, y]`, or with the axis of a sliding or spatial joint there."""
 
-    at: Position
-    axis: Direction | None = None
-    x: Direction | None = None
+    at: Annotated[Position, InSpace()]
+    axis: Annotated[Direction | None, InSpace()] = None
+    x: Annotated[Direction | None, InSpace()] = None
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -157,10 +158,10 @@ class Link(Part):
     """
 
     points: Mapping[Name, Point] = {}
-    mass: Mass = Quantity(0, KINDS["mass"])
+    mass: Annotated[Mass, NotNegative] = Quantity(0, KINDS["mass"])
     centre: (
         Annotated[
-            Annotated[Position, Tag(":list")] | Annotated[PolarPoint, Tag(":group")],
+            Annotated[Position, Tag(":list"), InSpace()] | Annotated[PolarPoint, Tag(":group")],
             forms("[x, y] or {distance: …, angle: …}"),
         ]
         | None
@@ -173,6 +174,19 @@ class Link(Part):
     frame: str | None = None
 
 
+_MOTOR_EXAMPLES = {
+    "effort": "4 N m", "stall_effort": "4 N m", "no_load_speed": "1500 rpm", "breakdown_effort": "20 N m",
+    "breakdown_slip": "0.2", "synchronous_speed": "1500 rpm", "points": "[[0 rpm, 4 N m], [1500 rpm, 0 N m]]",
+    "target": "300 rpm", "proportional": "0.5 N m s/rad", "limit": "10 N m",
+}  # fmt: skip
+_OF_ALL_MOTORS = (
+    *("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from"),
+    *("clutch", "clutch_from", "clutch_until"),
+)
+_ROTOR = "add inertia: 0.02 kg m^2 of the rotor, on the motor's side, which turns by itself while the clutch slips"
+_CLUTCH = "add clutch: 5 N m, what it transmits at most"
+
+
 class Motor(Part):
     """What drives a joint whose motion is found, by a kind of `joints.motors`, and what is between it and the joint.
 
@@ -182,28 +196,28 @@ class Motor(Part):
     side; it is engaged from the time clutch_from to clutch_until.
     """
 
-    kind: Annotated[str, _check_motor, _schema_motor]
+    kind: Annotated[str, _check_motor, _schema_motor, Selects("motor", MOTORS, _MOTOR_EXAMPLES, also=_OF_ALL_MOTORS)]
     effort: ForceOrMoment | None = None
     stall_effort: ForceOrMoment | None = None
-    no_load_speed: Rate | None = None
-    breakdown_effort: ForceOrMoment | None = None
-    breakdown_slip: Dimensionless | None = None
-    synchronous_speed: Rate | None = None
-    points: Annotated[tuple[tuple[AnyQuantity, ForceOrMoment], ...], Field(min_length=2)] | None = None
+    no_load_speed: Annotated[Rate | None, NotZero("the motor has no speed")] = None
+    breakdown_effort: Annotated[ForceOrMoment | None, Positive] = None
+    breakdown_slip: Annotated[Dimensionless | None, Positive] = None
+    synchronous_speed: Annotated[Rate | None, NotZero("the motor has no speed")] = None
+    points: Annotated[tuple[tuple[AnyQuantity, ForceOrMoment], ...], Field(min_length=2), Rising("place")] | None = None
     over: Literal["speed", "time"] = "speed"
     target: Rate | None = None
-    proportional: AnyQuantity | None = None
-    integral: AnyQuantity | None = None
-    limit: ForceOrMoment | None = None
-    ratio: Dimensionless | None = None
-    efficiency: Dimensionless | None = None
-    inertia: AnyQuantity | None = None
-    off_from: Time | None = None
-    brake: ForceOrMoment | None = None
-    brake_from: Time | None = None
-    clutch: ForceOrMoment | None = None
-    clutch_from: Time | None = None
-    clutch_until: Time | None = None
+    proportional: Annotated[AnyQuantity | None, NotNegative] = None
+    integral: Annotated[AnyQuantity | None, NotNegative] = None
+    limit: Annotated[ForceOrMoment | None, Positive] = None
+    ratio: Annotated[Dimensionless | None, NotZero("the motor would not turn")] = None
+    efficiency: Annotated[Dimensionless | None, Within(0, 1, "(]", "such as 0.95")] = None
+    inertia: Annotated[AnyQuantity | None, NotNegative] = None
+    off_from: Annotated[Time | None, NotNegative] = None
+    brake: Annotated[ForceOrMoment | None, NotNegative, OnlyWith("brake_from", "add brake_from: 0.5 s")] = None
+    brake_from: Annotated[Time | None, NotNegative, OnlyWith("brake", "add brake: 5 N m")] = None
+    clutch: Annotated[ForceOrMoment | None, Positive, OnlyWith("inertia", _ROTOR)] = None
+    clutch_from: Annotated[Time | None, NotNegative, OnlyWith("clutch", _CLUTCH)] = None
+    clutch_until: Annotated[Time | None, NotNegative, OnlyWith("clutch", _CLUTCH)] = None
 
     @property
     def of(self) -> MotorKind:
@@ -218,32 +232,42 @@ class Initial(Part):
     speed: Rate | None = None
 
 
+_MOTION_EXAMPLES = {
+    "speed": "60 rpm", "amplitude": "20 deg", "period": "0.5 s", "range": "[0 deg, 90 deg]", "duration": "0.2 s",
+    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or file: motion.csv, or give a file by --table",
+}  # fmt: skip
+_FREE = "a motion that is found"
+_LAW = Selects(
+    "motion law", MOTION_LAWS, _MOTION_EXAMPLES, also=("free", "motor", "initial"), instead={"file": "points"}
+)
+
+
 class Driver(Part):
     """Prescribed motion of the joint it is named after, by a law of `joints.motion`: `constant` if none is stated.
 
     With `free: true` or a motor, motion in time finds it; all other analyses prescribe it as stated.
     """
 
-    law: Annotated[str, _check_motion, _schema_motion] = "constant"
-    speed: Rate | None = None
+    law: Annotated[str, _check_motion, _schema_motion, _LAW] = "constant"
+    speed: Annotated[Rate | None, NotZero("the driver does not move", "give a speed, however small")] = None
     start: AngleOrLength | None = None
     range: tuple[AngleOrLength, AngleOrLength] | None = None
     mean: AngleOrLength | None = None
-    amplitude: AngleOrLength | None = None
-    period: Time | None = None
+    amplitude: Annotated[AngleOrLength | None, NotZero("it never moves", "give it an extent")] = None
+    period: Annotated[Time | None, Positive] = None
     phase: Angle | None = None
-    duration: Time | None = None
-    return_duration: Time | None = None
-    dwell: Time | None = None
+    duration: Annotated[Time | None, Positive] = None
+    return_duration: Annotated[Time | None, Positive, OnlyWith("returns", "remove it, or returns: false")] = None
+    dwell: Annotated[Time | None, NotNegative] = None
     returns: bool = True
-    points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2)] | None = None
+    points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2), Rising("time")] | None = None
     file: str | None = None
     periodic: bool = False
     ends: Literal["clamped", "natural"] = "clamped"
-    delay: Time | None = None
+    delay: Annotated[Time | None, NotNegative] = None
     free: bool = False
     motor: Motor | None = None
-    initial: Initial | None = None
+    initial: Annotated[Initial | None, OnlyWith("found", "state free: true or a motor", _FREE)] = None
     _found_law: MotionLaw | None = PrivateAttr(None)
 
     @property
@@ -290,9 +314,9 @@ class Load(Part):
     joints (`S.slide`, `S.slide_velocity`) and coordinates of points (`ram.Q.x`, `ram.Q.velocity_x`).
     """
 
-    link: str | None = None
+    link: Annotated[str | None, Refers("link")] = None
     at: str | None = None
-    force: Annotated[tuple[Force, ...], Field(min_length=2, max_length=3)] | None = None
+    force: Annotated[tuple[Force, ...], Field(min_length=2, max_length=3), InSpace()] | None = None
     moment: (
         Annotated[
             Annotated[Moment, Tag(":value")]
@@ -302,9 +326,9 @@ class Load(Part):
         | None
     ) = None
     frame: Literal["global", "link"] = "global"
-    joint: str | None = None
-    resisting_torque: Moment | None = None
-    resisting_force: Force | None = None
+    joint: Annotated[str | None, Refers("any joint")] = None
+    resisting_torque: Annotated[Moment | None, NotNegative] = None
+    resisting_force: Annotated[Force | None, NotNegative] = None
     only: Literal["positive", "negative"] | None = None
     useful: bool = False
 
@@ -316,7 +340,7 @@ class Table(Part):
     """
 
     over: Literal["drive", "time"] = "drive"
-    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2)] = ()
+    points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2), Rising("at")] = ()
     file: str | None = None
     interpolation: Literal["linear", "spline"] = "linear"
     periodic: bool = False
@@ -335,18 +359,21 @@ class Spring(Part):
     One that only pulls does so while it is longer than its free length, one that only pushes while it is shorter.
     """
 
-    between: tuple[str, str] | None = None
-    joint: str | None = None
-    stiffness: Stiffness | None = None
-    free_length: Length | None = None
+    between: Annotated[tuple[str, str] | None, Refers("point")] = None
+    joint: Annotated[str | None, Refers("any joint")] = None
+    stiffness: Annotated[Stiffness | None, NotNegative] = None
+    free_length: Annotated[Length | None, NotNegative] = None
     free_angle: Angle | None = None
-    damping: Damping | None = None
+    damping: Annotated[Damping | None, NotNegative] = None
     preload: ForceOrMoment | None = None
     only: Literal["pull", "push"] | None = None
     useful: bool = False
 
 
 USUAL_PRESSURE_ANGLE = Quantity.read("20 deg", KINDS["angle"])
+
+
+_TEETH = OnlyWith("teeth", "remove it, or state teeth: true")
 
 
 class Gear(Part):
@@ -356,11 +383,11 @@ class Gear(Part):
     pressure angle (20 deg if not stated); without, a train, belt or chain passes torques alone.
     """
 
-    joints: tuple[str, str]
-    ratio: Dimensionless
+    joints: Annotated[tuple[str, str], Refers("any joint", distinct=True)]
+    ratio: Annotated[Dimensionless, NotZero("the second joint would not turn at all")]
     phase: Angle = Quantity(0, KINDS["angle"])
     teeth: bool = True
-    pressure_angle: Angle | None = None
+    pressure_angle: Annotated[Angle | None, Within(0, math.pi / 2, "[)", "20 deg is usual"), _TEETH] = None
 
     def complete(self) -> Gear:
         """With the usual pressure angle if it has teeth and states none."""

@@ -11,10 +11,10 @@ import numpy as np
 from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.fits import standard_tolerance
-from trunnion.model.cost_parts import Cost
-from trunnion.model.parameter_names import ParameterNames
+from trunnion.model.names import ParameterNames
 from trunnion.model.parameters import Entry, ParameterSet
 from trunnion.model.quantity import Quantity
+from trunnion.model.tolerance_parts import Cost
 from trunnion.model.tolerances import clearance_of, named_paths, tolerated
 from trunnion.model.units import KINDS, Kind, UnitError, unit
 

@@ -1,16 +1,17 @@
-"""Quantities of a model file: a number in SI, a text with unit and tolerance, or an expression.
+"""Quantities of a model file: a number in SI, a text with unit and tolerance, or an expression; the named dimensions.
 
 `Quantity` keeps what was written, so that a model is written back as it was read. The annotated types `Length`,
-`Mass`, … say what a field of the model measures: pydantic reads a number or a text into a `Quantity` of that kind.
-"""
+`Mass`, … say what a field of the model measures: pydantic reads a number or a text into a `Quantity` of that kind."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
+from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,8 +20,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from trunnion.algebra.namespace import Number
-from trunnion.model.expression import LITERAL, Expression, literal, normalise, parse
-from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, dimension_text, fits
+from trunnion.model.expression import LITERAL, Expression, literal, parse
+from trunnion.model.units import ANY, KINDS, NUMBER, Dimension, Kind, UnitError, dimension_text, fits, normalise
 
 __all__ = [
     "Acceleration",
@@ -41,6 +42,8 @@ __all__ = [
     "Stiffness",
     "Time",
     "deviation_spans",
+    "evaluation_order",
+    "nominal_dimensions",
     "term",
 ]
 
@@ -108,10 +111,19 @@ class Quantity:
             assert dimension is not None  # None fits every kind
             raise UnitError(
                 f"'{self.source}' is {dimension_text(dimension)} where {_needed(kind)} is needed",
-                f"write {_needed(kind)} such as {kind.example}"
+                f"write {self.respelt(kind) or f'{_needed(kind)} such as {kind.example}'}"
                 + ("; a percentage of another value is not read" if "%" in str(self.source) else ""),
             )
         return dimension
+
+    def respelt(self, kind: Kind | None = None) -> str:
+        """What is likely meant where it is no quantity of its kind: 10 lbf in by 10 lb-in, 100 lbf by 100 lb."""
+        spaced = re.sub(r"(?<=[^\W\d_])-(?=[^\W\d_])", " ", str(self.source))
+        for text in (spaced, re.sub(r"\b(lb|oz|kg|g)s?\b", r"\1f", spaced)):
+            with suppress(UnitError):
+                if text != self.source and not Quantity.read(text, kind or self.kind).names:
+                    return text
+        return ""
 
 
 @lru_cache(maxsize=4096)
@@ -277,3 +289,35 @@ Pressure = Annotated[Quantity, _Read(KINDS["pressure"])]
 Stiffness = Annotated[Quantity, _Read(KINDS["stiffness"] | KINDS["torsional stiffness"])]
 Damping = Annotated[Quantity, _Read(KINDS["damping"] | KINDS["torsional damping"])]
 AngleOrLength = Annotated[Quantity, _Read(KINDS["angle"] | KINDS["length"])]
+
+
+def evaluation_order(
+    dimensions: Mapping[str, Quantity], errors: Mapping[str, Quantity] | None = None
+) -> tuple[list[str], list[list[str]]]:
+    """Dimensions in an order in which each follows those it speaks of, and the circles that have none.
+
+    errors: deviations of some of them, which may speak of dimensions too.
+    """
+    graph = {name: {one for one in quantity.names if one in dimensions} for name, quantity in dimensions.items()}
+    for name, quantity in (errors or {}).items():
+        graph[name] |= {one for one in quantity.names if one in dimensions}
+    circles: list[list[str]] = []
+    while True:
+        try:
+            return list(TopologicalSorter(graph).static_order()), circles
+        except CycleError as error:
+            circle = list(reversed(error.args[1]))[:-1]
+            circles.append(circle)
+            graph = {name: set() if name in circle else needs for name, needs in graph.items()}
+
+
+def nominal_dimensions(dimensions: Mapping[str, Quantity]) -> dict[str, Number]:
+    """The dimensions without errors; nan where one has no value."""
+    order, circles = evaluation_order(dimensions)
+    lost = {name for circle in circles for name in circle}
+    names: dict[str, Number] = {}
+    for name in order:
+        quantity = dimensions[name]
+        sound = name not in lost and set(quantity.names) <= names.keys()
+        names[name] = quantity.evaluate(names) if sound else np.nan
+    return names

@@ -19,7 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.file import composed, entries_of, read_entries, text_of
 from trunnion.model.mechanism import Mechanism, read_mechanism
-from trunnion.model.named_file import stated_files
+from trunnion.model.text import stated_files
 
 __all__ = ["changed_text", "rewrite_mechanism"]
 

@@ -1,14 +1,15 @@
 """Which numbers of a mechanism vary, within which limits and how: `tolerances`, `tolerance_defaults`, `correlations`.
 
 A name is one that `--set` takes. One of `joint_defaults` means the number of each joint that has it; those vary
-independently. A number that is stated with ± or by a fit varies too.
-"""
+independently. A number that is stated with ± or by a fit varies too."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +17,9 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.assign import assign
-from trunnion.model.limit_texts import DIGITS, half_width, limits_text, number_with, written
-from trunnion.model.limits import Limits
+from trunnion.model.changes import assign
+from trunnion.model.csv_table import column
+from trunnion.model.limits import DIGITS, Limits, half_width, limits_text, number_with, written
 from trunnion.model.parameters import Entry, Location, ParameterSet, measured
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerance_parts import DISTRIBUTIONS, Variation
@@ -38,6 +39,7 @@ __all__ = [
     "tolerated",
     "towards",
     "variations",
+    "with_samples",
     "with_tolerances",
     "written_limits",
 ]
@@ -371,3 +373,19 @@ def kept(mechanism: Numbers, data: Mapping[str, Any]) -> dict[str, Any]:
         if row["of"] == stated["of"] or len(row["of"]) > 1
     ]
     return {**data, **rest, **({"correlations": together} if rows else {})}
+
+
+def with_samples(mechanism: Numbers, name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Plain data of the mechanism with a number that varies as the deviations in a file; limits stated are kept."""
+    numbers = mechanism.parameter_set
+    target = numbers.resolve(name)
+    if target not in numbers.entries:
+        raise MechanismError(Finding(f"the model states no '{target}'", "--sample", "state it, then its deviations"))
+    deviations = column(Path(path), measured(mechanism, numbers.entries.values())[target])
+    key, stated = variations(mechanism, numbers).get(target, (target, None))
+    data = mechanism.data()
+    kept = {} if stated is None or stated.limits is None else {"limits": stated.limits.source}
+    own = key if numbers.resolve(key) == target else target
+    entry = {**kept, "distribution": "sample", "values": deviations}
+    data["tolerances"] = {**data.get("tolerances", {}), own: entry}
+    return data

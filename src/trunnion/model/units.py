@@ -1,23 +1,21 @@
-"""Kinds of quantity (length, moment, …) and the units a model file may write them in.
+"""Kinds of quantity (length, moment, …) and the units that files may write them in.
 
 A dimension is the exponents of (length, mass, time, angle). Angle counts as one, although SI calls it a pure
 number, so that 30 deg is not taken for a length nor 30 mm for an angle; beside other dimensions it drops out
-(N m/rad is N m). pint knows the units; those that nearly every model is written in stand here as well, since pint
-takes a third of a second to load.
+(N m/rad is N m). Only the spellings of the table of units are read, those in common use: a library that puts every
+prefix before every unit takes `Grad` for a giga-radian and `Min` for a million inches.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import Final, Literal
 
-from trunnion.model.unit_spellings import READ, plain, remedy_for, strange_sign, words
-
-if TYPE_CHECKING:
-    import pint
+from trunnion.model.names import nearest
 
 __all__ = [
     "ANGLE",
@@ -30,6 +28,8 @@ __all__ = [
     "UnitError",
     "dimension_text",
     "fits",
+    "normalise",
+    "pound_feet",
     "root",
     "si_unit",
     "unit",
@@ -133,135 +133,170 @@ def dimension_text(dimension: Dimension) -> str:
     return f"in {' '.join(parts)}"
 
 
-@cache
-def _registry() -> pint.UnitRegistry[Fraction]:
-    """pint with exact rational factors: 93.782 mm is the float nearest 0.093782."""
-    import pint
+# ---- the table ------------------------------------------------------------------------------------------------
 
-    registry: pint.UnitRegistry[Fraction] = pint.UnitRegistry(non_int_type=Fraction)
-    registry.define("@alias turn = rev")
-    return registry
-
-
-_PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as pint has it
-_M, _RAD, _S = {"meter": Fraction(1)}, {"radian": Fraction(1)}, {"second": Fraction(1)}
-_NEWTON = {"gram": Fraction(1), "meter": Fraction(1), "second": Fraction(-2)}
-_JOULE = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-2)}
-_WATT = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3)}
-_PASCAL = {"gram": Fraction(1), "meter": Fraction(-1), "second": Fraction(-2)}
-_VOLT = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
-# of the units in most models: name and root as pint has them, factor to SI; a test holds them against pint
-_COMMON: dict[str, tuple[str, Fraction, dict[str, Fraction]]] = {
-    "mm": ("millimeter", Fraction(1, 1000), _M),
-    "cm": ("centimeter", Fraction(1, 100), _M),
-    "m": ("meter", Fraction(1), _M),
-    "um": ("micrometer", Fraction(1, 10**6), _M),
-    "µm": ("micrometer", Fraction(1, 10**6), _M),
-    "deg": ("degree", _PI / 180, _RAD),
-    "turn": ("turn", 2 * _PI, _RAD),
-    "rad": ("radian", Fraction(1), _RAD),
-    "rpm": ("revolutions_per_minute", _PI / 30, {"radian": Fraction(1), "second": Fraction(-1)}),
-    "kg": ("kilogram", Fraction(1), {"gram": Fraction(1)}),
-    "g": ("gram", Fraction(1, 1000), {"gram": Fraction(1)}),
-    "s": ("second", Fraction(1), _S),
-    "ms": ("millisecond", Fraction(1, 1000), _S),
-    "N": ("newton", Fraction(1), _NEWTON),
-    "mN": ("millinewton", Fraction(1, 1000), _NEWTON),
-    "kN": ("kilonewton", Fraction(1000), _NEWTON),
-    "W": ("watt", Fraction(1), _WATT),
-    "J": ("joule", Fraction(1), _JOULE),
-    "Pa": ("pascal", Fraction(1), _PASCAL),
-    "MPa": ("megapascal", Fraction(10**6), _PASCAL),
-    "GPa": ("gigapascal", Fraction(10**9), _PASCAL),
-    "bar": ("bar", Fraction(10**5), _PASCAL),
-    # of the settings of a test rig
-    "V": ("volt", Fraction(1), _VOLT),
-    "mV": ("millivolt", Fraction(1, 1000), _VOLT),
-    "Hz": ("hertz", Fraction(1), {"second": Fraction(-1)}),
-    "kHz": ("kilohertz", Fraction(1000), {"second": Fraction(-1)}),
-    "%": ("percent", Fraction(1, 100), {}),
-}
-_FACTOR = re.compile(r"([^\W\d]+|%)(?:\^(-?[1-9]))?")
-_PRODUCT_OF_COMMON = re.compile(rf"(?:1 ?/ ?)?{_FACTOR.pattern}(?: ?[ */] ?{_FACTOR.pattern})*")
-
-
-def _common(spaced: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]] | None:
-    """`root` of a product of the units in `_COMMON`, each once, without pint; None of any other."""
-    spaced = spaced[1:-1] if re.fullmatch(r"\([^()]*\)", spaced) else spaced
-    if found := re.fullmatch(r"([^()]*/) ?\(([^()^]*)\)", spaced):  # mV/(N m) is mV/N/m, V/(rad/s) is V/rad*s
-        spaced = found[1] + re.sub(r" ?([ */]) ?", lambda sign: "*" if sign[1] == "/" else "/", found[2].strip())
-    if not _PRODUCT_OF_COMMON.fullmatch(spaced):
-        return None
-    total, exponents, names = Fraction(1), dict[str, Fraction](), list[str]()
-    for one in _FACTOR.finditer(spaced):
-        if one[1] not in _COMMON:
-            return None
-        name, factor, base = _COMMON[one[1]]
-        power = int(one[2] or 1) * (-1 if spaced[: one.start()].rstrip().endswith("/") else 1)
-        total *= factor**power
-        names.append(name)
-        for symbol, exponent in base.items():
-            exponents[symbol] = exponents.get(symbol, Fraction(0)) + power * exponent
-    if len(set(names)) < len(names):
-        return None
-    return total, {one: exponent for one, exponent in exponents.items() if exponent}, tuple(names)
-
-
-MOST_POWER = 1000  # of all powers in a unit, one on the other
-# one power, not itself raised to another
-_POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\s*(\d{1,2})(?:[./]\d{1,2})?\s*\)?(?!\s*(?:\*\*|\^)|[\d.])")
-_LONG = re.compile(r"\d{20}|[⁰¹²³⁴⁵⁶⁷⁸⁹]{3}|.{200}")
-_PRODUCT = "write a product of a number and a dimension as 2 * AB"
-
-
-def _known_to_pint(word: str) -> str:
-    """The name that pint has for a word; empty if it has none."""
-    try:
-        return " ".join(str(name).replace("_", " ") for name in _registry().parse_units(word)._units)
-    except Exception:  # see `root`
-        return ""
-
-
-def _check_spelling(text: str, spaced: str) -> None:
-    """UnitError for a word that is no unit in common use, whatever pint would make of it."""
-    strange = strange_sign(spaced)
-    word = next((one for one in words(spaced) if one not in READ), None)
-    if word is None and not strange:
-        return
-    meant = remedy_for(text, word or "")
-    if word is None or not (name := _known_to_pint(word)):
-        raise UnitError(f"the unit '{text}' is not known", meant)
-    told = "" if word == text else f", of which '{word}'"
-    same = "is" if name == word else f"would be {name}, which is"
-    raise UnitError(f"the unit '{text}'{told} {same} not in common use", meant)
-
-
-def _check_powers(text: str, spaced: str) -> None:
-    """UnitError for powers and numbers that no unit has: pint works them out to the last digit."""
-    product = 1
-    for power in _POWER.findall(spaced):
-        product *= max(1, int(power))
-    if re.search(r"\*\*|\^", _POWER.sub("", spaced)) or product > MOST_POWER or _LONG.search(spaced):
-        raise UnitError(f"the unit '{text[:60]}' is not known", "write powers as m^2 or s^-1")
+BASES = ("m", "kg", "s", "rad", "A", "K", "count")
+# A unit in a line: symbols, each with the prefixes that it takes in brackets; what one of it is; words, which may be
+# plural, of those with a star with micro, milli, kilo and mega. Prefixes are few: krad and Mm are slips of the pen.
+_TABLE: Final = """
+m(n µ m c d k)          |                 | meter* metre*
+g(µ m k)                | 0.001 kg        | gram*
+s(n µ m) sec secs       |                 | second*
+rad(µ m)                |                 | radian
+A(n µ m k)              |                 | ampere*
+K(m)                    |                 | kelvin
+                        |                 | count
+°C degC degree_Celsius  | 1 K             |
+min mins                | 60 s            | minute
+h hr hrs                | 60 min          | hour
+d                       | 24 h            | day
+msec                    | 0.001 s         |
+usec                    | 1e-6 s          |
+                        | 1e-6 m          | micron
+                        | 0.01 m          | centimeter centimetre
+N(µ m c da k M)         | 1 kg m/s^2      | newton*
+Pa(h k M G)             | 1 N/m^2         | pascal*
+bar(m)                  | 1e5 Pa          |
+J(m k M)                | 1 N m           | joule*
+W(µ m k M)              | 1 J/s           | watt*
+Wh(k)                   | 1 W h           |
+Hz(k M)                 | 1 s^-1          | hertz*
+V(µ m k)                | 1 W/A           | volt*
+                        | 1 A s           | coulomb*
+pC                      | 1e-12 A s       |
+nC                      | 1e-9 A s        |
+µC μC uC                | 1e-6 A s        |
+F(p n µ)                | 1 A s/V         | farad*
+Ω(m k M) ohm(k M)       | 1 V/A           | ohm*
+T(m)                    | 1 V s/m^2       | tesla*
+l(m) L(m)               | 0.001 m^3       | liter* litre*
+cc                      | 1 cm^3          |
+rev revs                | 6.2831853071795864769252867665590057683943387987502 rad | turn revolution
+deg °                   | 1/360 rev       | degree
+gon                     | 1/400 rev       |
+arcmin                  | 1/60 deg        | arcminute
+arcsec                  | 1/60 arcmin     | arcsecond
+                        | 0.001 rad       | milliradian
+                        | 1e-6 rad        | microradian
+rpm                     | 1 rev/min       |
+rps                     | 1 rev/s         |
+t                       | 1000 kg         | tonne
+kgf                     | 9.80665 N       |
+gf                      | 0.001 kgf       |
+dyn                     | 1e-5 N          |
+in(µ) inches            | 0.0254 m        | inch
+ft feet                 | 12 in           | foot
+yd                      | 3 ft            | yard
+mi                      | 1760 yd         | mile
+thou                    | 0.001 in        |
+lb lbs                  | 0.45359237 kg   | pound
+oz                      | 1/16 lb         |
+lbf(k)                  | 0.45359237 kgf  |
+ozf                     | 1/16 lbf        |
+kip                     | 1000 lbf        |
+slug                    | 1 lbf s^2/ft    | slug
+psi                     | 1 lbf/in^2      |
+ksi                     | 1 kip/in^2      |
+atm                     | 101325 Pa       |
+hp                      | 550 ft lbf/s    |
+mph                     | 1 mi/h          |
+kph                     | 1 km/h          |
+cSt                     | 1 mm^2/s        |
+ε(µ)                    | 1               | strain
+                        | 1e-6            | microstrain
+%                       | 0.01            | percent
+‰                       | 0.001           |
+ppm                     | 1e-6            |
+"""
+_PREFIXES: Final = {
+    "p": "1e-12", "n": "1e-9", "µ": "1e-6", "μ": "1e-6", "u": "1e-6", "m": "0.001", "c": "0.01", "d": "0.1",
+    "": "1", "da": "10", "h": "100", "k": "1000", "M": "1e6", "G": "1e9",
+    "micro": "1e-6", "milli": "0.001", "kilo": "1000", "mega": "1e6",
+}  # fmt: skip
+Root = tuple[Fraction, dict[str, Fraction], frozenset[str]]  # factor to SI, exponents of BASES, names of units
+_SYMBOL = re.compile(r"([^\s(]+)(?:\(([^)]*)\))?")
+ONE: Final[Root] = (Fraction(1), {}, frozenset())
 
 
 @cache
-def root(text: str) -> tuple[Fraction, dict[str, Fraction], tuple[str, ...]]:
-    """Factor to SI, exponents by base unit of pint, and the units named, of any unit in use; UnitError if none."""
-    spaced = plain(text)
-    if known := _common(spaced):
-        return known
-    registry = _registry()
-    _check_spelling(text, spaced)
-    _check_powers(text, spaced)
+def _table() -> dict[str, Root]:
+    """Every spelling with what it is; the name of a unit is its first symbol, else its first word."""
+    table: dict[str, Root] = {"1": ONE, "kg": (Fraction(1), {"kg": Fraction(1)}, frozenset())}
+    for line in _TABLE.strip().splitlines():
+        first, definition, last = (part.strip() for part in line.split("|"))
+        symbols = dict(_SYMBOL.findall(first))
+        name = next(iter(symbols), last.split(" ")[0].strip("*"))
+        number, _, product = definition.partition(" ")
+        factor, exponents, _ = _product(product or "1", table)[0]
+        size, powers = Fraction(number or 1) * factor, exponents if definition else {name: Fraction(1)}
+        spellings = {f"{before}{symbol}": before for symbol in symbols for before in _before(symbols[symbol])}
+        for word in last.split():
+            metric = ("", "micro", "milli", "kilo", "mega") if word.endswith("*") else ("",)
+            spellings |= {f"{before}{word.strip('*')}{end}": before for before in metric for end in ("", "s")}
+        sizes = {before: Fraction(_PREFIXES[before]) * size for before in {*spellings.values()}}
+        table |= {text: (sizes[before], powers, frozenset({name})) for text, before in spellings.items()}
+    return table
+
+
+def _before(prefixes: str) -> list[str]:
+    """The prefixes of a symbol, none among them; micro has two signs in Unicode, and none on most keyboards."""
+    return ["", *(sign for one in prefixes.split() for sign in (("µ", "μ", "u") if one == "µ" else (one,)))]
+
+
+# ---- reading --------------------------------------------------------------------------------------------------
+
+_WORD = re.compile(r"[^\W\d]\w*|°\w*|[%‰]")
+_FACTOR = re.compile(rf"\s*(?P<sign>[*/.]?)\s*(?P<word>{_WORD.pattern}|1(?![\d.])|\()")
+_POWER = re.compile(
+    r"\s*(?:\^|\*\*)\s*(?:\(\s*([-+]?\s*\d{1,2}(?:[./]\d{1,2})?)\s*\)|([-+]?\s*\d{1,2}(?:\.\d{1,2})?))(?![\d.])"
+)
+MOST_DIGITS = 100_000  # binary, of a factor: powers of powers have many
+MOST_SIGNS = 200
+_FORMS = "write a unit as N m, kg/m^3 or s^-1"
+
+
+def _product(text: str, table: Mapping[str, Root], begin: int = 0) -> tuple[Root, int]:
+    """A product of units from a place on, and where it ends; ValueError, KeyError, ArithmeticError if it is none."""
+    factor, exponents, names, place = Fraction(1), dict.fromkeys(BASES, Fraction(0)), frozenset[str](), begin
+    while found := _FACTOR.match(text, place):
+        if found["sign"] and place == begin:
+            raise ValueError(text)
+        (size, powers, named), place = table.get(found["word"], ONE), found.end()
+        if found["word"] == "(":
+            (size, powers, named), place = _product(text, table, place)
+            place = text.index(")", place) + 1
+        elif found["word"] not in table:
+            raise KeyError(found["word"])
+        raised = _POWER.match(text, place)
+        power = Fraction("".join((raised[1] or raised[2]).split())) if raised else Fraction(1)
+        power, place = -power if found["sign"] == "/" else power, raised.end() if raised else place
+        if abs(power) * (size.numerator.bit_length() + size.denominator.bit_length()) > MOST_DIGITS:
+            raise ValueError(text)
+        factor *= size ** int(power) if power.denominator == 1 else Fraction(float(size) ** float(power))
+        for base, exponent in powers.items():
+            exponents[base] += power * exponent
+        names |= named
+    place += len(text[place:]) - len(text[place:].lstrip())
+    if place == begin or text[place : place + 1] not in ("", ")"):
+        raise ValueError(text)
+    return (factor, {base: power for base, power in exponents.items() if power}, names), place
+
+
+@cache
+def root(text: str) -> Root:
+    """What a unit in use is: factor to SI, exponents by `BASES`, the units named in it; UnitError if it is none."""
+    written, table = _plain(text).strip(), _table()
     try:
-        parsed = registry.parse_units(spaced)
-        factor, base = registry.get_root_units(parsed)
-    except Exception as error:  # pint raises its own, tokenizer and arithmetic errors on text that is no unit
-        raise UnitError(f"the unit '{text}' is not known", remedy_for(text, "")) from error
-    exponents = {str(name): Fraction(str(power)) for name, power in base._units.items()}
-    to_si = Fraction(str(factor)) / Fraction(1000) ** int(exponents.get("gram", 0))
-    return to_si, exponents, tuple(str(name) for name in parsed._units)
+        if len(text) > MOST_SIGNS:
+            raise ValueError(text)
+        product, end = _product(written or "1", table)
+        if end < len(written):
+            raise ValueError(text)
+    except (ValueError, LookupError, ArithmeticError):
+        word = next((one for one in _WORD.findall(written) if one not in table), "")
+        remedy = _remedy(text, word) or ("" if word else _FORMS)
+        raise UnitError(f"the unit '{text[:60]}' is not known", remedy) from None
+    return product
 
 
 @cache
@@ -272,12 +307,96 @@ def unit(text: str) -> tuple[Fraction, Dimension]:
     except UnitError as error:  # in a model the word may be a dimension's name
         near = error.remedy.startswith("did you mean")
         raise UnitError(error.what, f"{error.remedy} ({_PRODUCT})" if near else error.remedy or _PRODUCT) from None
-    order = ("meter", "gram", "second", "radian")
-    if set(exponents) - set(order):
+    if exponents.keys() - set(BASES[:4]):
         raise UnitError(f"the unit '{text}' is not one of mechanics", "use units of length, mass, time and angle")
-    length, mass, time, angle = (exponents.get(name, Fraction(0)) for name in order)
+    length, mass, time, angle = (exponents.get(base, Fraction(0)) for base in BASES[:4])
     dimension = (length, mass, time, angle)
-    per_time = dimension == _dimension(time=-1) and factor != 1
-    if per_time or any(name.endswith("hertz") for name in names):
+    if "Hz" in names or (dimension == _dimension(time=-1) and factor != 1):
         raise UnitError(f"the unit '{text}' may count turns or radians", "write an angular speed in rpm or rad/s")
     return factor, dimension
+
+
+# ---- spellings ------------------------------------------------------------------------------------------------
+
+_PRODUCT = "write a product of a number and a dimension as 2 * AB"
+# Signs an engineer's keyboard or word processor makes of - * ^2; the minus of a superscript included.
+_SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "⋅": "·"})
+_SUPERSCRIPT = re.compile("⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]")
+_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def normalise(text: str) -> str:
+    """The text with typographic signs as plain ones: − – × as - *, m² as m^2."""
+    return _SUPERSCRIPT.sub(lambda found: "^" + found[0].translate(_DIGITS), text.translate(_SIGNS))
+
+
+# Those that a misspelt one is compared with.
+_USUAL: Final = (
+    "mm cm m µm km in ft deg rad mrad kg g mg t lb s ms min N mN kN MN lbf Pa kPa MPa GPa bar psi J kJ W kW rpm "
+    "V mV A mA Hz kHz gon rev turn"
+)
+_DEGREES = "write deg for degrees, 360 to a turn, or gon, 400 to a turn"
+_SPEED = "write rpm, or rad/s"
+# What other spellings are likely to mean.
+_MEANT: Final = {
+    "grad": _DEGREES, "grade": _DEGREES, "grads": _DEGREES, "gradian": _DEGREES, "altgrad": "write deg",
+    "mil": "write thou for 0.001 in, or mrad for an angle", "mils": "write thou for 0.001 in, or mrad for an angle",
+    "ton": "write t for 1000 kg, or lb", "tons": "write t for 1000 kg, or lb", "kp": "write kgf, or N",
+    "ps": "write kW; 1 PS are 0.7355 kW", "mpa": "write MPa for a pressure, Pa s for a viscosity", "gon": "write gon",
+    "c": "write °C for a temperature, pC or nC for a charge",
+    "a": "write A for ampere", "u": _SPEED, "r": _SPEED, "umin": _SPEED, "tr": _SPEED, "upm": _SPEED, "cps": _SPEED,
+    "cycle": "write turn, or Hz", "cycles": "write turn, or Hz", "mdeg": "write it in deg, or mrad",
+    "kn": "write kN for a force, km/h for a speed", "kt": "write km/h for a speed, kg or t for a mass",
+    "g_n": "write m/s^2", "g_0": "write m/s^2", "zoll": "write in", "umdr": _SPEED, "nms": "write N m s",
+    "ns": "write N s for a momentum, ns for a time", "std": "write h", "sekunden": "write s", "grd": _DEGREES,
+    "knm": "write kNm", "nm": "write N m for a torque, nm for a length",
+}  # fmt: skip
+_PHRASES: Final = {  # whole units, without their spaces
+    re.compile(r"[uUrR](pm|PM)?/[Mm]in\.?|[Mm]in(-1|⁻¹)|[1I]?/[Mm]in\.?"): _SPEED,
+    re.compile(r"[uUrR]/s|s(-1)"): "write rad/s, rpm or Hz",
+    re.compile(r"(.*/)?[Hh]{1,2}:[Mm]{2}(:[Ss]{2})?.*"): "write s",
+}
+_TORQUE = re.compile(r"(?<![\w])((?:[mkMcµμu]|da)?)N(mm|cm|m)(?!\w)([\^*]?)")
+_TURNS = re.compile(r"(?<![\w])(?:U|Umdr\.?)\s?/\s?(?=(?:min|s)(?!\w))")
+_POUND_FEET = re.compile(r"(?<!\w)(?:(ft|in)-(lb|oz)[fs]?|(lb|oz)[fs]?-(ft|in))(?!\w)")
+_POUND_FEET_ALONE = re.compile(r"(?:(ft|in)[ .·⋅*]?(lb|oz)[fs]?|(lb|oz)[fs]?[ .·⋅*]?(ft|in))")
+_SECOND = re.compile(r"(?<![\w])[Ss]ek\b\.?|(?<![\w])[Ss]ec\.")
+
+
+def _plain(text: str) -> str:
+    """A unit in plain signs and spaces: `N m` for `Nm`, `rev/min` for `U/min`, `s` for `Sek.`, `m^2` for `m²`.
+
+    In `mV/Nm` both are below the stroke.
+    """
+    spaced = _TORQUE.sub(_torque, normalise(text))
+    spaced = _SECOND.sub("s", _TURNS.sub("rev/", spaced))
+    return spaced.replace("·", "*")
+
+
+def pound_feet(text: str) -> str:
+    """A unit of a sensor with its torques of pounds and feet written out: `lbf ft` for `ft-lb`, `ft lb` and `lb-ft`.
+
+    Not of a model's: a minus may stand there, and `lb ft` is a mass times a length. No sensor measures that.
+    """
+
+    def product(found: re.Match[str]) -> str:
+        return f"({found[2] or found[3]}f {found[1] or found[4]})"
+
+    alone = _POUND_FEET_ALONE.fullmatch(text.strip())
+    return product(alone) if alone else _POUND_FEET.sub(product, text)
+
+
+def _torque(found: re.Match[str]) -> str:
+    product = f"{found[1]}N {found[2]}"
+    return f"{product}{found[3]}" if found[3] else f"({product})"
+
+
+def _remedy(text: str, word: str) -> str:
+    """What to write instead of a unit with a word that is none; empty where nothing is near."""
+    bare = "".join(text.split())
+    if told := next((remedy for phrase, remedy in _PHRASES.items() if phrase.fullmatch(bare)), ""):
+        return told
+    if told := _MEANT.get(word.casefold(), ""):
+        return told
+    near = nearest(word, _USUAL.split())
+    return near if near.startswith("did you mean") else ""

@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import json
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Protocol
 
 from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.model.units import UnitError, si_unit, unit
 from trunnion.results.figure import Figure
 from trunnion.version import __version__
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism
-from trunnion.model.stated_units import stated_units
 
 __all__ = [
-    "KEPT", "Described", "attribute", "cited", "codes", "encoded", "figure_rows", "finding_rows", "findings_of",
-    "origin", "summary_of", "whole",
-]  # fmt: skip
+    "KEPT",
+    "Described",
+    "attribute",
+    "cited",
+    "codes",
+    "encoded",
+    "figure_rows",
+    "finding_rows",
+    "findings_of",
+    "origin",
+    "stated_units",
+    "summary_of",
+    "whole",
+]
 
 _AS_TEXT = json.JSONEncoder(ensure_ascii=False).encode
 KEPT = "variables"  # the attribute of a result that has not kept every variable
@@ -95,3 +108,31 @@ def figure_rows(figures: Iterable[Figure]) -> list[dict[str, Any]]:
 def summary_of(result: Described) -> list[Figure]:
     """The figures that one looks at first."""
     return [Figure.read(row) for row in attribute(result, "summary")]
+
+
+STATED = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-zµ°][^±(]*?)\s*(?:[±+(-].*)?")  # "60 mm ± 0.05 mm"
+ANGLES = {"rad": "deg"}  # where no angle is stated; nobody reads radians
+
+
+def stated_units(mechanism: Mechanism) -> dict[str, str]:
+    """The unit that the model states most often, for each unit of SI: {"m": "mm", "rad": "deg"}."""
+    if "stated_units" not in mechanism.worked_out:
+        mechanism.worked_out["stated_units"] = _stated_units(mechanism)
+    return dict(mechanism.worked_out["stated_units"])
+
+
+def _stated_units(mechanism: Mechanism) -> dict[str, str]:
+    counts: Counter[tuple[str, str]] = Counter()
+    for entry in mechanism.parameter_set.entries.values():
+        text = str(entry.quantity.source)
+        found = STATED.fullmatch(text)
+        if entry.alias or not found:
+            continue
+        try:
+            counts[si_unit(unit(found[1])[1]), found[1]] += 1
+        except UnitError:  # of a formula: "2 e", "40 N * x"
+            continue
+    stated: dict[str, str] = {}
+    for (si, own), _ in counts.most_common():
+        stated.setdefault(si, own)
+    return {si: own for si, own in (ANGLES | stated).items() if si != own}

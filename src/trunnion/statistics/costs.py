@@ -20,7 +20,7 @@ __all__ = ["COST_MODELS", "Cost", "CostModel", "CostParameter"]
 
 @dataclass(frozen=True)
 class CostParameter:
-    """One parameter of a model: its unit (pint notation, empty if none), default (None: must be given), least value.
+    """One parameter of a model: its unit (empty if none), default (None: must be given), least value.
 
     above: whether it has to be above that least value.
     """

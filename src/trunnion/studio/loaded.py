@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.file import Lines, entries_of, place, version_findings
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.named_file import stated_files
+from trunnion.model.text import stated_files
 from trunnion.solve.run import Run, prepare
 
 if TYPE_CHECKING:

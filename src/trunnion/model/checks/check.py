@@ -7,34 +7,30 @@ whether it can be assembled) is checked where the structure is known.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.errors import Finding, Severity
 from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.joints.motion import MOTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.checks.angles import Bare, plain_dimensions, radians, unitless_angles
-from trunnion.model.checks.contacts import contact_law
-from trunnion.model.checks.costs import cost_names, cost_values
+from trunnion.model.checks.drivers import gears
 from trunnion.model.checks.errors import errors, joint_errors
-from trunnion.model.checks.free_motion import FREE, free_motion
-from trunnion.model.checks.gears import gears
+from trunnion.model.checks.joints import contact_law
 from trunnion.model.checks.loads import losses, motion_dimensions, springs, tables, unknown_name, unread
-from trunnion.model.checks.magnitudes import magnitudes
-from trunnion.model.checks.measures import check_measure, measure_values, point_exists
+from trunnion.model.checks.magnitudes import Bare, magnitudes, plain_dimensions, radians, unitless_angles
+from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.space import contact, coordinates, driven, loop, pitch, resisted, space
-from trunnion.model.checks.tolerances import stated_entries, tolerance_names, tolerance_values
+from trunnion.model.checks.tolerances import cost_names, cost_values, stated_entries, tolerance_names, tolerance_values
 from trunnion.model.checks.values import check_values
 from trunnion.model.contact import motions
-from trunnion.model.dimensions import evaluation_order
 from trunnion.model.expression import MOTION, RESERVED
-from trunnion.model.names import as_key, nearest
-from trunnion.model.parameter_names import ERRORS
+from trunnion.model.names import ERRORS, as_key, nearest
 from trunnion.model.parameters import ParameterSet, dimension_errors
 from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
-from trunnion.model.quantity import UNREADABLE
+from trunnion.model.quantity import UNREADABLE, evaluation_order
+from trunnion.model.rules import InSpace, Refers, stated_findings
 from trunnion.model.units import ANY, Dimension, UnitError
 
 if TYPE_CHECKING:
@@ -52,7 +48,13 @@ def check_model(mechanism: Numbers, lost: Collection[str] = ()) -> list[Finding]
     if "space" not in mechanism.model_fields_set and _looks_spatial(mechanism):
         what = "this is a spatial model: it has a loop, or points with three coordinates"
         return [Finding(what, "space", "state space: spatial")]
-    findings = [*_quantities(mechanism, unreadable), *space(mechanism), *_links(mechanism), *_joints(mechanism)]
+    findings = [
+        *_quantities(mechanism, unreadable),
+        *stated_findings(mechanism),
+        *space(mechanism),
+        *_links(mechanism),
+        *_joints(mechanism),
+    ]
     findings += [] if lost else _absent(mechanism)
     findings += [*loop(mechanism), *gears(mechanism), *_drivers(mechanism), *_loads(mechanism)]
     findings += [*errors(mechanism), *joint_errors(mechanism)]
@@ -102,7 +104,9 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
         if missing := [name for name in names if name not in sayable]:
             unreadable.add(entry.path)
             for name in missing:
-                yield unknown_name(mechanism, name, entry.where, entry.quantity.source, known)
+                finding = unknown_name(mechanism, name, entry.where, entry.quantity.source, known)
+                respelt = entry.quantity.respelt(entry.kind)
+                yield replace(finding, remedy=f"write {respelt}") if respelt else finding
             continue
         if entry.varies and entry.quantity.tolerance:
             what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"
@@ -174,29 +178,10 @@ def _absent(mechanism: Numbers) -> Iterator[Finding]:
 
 
 def _links(mechanism: Numbers) -> Iterator[Finding]:
-    size, fixed = mechanism.coordinates, mechanism.ground
-    if fixed is not None and fixed not in {*mechanism.links, *(row.link for row in mechanism.loop)}:
-        yield Finding(f"there is no link '{fixed}'", "ground", nearest(fixed, mechanism.links))
     for name, link in mechanism.links.items():
         where = f"links.{name}"
         if link.inertia_about == "origin" and not link.model_fields_set & {"inertia"}:
             yield Finding("inertia_about is given without an inertia", where, "give the inertia", Severity.WARNING)
-        for point, place in link.points.items():
-            for key in ("at", "axis", "x"):
-                vector = getattr(place, key)
-                if vector is not None:
-                    yield from _length(len(vector), size, f"{where}.points.{point}" + f".{key}" * (key != "at"))
-        if isinstance(link.centre, tuple):
-            yield from _length(len(link.centre), size, f"{where}.centre")
-    if mechanism.gravity is not None:
-        yield from _length(len(mechanism.gravity), size, "gravity")
-
-
-def _length(found: int, size: int, where: str) -> Iterator[Finding]:
-    if found != size:
-        space = "planar" if size == 2 else "spatial"
-        remedy = f"give {size}; a decimal comma would make two numbers of one"
-        yield Finding(f"has {found} coordinates, a {space} model needs {size}", where, remedy)
 
 
 def _joints(mechanism: Numbers) -> Iterator[Finding]:
@@ -222,11 +207,8 @@ def _joints(mechanism: Numbers) -> Iterator[Finding]:
 def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
     """The links of a joint and its point on each."""
     where = f"joints.{name}"
-    if joint.links[0] == joint.links[1]:
-        yield Finding(f"joins the link '{joint.links[0]}' to itself", where, "name two different links")
     for link in dict.fromkeys(joint.links):
         if link not in mechanism.links:
-            yield Finding(f"there is no link '{link}'", f"{where}.links", nearest(link, mechanism.links))
             continue
         points = mechanism.links[link].points
         axis = "[1, 0]" if mechanism.space == "planar" else "[0, 0, 1]"
@@ -265,46 +247,21 @@ def _drivers(mechanism: Numbers) -> Iterator[Finding]:
         elif "rotation" not in freedoms(joints[name].type) and driver.law == "constant" and driver.range is None:
             yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
         yield from _motion(driver, where)
-        yield from free_motion(driver, where)
 
 
 def _motion(driver: Driver, where: str) -> Iterator[Finding]:
-    """Whether a driver states what its law needs and nothing else."""
+    """Whether a table that a driver follows can be read, and what else it states goes with it."""
     if driver.file is not None and driver.law == "table":
         yield unread(driver.file, where)
-        return
-    law, takes = driver.motion, (*driver.motion.needs, *driver.motion.takes)
-    stray = [key for key in driver.model_fields_set if key not in ("law", *FREE, *takes)]
-    for key in sorted(stray):
-        given = "points" if key == "file" else key
-        others = [name for name, one in MOTION_LAWS.items() if given in (*one.needs, *one.takes)]
-        remedy = (
-            f"remove it, or state law: {' or '.join(others)}; the parameters of {driver.law} are {', '.join(takes)}"
-        )
-        yield Finding(f"'{key}' has no effect on the motion law {driver.law}", f"{where}.{key}", remedy)
-    for key in law.needs:
-        if getattr(driver, key) is None:
-            law_too = "" if "law" in driver.model_fields_set else f", or a law: {', '.join(MOTION_LAWS)}"
-            yield Finding(f"'{key}' is missing", where, f"add {key}: {MOTION_EXAMPLES[key]}{law_too}")
-    if driver.return_duration is not None and not driver.returns:
-        what = "'return_duration' has no effect on a driver that does not return"
-        yield Finding(what, f"{where}.return_duration", "remove it, or returns: false")
+    if driver.found and driver.law != "constant":
+        what = f"the motion law {driver.law} prescribes a coordinate that is free"
+        yield Finding(what, f"{where}.law", "state speed: … (what all but `simulate` prescribe), or no motor")
     if driver.points is not None and driver.periodic and len(driver.points) < 3:
         yield Finding("a periodic table needs at least three points", f"{where}.points", "add points")
     if driver.points is not None and driver.ends == "natural":
         for key in ("periodic", "delay"):
             if key in driver.model_fields_set and getattr(driver, key):
                 yield Finding(f"a table with natural ends has no '{key}'", f"{where}.{key}", f"remove ends or {key}")
-
-
-MOTION_EXAMPLES = {
-    "speed": "60 rpm",
-    "amplitude": "20 deg",
-    "period": "0.5 s",
-    "range": "[0 deg, 90 deg]",
-    "duration": "0.2 s",
-    "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or file: motion.csv, or give a file by --table",
-}
 
 
 def _loads(mechanism: Numbers) -> Iterator[Finding]:
@@ -329,16 +286,12 @@ def _link_load(mechanism: Numbers, load: Load, link: str, where: str) -> Iterato
         yield Finding("only is for a load that resists a joint", f"{where}.only", "remove it, or state joint: …")
     elif load.force is None and load.moment is None:
         yield Finding("this load is empty", where, "state a force or a moment")
-    if load.force is not None:
-        yield from _length(len(load.force), mechanism.coordinates, f"{where}.force")
-        if load.at is None:
-            yield Finding("the force has no point to act at", where, "add at: <a point of the link>")
+    if load.force is not None and load.at is None:
+        yield Finding("the force has no point to act at", where, "add at: <a point of the link>")
     if load.moment is not None and isinstance(load.moment, tuple) != (mechanism.space == "spatial"):
         form = "one number" if mechanism.space == "planar" else "[x, y, z]"
         yield Finding(f"the moment of a {mechanism.space} model is {form}", f"{where}.moment", f"write {form}")
-    if link not in mechanism.points:
-        yield Finding(f"there is no link '{link}'", f"{where}.link", nearest(link, mechanism.points))
-    elif load.at is not None and load.at not in mechanism.points[link]:
+    if link in mechanism.points and load.at is not None and load.at not in mechanism.points[link]:
         points = mechanism.points[link]
         yield Finding(f"the link '{link}' has no point '{load.at}'", f"{where}.at", nearest(load.at, points))
     if link == mechanism.fixed_link:
@@ -358,7 +311,6 @@ def _joint_load(mechanism: Numbers, load: Load, where: str) -> Iterator[Finding]
     elif load.resisting_torque is not None and load.resisting_force is not None:
         yield Finding("resists a rotation and a slide at once", where, "state a load for each")
     if load.joint is None or load.joint not in joints:
-        yield Finding(f"there is no joint '{load.joint}'", f"{where}.joint", nearest(str(load.joint), joints))
         return
     for key, freedom in (("resisting_torque", "rotation"), ("resisting_force", "slide")):
         if getattr(load, key) is not None:
@@ -385,11 +337,11 @@ def _others(mechanism: Numbers) -> Iterator[Finding]:
                 yield Finding(what, where, nearest(name, moving))
             continue
         if point and point not in points.get(link, ()):
-            yield from point_exists(mechanism, name, where)
+            yield from Refers("point").missing(name, where, mechanism)
         elif not point and name not in joints:
-            yield Finding(f"there is no joint '{name}'", where, nearest(name, joints))
+            yield from Refers("any joint").missing(name, where, mechanism)
         if isinstance(hint, tuple):
-            yield from _length(len(hint), mechanism.coordinates, where)
+            yield from InSpace().counted(hint, where, mechanism)
         elif point:
             yield Finding("a point has a position, not an angle", where, f"write {coordinates(mechanism)}")
         elif name in joints and not (motions(joints[name].type) or PAIRS[joints[name].type].crossed):

@@ -13,11 +13,11 @@ from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.contact import PLAY_PAIRS, TURNING_PAIRS, clearance, has_guide, has_pin, has_play, play
-from trunnion.model.dimensions import nominal_dimensions
 from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
 from trunnion.model.merge import stated
-from trunnion.model.parameter_names import ERRORS, ParameterNames
+from trunnion.model.names import ERRORS, ParameterNames
 from trunnion.model.parameters import ParameterSet
+from trunnion.model.quantity import nominal_dimensions
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
@@ -26,7 +26,6 @@ __all__ = ["error_sizes", "errors", "joint_errors", "play_values"]
 
 WILD = 0.1  # of a length: an error above it is more likely a slip of the unit
 LEANING = np.radians(2)  # of a tilt, likewise
-STEEPEST = np.pi / 4  # of a tilt: beyond it is another design, and more likely a slip of the unit
 MEASURABLE = 1e-9  # m: half a millionth of a millimetre of interference is rounding
 
 
@@ -236,19 +235,9 @@ def play_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterato
     """Signs and sizes of a joint's misalignment, seat and play, and what they make doubtful."""
     joint, where, values = mechanism.effective_joints[name], f"joints.{name}", numbers.nominal
     tilt = values.get(f"{where}.misalignment.tilt", 0.0)
-    if np.abs(tilt) > STEEPEST:
-        what = f"is {np.degrees(tilt):.4g} deg, an error can be at most 45 deg"
-        yield Finding(what, f"{where}.misalignment.tilt", "check its unit; turn the axis of the point instead")
-    elif np.abs(tilt) > LEANING:
+    if LEANING < np.abs(tilt) <= np.pi / 4:
         what = f"is {np.degrees(tilt):.4g} deg, more than a misalignment usually is"
         yield Finding(what, f"{where}.misalignment.tilt", "a plain number is in radians", Severity.WARNING)
-    beta = values.get(f"{where}.seat.beta", 0.0)
-    if np.abs(beta) > np.pi * (1 + 1e-12):
-        what = f"is {np.degrees(beta):.4g} deg, the ends of a pin are at most 180 deg apart"
-        yield Finding(what, f"{where}.seat.beta", "give an angle above -180 deg up to 180 deg")
-    stated_direction = isinstance(joint.seat, Seat) and joint.seat.direction is not None
-    if stated_direction and all(values.get(f"{where}.seat.direction.{one}", np.nan) == 0 for one in "xyz"):
-        yield Finding("has no direction: all its components are 0", f"{where}.seat.direction", "write [0, 0, 1]")
     yield from _unmodelled(mechanism, name, values)
     if not has_play(joint):
         return

@@ -9,36 +9,17 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.model.contact import motions
-from trunnion.model.measure_parts import Measure
-from trunnion.model.measure_table import MEASURES
-from trunnion.model.names import nearest
+from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.parameters import ParameterSet
+from trunnion.model.rules import Refers
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["check_measure", "measure_values", "point_exists", "subjects"]
+__all__ = ["check_measure", "measure_values"]
 
 ENDS = ("from", "to")
 PLACES = ("place-of-maximum", "place-of-minimum")
-
-
-def subjects(mechanism: Numbers, of: str | tuple[str, ...]) -> list[str]:
-    """What a measure may be of in a mechanism, by `MeasureKind.of`."""
-    if isinstance(of, tuple):
-        return list(of)
-    loads = [one for one, load in mechanism.loads.items() if load.joint is not None]
-    return {
-        "point": [f"{link}.{point}" for link, points in mechanism.points.items() for point in points],
-        "link": list(mechanism.effective_links),
-        "joint": [name for name, joint in mechanism.effective_joints.items() if motions(joint.type)],
-        "any joint": list(mechanism.effective_joints),
-        "driver": list(mechanism.drivers),
-        "free driver": [name for name, driver in mechanism.drivers.items() if driver.found],
-        "load on a joint": loads,
-        "spring": list(mechanism.springs),
-        "driver or load": list(dict.fromkeys([*mechanism.drivers, *mechanism.loads])),
-    }[of]
 
 
 def check_measure(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
@@ -57,21 +38,15 @@ def _subject(mechanism: Numbers, key: str, name: str, where: str) -> Iterator[Fi
     kind = MEASURES[key]
     if kind.space not in ("", mechanism.space):
         yield Finding(f"there is no {key} in space", f"{where}.{key}", "measure an angle or a rotation")
-    if kind.of == "point":
-        yield from point_exists(mechanism, name, f"{where}.{key}")
-    elif kind.of in ("joint", "any joint"):
-        if name not in mechanism.effective_joints:
-            names = list(mechanism.effective_joints)
-            yield Finding(f"there is no joint '{name}'", f"{where}.{key}", nearest(name, names))
-        elif kind.of == "joint":
+    if not isinstance(kind.of, tuple):
+        subject = "any joint" if kind.of == "joint" else kind.of
+        yield from Refers(subject).missing(name, f"{where}.{key}", mechanism)
+        if kind.of == "joint" and name in mechanism.effective_joints:
             yield from _moves(mechanism, name, key, where)
-    elif name not in (names := subjects(mechanism, kind.of)):
-        yield Finding(f"there is no {kind.of} '{name}'", f"{where}.{key}", nearest(name, names))
 
 
 def _component(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Finding]:
     """Whether an axis or a direction is stated where one is needed, once, and there only."""
-    planar = mechanism.space == "planar"
     words = {MEASURES[key].vector_in(mechanism.space) for key in measure.kinds}
     stated = [key for key in ("axis", "along") if getattr(measure, key) is not None]
     if "must" in words and not stated:
@@ -85,11 +60,8 @@ def _component(mechanism: Numbers, measure: Measure, where: str) -> Iterator[Fin
         yield Finding(what, f"{where}.{stated[0]}", "remove it, or name a point")
     if len(stated) > 1 or ("along" in stated and measure.kind == "angle"):
         yield Finding("has an axis and a direction", f"{where}.along", "keep one of them; an angle needs an axis")
-    if measure.axis == "z" and planar:
+    if measure.axis == "z" and mechanism.space == "planar":
         yield Finding("there is no z in the plane", f"{where}.axis", "write x or y")
-    if measure.along is not None and len(measure.along) != mechanism.coordinates:
-        what = f"a direction in {'the plane' if planar else 'space'} has {mechanism.coordinates} components"
-        yield Finding(what, f"{where}.along", f"write [{', '.join(['1', '0', '0'][: mechanism.coordinates])}]")
 
 
 def _moves(mechanism: Numbers, joint: str, key: str, where: str) -> Iterator[Finding]:
@@ -156,8 +128,6 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
         if lower > upper:
             what = f"the lower limit {lower:g} is above the upper one {upper:g} (SI)"
             yield Finding(what, f"{where}.limit", "write ± before a number that is not negative")
-        if value("duration") <= 0:
-            yield Finding(f"a duration of {value('duration'):g} s", f"{where}.duration", "give a time above 0")
         least, most = value("at_least"), value("at_most")
         if least > most:
             yield Finding(f"at least {least:g} and at most {most:g} (SI)", f"{where}.at_least", "exchange them")
@@ -170,9 +140,6 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
             if value(key) >= up_to:
                 what = f"is {value(key):g}, but this measure is looked for up to {up_to:g} alone"
                 yield Finding(what, f"{where}.{key}", "give a number below that")
-        parts = [number for path, number in numbers.nominal.items() if path.startswith(f"{where}.along.")]
-        if parts and not any(parts):
-            yield Finding("the direction is zero", f"{where}.along", "give it a length, such as [1, 0]")
         start, end = value("over.from"), value("over.to")
         kinds = {one.kind.name for key, one in numbers.entries.items() if key.startswith(f"{where}.over.")}
         if len(kinds) > 1:
@@ -184,10 +151,3 @@ def measure_values(mechanism: Numbers, numbers: ParameterSet) -> Iterator[Findin
             yield Finding(
                 f"the range begins and ends at {start:g}", f"{where}.over", "give it an extent, or state at: …"
             )
-
-
-def point_exists(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
-    """Whether `link.point` exists."""
-    known = [f"{link}.{point}" for link, points in mechanism.points.items() for point in points]
-    if name not in known:
-        yield Finding(f"there is no point '{name}'", where, nearest(name, known) + " (write link.point)")

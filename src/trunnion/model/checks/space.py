@@ -17,7 +17,7 @@ from trunnion.model.parts import Joint, LoopJoint, PolarPoint
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["contact", "coordinates", "direction_values", "driven", "loop", "pitch", "pitch_values", "resisted", "space"]
+__all__ = ["contact", "coordinates", "direction_values", "driven", "loop", "pitch", "resisted", "space"]
 
 Values = Mapping[str, Number]
 # Sine of the angle below which `x` is taken to lie along `axis`: what is left of it across is rounding of the file.
@@ -103,14 +103,6 @@ def pitch(joint: Joint, where: str) -> Iterator[Finding]:
         yield Finding("a helical joint without a pitch", where, remedy)
     elif not PAIRS[joint.type].threaded and joint.pitch is not None:
         yield Finding(f"a {joint.type} joint has no pitch", f"{where}.pitch", "remove it, or state type: helical")
-
-
-def pitch_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
-    """A thread whose pitch is zero."""
-    for name in mechanism.effective_joints:
-        if values.get(f"joints.{name}.pitch", np.nan) == 0:
-            remedy = "give another, or state type: revolute, which is a thread that does not advance"
-            yield Finding("is 0: the thread does not advance", f"joints.{name}.pitch", remedy)
 
 
 def direction_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:

@@ -10,25 +10,23 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.joints.friction import FRICTION_LAWS, LawParameter
-from trunnion.model.checks.contacts import contact_values
+from trunnion.model.checks.drivers import gear_values, motor_values
 from trunnion.model.checks.errors import error_sizes, play_values
-from trunnion.model.checks.free_motion import motor_values
-from trunnion.model.checks.gears import gear_values
+from trunnion.model.checks.joints import contact_values
 from trunnion.model.checks.loads import spring_values, table_values
-from trunnion.model.checks.space import direction_values, pitch_values
-from trunnion.model.parameter_names import ERRORS
+from trunnion.model.checks.space import direction_values
 from trunnion.model.parameters import ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
+from trunnion.model.rules import group_findings, limit_findings
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["NOT_NEGATIVE", "check_values"]
+__all__ = ["check_values"]
 
 Values = Mapping[str, Number]
-# Rounding in a file of four to six digits may violate the triangle inequality of a flat body by this much.
-INERTIA_SLACK = 1e-3
+# of the largest moment, by which a flat body may violate the triangle inequality: of four digits, of three or two
+INERTIA_SLACK, INERTIA_ROUNDING = 1e-3, 1e-2
 
 
 def check_values(
@@ -47,9 +45,13 @@ def check_values(
     def among(section: str, names: Iterable[str]) -> Iterator[str]:
         return (name for name in names if parts is None or (section, name) in parts)
 
+    for section in ("links", "drivers", "tables", "measures"):
+        for name in among(section, getattr(mechanism, section)):
+            yield from group_findings(f"{section}.{name}", getattr(mechanism, section)[name], values)
     for name in among("links", mechanism.links):
         yield from _inertia(mechanism, mechanism.links[name], values, f"links.{name}")
     for name in among("joints", mechanism.effective_joints):
+        yield from group_findings(f"joints.{name}", mechanism.effective_joints[name], values)
         yield from _joint(mechanism, name, numbers)
         yield from play_values(mechanism, name, numbers)
     for name in among("drivers", mechanism.drivers):
@@ -61,10 +63,7 @@ def check_values(
     if sections is None or not sections.isdisjoint(("tables", "drivers")):
         yield from table_values(mechanism, values)
     yield from spring_values(mechanism, values)
-    if sections is None or "joints" in sections:
-        yield from pitch_values(mechanism, values)
     if sections is None or "links" in sections:
-        yield from _directions(mechanism, values)
         yield from direction_values(mechanism, values)
         yield from _sides(mechanism, values)
 
@@ -85,23 +84,15 @@ def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:
         if path not in values:  # an expression of the motion
             continue
         entry = numbers.entries[path]
-        broken = any(np.isnan(values[one]) for one in entry.depends if one in values)
-        if entry.quantity.names and not broken and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
+        undefined = any(np.isnan(values[one]) for one in entry.depends if one in values)
+        if entry.quantity.names and not undefined and not np.isfinite(values[path]) and not numbers.is_unreadable(path):
             yield Finding(
                 f"'{entry.quantity.source}' has no finite value ({values[path]})",
                 entry.where,
                 "check divisions and roots",
             )
-        if path.startswith(ERRORS):
-            continue  # a deviation has a sign
-        if entry.path.rpartition(".")[2] in NOT_NEGATIVE and not entry.alias and values[path] < 0:
-            yield Finding(f"is {values[path]:g}, which is negative", path, "give a value of at least 0")
-
-
-NOT_NEGATIVE = frozenset(
-    {"mass", "radius", "hole_radius", "length", "bearing", "clearance", "cylindricity", "end_float"}
-    | {"resisting_torque", "resisting_force"}
-)
+        if not entry.alias:
+            yield from limit_findings(entry.rules, values[path], entry.kind, path)
 
 
 def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Finding]:
@@ -116,15 +107,10 @@ def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Fin
         return entry.alias or entry.path
 
     yield from contact_values(joint, numbers.nominal, where)
-    for key in ("constant", "viscous"):
-        if value(f"losses.{key}") < 0:
-            what = f"is {value(f'losses.{key}'):g}, which is negative"
-            yield Finding(what, f"{where}.losses.{key}", "give a value of at least 0")
     if joint.friction and joint.friction.law:
-        for parameter, declared in FRICTION_LAWS[joint.friction.law].parameters.items():
-            if parameter in joint.friction.parameters:
-                key = f"friction.{parameter}"
-                yield from _law_value(declared, parameter, value(key), stated(key))
+        if (number := value("friction.coefficient")) > 1:
+            what, remedy = f"is {number:g}, above 1", "check it: dry metals have 0.1 to 0.6"
+            yield Finding(what, stated("friction.coefficient"), remedy, Severity.WARNING)
         across = ("pin.bearing", "guide.width") if mechanism.space == "spatial" else ()
         for size in ("pin.radius", "guide.length", *across):
             if value(size) == 0:
@@ -136,36 +122,11 @@ def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Fin
             yield Finding(what, stated(f"{part}.clearance"), "check its unit")
 
 
-def _law_value(declared: LawParameter, parameter: str, number: Number, where: str) -> Iterator[Finding]:
-    if number < declared.minimum:
-        yield Finding(
-            f"is {number:g}, the least is {declared.minimum:g}", where, "give a value in the range of the law"
-        )
-    elif number > declared.maximum:
-        yield Finding(f"is {number:g}, the most is {declared.maximum:g}", where, "give a value in the range of the law")
-    elif parameter == "pair_factor" and number == 0:
-        yield Finding("is 0, which removes the friction", where, "give a factor above 0, or friction: 0")
-    elif parameter == "coefficient" and number > 1:
-        yield Finding(f"is {number:g}, above 1", where, "check it: dry metals have 0.1 to 0.6", Severity.WARNING)
-
-
 def _driver(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
     where, driver = f"drivers.{name}", mechanism.drivers[name]
-    for key in ("period", "duration", "return_duration"):
-        if values.get(f"{where}.{key}", np.nan) <= 0:
-            number = values[f"{where}.{key}"]
-            yield Finding(f"is {number:g} s, which is not above 0", f"{where}.{key}", "give a time above 0")
-    for key in ("dwell", "delay"):
-        if values.get(f"{where}.{key}", np.nan) < 0:
-            number = values[f"{where}.{key}"]
-            yield Finding(f"is {number:g} s, which is negative", f"{where}.{key}", "give a time of at least 0")
-    if values.get(f"{where}.amplitude") == 0:
-        yield Finding("the amplitude is 0: it never moves", f"{where}.amplitude", "give it an extent")
     if driver.points is not None:
         yield from _table(mechanism, name, values)
-    if values.get(f"{where}.speed") == 0:
-        yield Finding("the speed is 0", f"{where}.speed", "give a speed, however small, with its sign")
-    yield from motor_values(driver, values, where)
+    yield from motor_values(values, where)
     start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
     if start == end:
         yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")
@@ -179,10 +140,6 @@ def _table(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
     if times[0] != 0 and not np.isnan(times[0]):
         what = f"the table begins at {times[0]:g} s"
         yield Finding(what, f"{where}.0", "begin it at 0 s and shift it by delay: …")
-    for k in rows[1:]:
-        if times[k] <= times[k - 1]:
-            what = f"its time {times[k]:g} s does not come after {times[k - 1]:g} s of the point before"
-            yield Finding(what, f"{where}.{k}", "sort the points by time")
     if all(coordinate == coordinates[0] for coordinate in coordinates):
         yield Finding("the table never moves", where, "give it an extent")
     joint = mechanism.effective_joints.get(name)
@@ -192,18 +149,6 @@ def _table(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
         if "rotation" not in freedoms(joint.type) or abs(turns - np.round(turns)) > 1e-9:
             what = f"a periodic table that begins at {coordinates[0]:g} and ends at {coordinates[-1]:g} (SI)"
             yield Finding(what, where, "end it where it begins, or whole turns from there, or state periodic: false")
-
-
-def _directions(mechanism: Numbers, values: Values) -> Iterator[Finding]:
-    example = "[1, 0]" if mechanism.space == "planar" else "[1, 0, 0]"
-    for name, link in mechanism.links.items():
-        for point, place in link.points.items():
-            for key in ("axis", "x"):
-                path = f"links.{name}.points.{point}.{key}"
-                if getattr(place, key) is not None and all(
-                    values[f"{path}.{one}"] == 0 for one in _letters(values, path)
-                ):
-                    yield Finding("has no direction: all its components are 0", path, f"write {example} for along x")
 
 
 def _letters(values: Values, path: str) -> list[str]:
@@ -260,12 +205,13 @@ def _inertia(mechanism: Numbers, link: Link, values: Values, where: str) -> Iter
         tensor = tensor - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     if not np.isfinite(tensor).all():
         return
-    principal = np.linalg.eigvalsh(tensor)
-    slack = INERTIA_SLACK * float(np.abs(tensor).max())
-    if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
+    principal, size = np.linalg.eigvalsh(tensor), float(np.abs(tensor).max())
+    excess = principal[2] - principal[0] - principal[1]
+    if principal[0] < -INERTIA_SLACK * size or excess > INERTIA_SLACK * size:
+        rounded = principal[0] >= -INERTIA_SLACK * size and excess <= INERTIA_ROUNDING * size
         shown = ", ".join(f"{one:.4g}" for one in principal)
-        yield Finding(
-            f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others",
-            path,
-            "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)",
-        )
+        what = f"no body has the principal moments {shown} kg m² about its centre: one exceeds the sum of the others"
+        remedy = "check inertia_about and the signs of xy, xz, yz (xy = −∫ x y dm)"
+        if rounded:
+            what, remedy = f"{what} by {100 * excess / size:.2g} %", "state more digits, if it is of rounding"
+        yield Finding(what, path, remedy, Severity.WARNING if rounded else Severity.ERROR)

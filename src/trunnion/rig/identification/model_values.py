@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from trunnion.model.expression import LITERAL, normalise
+from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import UnitError, unit
+from trunnion.model.units import UnitError, normalise, unit
 from trunnion.results.attributes import attribute
 from trunnion.rig.identification.number_text import decimals
 

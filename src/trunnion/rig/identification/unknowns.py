@@ -9,19 +9,15 @@ from math import inf
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.joints.friction import FRICTION_LAWS
-from trunnion.model.checks.values import NOT_NEGATIVE
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.parameters import Entry, measured
+from trunnion.model.rules import Within
 
 __all__ = ["Parameters", "Unknown", "described", "limits", "unknowns"]
 
 Parameters = Mapping[str, Sequence[str] | str] | Sequence[str]
-ABOVE_ZERO = frozenset({"pair_factor", "period", "duration", "return_duration"})
 SMALL = 1e-6  # of 1 in SI: the least of numbers that must be above 0
 PLAIN = {"SI": "1"}  # of a dimension without a unit, whose kind its value does not tell
-OF_SPRINGS = ("stiffness", "damping", "free_length")
 
 
 @dataclass(frozen=True)
@@ -140,22 +136,9 @@ def _equals(entry: Entry, paths: set[str]) -> bool:
 
 def _limits(mechanism: Mechanism, path: str) -> tuple[float, float]:
     """Those of a number by itself."""
-    section, _, rest = path.partition(".")
-    leaf = path.rpartition(".")[2]
-    if ".friction." in path:
-        owner, _, _ = path.removeprefix("joints.").rpartition(".friction.")
-        joint = mechanism.effective_joints.get(owner)
-        friction = joint.friction if joint else mechanism.joint_defaults.friction
-        law = FRICTION_LAWS[(friction.law if friction else None) or DEFAULT_LAW]
-        if leaf in law.parameters:
-            stated = law.parameters[leaf]
-            return (max(stated.minimum, SMALL) if leaf in ABOVE_ZERO else stated.minimum), stated.maximum
-    if section == "errors" or section == "dimensions":
-        return -inf, inf
-    if leaf in ABOVE_ZERO and section == "drivers":
-        return SMALL, inf
-    if leaf in NOT_NEGATIVE or (section == "springs" and leaf in OF_SPRINGS):
-        return 0.0, inf
-    if section == "links" and rest.endswith(".inertia"):
-        return 0.0, inf
-    return -inf, inf
+    entry = mechanism.parameter_set.entries[path]
+    limits = [one for one in entry.rules if isinstance(one, Within)]
+    low = max((SMALL if one.ends[0] == "(" and one.low == 0 else one.low for one in limits), default=-inf)
+    high = min((one.high for one in limits), default=inf)
+    moment = path.startswith("links.") and path.endswith(".inertia")
+    return max(low, 0.0 if moment else -inf), high

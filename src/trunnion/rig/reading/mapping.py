@@ -308,7 +308,7 @@ def _check_spans(spans: Any) -> None:
     """Stretches of time that begin before they end."""
     for begin, end in spans:
         for one in (begin, end):
-            if not one.plain and not alike(one.dimensions, {"second": 1}):  # type: ignore[dict-item]
+            if not one.plain and not alike(one.dimensions, {"s": 1}):  # type: ignore[dict-item]
                 raise problem(f"'{one.source}' is no time", "write [0 s, 0.5 s]")
         if not begin.value < end.value:
             raise problem(f"[{begin.source}, {end.source}] ends before it begins", "write [0 s, 0.5 s]")

@@ -16,9 +16,10 @@ from pydantic import Field, Tag, ValidationError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.entry import Name, Part, forms
-from trunnion.model.expression import LITERAL, normalise
+from trunnion.model.expression import LITERAL
 from trunnion.model.file import place, read_entries
 from trunnion.model.findings import schema_findings
+from trunnion.model.units import normalise
 from trunnion.rig.reading.mapping import FixedAngle, FixedNumber, FixedTime
 from trunnion.rig.reading.sensor_quantity import Amount, Frequency, Number
 

@@ -113,7 +113,7 @@ def scale(measures: str, unit: str, gain: Amount | None, column: str = "") -> Se
     for power, found in ways.items():
         known = QUANTITIES.get(kind, ())
         name = next((one for one in known if alike(found, dimensions(one)[1])), "")
-        if not kind and not {"ampere", "kelvin"} & {key for key, value in found.items() if value}:
+        if not kind and not {"A", "K"} & {key for key, value in found.items() if value}:
             name = unit_name({key: value for key, value in found.items() if value})
         if name:
             factor = raw * gain.value**power
@@ -122,7 +122,7 @@ def scale(measures: str, unit: str, gain: Amount | None, column: str = "") -> Se
         what = f"readings in '{unit}' do not give {measures}, for they may count turns or radians"
         raise UnitError(what, "write the unit as rpm or rad/s")
     needed = " or ".join(QUANTITIES.get(kind, ("a quantity of mechanics",)))
-    if gain.plain and kind and column and any(of_reading.values()) and not {"ampere", "kelvin"} & of_reading.keys():
+    if gain.plain and kind and column and any(of_reading.values()) and not {"A", "K"} & of_reading.keys():
         what = f"the column '{column}' is in {unit}; {measures} is in {needed}"
         raise UnitError(what, f"{OTHER_COLUMN}, or correct its unit")
     told = "" if gain.plain else f" with the gain '{gain.source}'"

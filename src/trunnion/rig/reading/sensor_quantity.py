@@ -17,10 +17,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
 from trunnion.model.entry import problem
-from trunnion.model.expression import normalise
 from trunnion.model.names import nearest
-from trunnion.model.unit_spellings import pound_feet
-from trunnion.model.units import UnitError, root, si_unit, unit
+from trunnion.model.units import BASES, UnitError, normalise, pound_feet, root, si_unit, unit
 from trunnion.rig.reading.clock import is_time
 
 __all__ = [
@@ -38,7 +36,7 @@ __all__ = [
 
 Dimensions = Mapping[str, Fraction]
 
-HERTZ: Dimensions = {"second": Fraction(-1)}
+HERTZ: Dimensions = {"s": Fraction(-1)}
 _AMOUNT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _RATIO = re.compile(r"([^/()]+?)\s*/\s*\(\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*([^/()0-9][^()]*)\)", re.DOTALL)
 _USUAL = (
@@ -61,10 +59,9 @@ _USUAL = (
     "mm",
     "%",
 )
-_SYMBOLS = {"meter": "m", "gram": "kg", "second": "s", "radian": "rad", "ampere": "A", "kelvin": "K"}
-_MECHANICS = ("meter", "gram", "second", "radian")
-_COUNTED = {"radian", "meter"}  # Hz over a speed, 60 Hz/(rev/s), are pulses over an angle or length
-_VOLT: Dimensions = {"gram": Fraction(1), "meter": Fraction(2), "second": Fraction(-3), "ampere": Fraction(-1)}
+_MECHANICS = BASES[:4]
+_COUNTED = {"rad", "m"}  # Hz over a speed, 60 Hz/(rev/s), are pulses over an angle or length
+_VOLT: Dimensions = {"kg": Fraction(1), "m": Fraction(2), "s": Fraction(-3), "A": Fraction(-1)}
 
 
 @dataclass(frozen=True)
@@ -91,10 +88,10 @@ def dimensions(text: str) -> tuple[float, Dimensions]:
         near = nearest(text, _USUAL)
         near = near if near.startswith("did you mean") else "write a unit such as mV, N m, rpm or deg"
         raise UnitError(error.what, error.remedy or near) from None
-    if set(exponents) - set(_SYMBOLS):
+    if "count" in exponents:
         raise UnitError(f"the unit '{text}' is not one of a sensor", "use units of mechanics, volts, ampere or kelvin")
-    pulses = any(name.endswith("hertz") for name in names) and exponents and exponents.keys() <= _COUNTED
-    if not {"ampere", "kelvin"} & exponents.keys() and exponents != HERTZ and not pulses:
+    pulses = "Hz" in names and exponents and exponents.keys() <= _COUNTED
+    if not {"A", "K"} & exponents.keys() and exponents != HERTZ and not pulses:
         unit(written)
     return float(factor), exponents
 
@@ -127,7 +124,7 @@ def alike(one: Dimensions, other: Dimensions) -> bool:
     first, second = ({key: power for key, power in each.items() if power} for each in (one, other))
     if first == second:
         return True
-    bare = [{key: power for key, power in each.items() if key != "radian"} for each in (first, second)]
+    bare = [{key: power for key, power in each.items() if key != "rad"} for each in (first, second)]
     return bare[0] == bare[1] and bool(bare[0]) and bare[0] != dict(HERTZ)
 
 
@@ -138,9 +135,7 @@ def unit_name(exponents: Dimensions) -> str:
     if not set(exponents) - set(_MECHANICS):
         length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in _MECHANICS)
         return si_unit((length, mass, time, angle))
-    parts = [
-        _SYMBOLS.get(name, name) + ("" if power == 1 else f"^{power}") for name, power in exponents.items() if power
-    ]
+    parts = [name + ("" if power == 1 else f"^{power}") for name, power in exponents.items() if power]
     return " ".join(parts) or "1"
 
 

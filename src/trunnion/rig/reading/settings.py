@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, agreeing, counted
 from trunnion.model.quantity import Quantity
-from trunnion.model.units import Dimension, UnitError
+from trunnion.model.units import BASES, Dimension, UnitError
 from trunnion.rig.reading.columns import DataTable
 from trunnion.rig.reading.log import Account
 from trunnion.rig.reading.mapping import DataMapping, File, FromData
@@ -117,7 +117,7 @@ def _factor(path: str, unit: str, known_as: dict[str, Dimension], account: Accou
 
 def dimension_of(exponents: Dimensions, unit: str) -> Dimension:
     """Exponents of a unit as a dimension of the model; UnitError for volts, degrees of temperature and the like."""
-    order = ("meter", "gram", "second", "radian")
+    order = BASES[:4]
     if any(power for name, power in exponents.items() if name not in order):
         raise UnitError(f"the unit '{unit}' is none that a number of a model has", "write one such as deg, mm or N m")
     length, mass, time, angle = (Fraction(exponents.get(name, 0)) for name in order)

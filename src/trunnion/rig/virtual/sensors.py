@@ -122,7 +122,7 @@ def resolved(name: str, sensor: Sensor, column: str, unit: str) -> SensorChannel
             return absent
         if amount.plain:
             return amount.value
-        own = _times(amount.dimensions, {"second": Fraction(bool(over))})
+        own = _times(amount.dimensions, {"s": Fraction(bool(over))})
         if alike(own, dimensions(unit)[1]):
             return amount.value
         factor, of_reading = dimensions(reading)

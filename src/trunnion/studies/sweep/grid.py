@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.model.expression import LITERAL, normalise
+from trunnion.model.expression import LITERAL
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.units import Dimension, si_unit, unit
+from trunnion.model.units import Dimension, normalise, si_unit, unit
 from trunnion.studies.sweep.figures import FIGURES
 
 __all__ = ["MOST_NAMES", "MOST_POINTS", "Over", "Swept", "at", "grid", "named", "say"]

@@ -1,4 +1,4 @@
-"""Checks of gear pairs."""
+"""Checks of drivers: their motion laws, tables and motors; of gear pairs."""
 
 from __future__ import annotations
 
@@ -9,13 +9,37 @@ import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding
-from trunnion.model.names import nearest
 from trunnion.model.parts import freedoms
 
 if TYPE_CHECKING:
     from trunnion.model.numbers import Numbers
 
-__all__ = ["gear_values", "gears"]
+__all__ = [
+    "gear_values",
+    "gears",
+    "motor_values",
+]
+
+
+def motor_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:
+    """Whether the numbers of a motor can be those of one."""
+    where = f"{where}.motor"
+    for effort, speed in (("stall_effort", "no_load_speed"), ("breakdown_effort", "synchronous_speed")):
+        if values.get(f"{where}.{effort}", np.nan) * values.get(f"{where}.{speed}", np.nan) < 0:
+            what = f"the motor drives away from its {speed}: their signs differ"
+            yield Finding(what, f"{where}.{effort}", f"give {effort} and {speed} the same sign")
+    yield from _clutch_values(values, where)
+
+
+def _clutch_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:
+    """Whether a clutch has a rotor to hold, and engages before it opens."""
+    if f"{where}.clutch" in values and values.get(f"{where}.inertia") == 0.0:
+        what = "is 0, and a clutch needs a rotor that turns by itself while it slips"
+        yield Finding(what, f"{where}.inertia", "give a number above 0")
+    begin, end = values.get(f"{where}.clutch_from", 0.0), values.get(f"{where}.clutch_until", np.inf)
+    if end <= begin:
+        what = f"the clutch opens at {end:g} s, not after it engages at {begin:g} s"
+        yield Finding(what, f"{where}.clutch_until", "give a time after clutch_from")
 
 
 def gears(mechanism: Numbers) -> Iterator[Finding]:
@@ -28,15 +52,10 @@ def gears(mechanism: Numbers) -> Iterator[Finding]:
             continue
         if name in joints:
             yield Finding("a joint has this name too", where, "rename the gear pair")
-        missing = [joint for joint in gear.joints if joint not in joints]
-        for joint in missing:
-            yield Finding(f"there is no joint '{joint}'", f"{where}.joints", nearest(joint, joints))
         for joint in gear.joints:
             if joint in joints and "rotation" not in freedoms(joints[joint].type):
                 yield Finding(f"the joint '{joint}' does not turn", f"{where}.joints", "name a revolute joint")
-        if gear.joints[0] == gear.joints[1]:
-            yield Finding(f"couples the joint '{gear.joints[0]}' with itself", f"{where}.joints", "name two joints")
-        elif not missing:
+        if gear.joints[0] != gear.joints[1] and all(joint in joints for joint in gear.joints):
             yield from _teeth(mechanism, name, where)
 
 
@@ -49,17 +68,13 @@ def _teeth(mechanism: Numbers, name: str, where: str) -> Iterator[Finding]:
     elif gear.teeth and not shared:
         what = f"'{gear.joints[0]}' and '{gear.joints[1]}' have no link in common that carries both gears"
         yield Finding(what, where, "state teeth: false for a train, belt or chain that passes torques alone")
-    elif not gear.teeth and gear.pressure_angle is not None:
-        yield Finding("has no effect without teeth", f"{where}.pressure_angle", "remove it, or teeth: false")
 
 
 def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Finding]:
-    """Ratios and pressure angles that no gear has."""
+    """Gears without a pitch point, or on one centre."""
     for name, gear in mechanism.gears.items():
         where = f"gears.{name}"
         ratio = values.get(f"{where}.ratio", np.nan)
-        if ratio == 0:
-            yield Finding("is 0: the second joint would not turn at all", f"{where}.ratio", "give another ratio")
         known = len({*gear.joints} & mechanism.effective_joints.keys()) == len(gear.joints)
         carriers = mechanism.carriers(name) if known else None
         if gear.teeth and carriers and abs((1 if carriers[0] == carriers[1] else -1) * ratio - 1) < 1e-9:
@@ -68,10 +83,6 @@ def gear_values(mechanism: Numbers, values: Mapping[str, Number]) -> Iterator[Fi
         if gear.teeth and carriers and not _apart(mechanism, name, carriers, values):
             what = "both joints are at the same point of the link that carries them: the centre distance is zero"
             yield Finding(what, where, "move one, or state teeth: false for gears inside each other or a belt")
-        angle = values.get(f"{where}.pressure_angle", 0.0)
-        if angle < 0 or angle >= np.pi / 2:
-            what = f"is {np.degrees(angle):.4g}°"
-            yield Finding(what, f"{where}.pressure_angle", "give an angle from 0 to below 90°; 20 deg is usual")
 
 
 def _apart(mechanism: Numbers, name: str, carriers: tuple[int, int], values: Mapping[str, Number]) -> bool:

@@ -1,0 +1,90 @@
+"""Changes of the plain data of a model: a value at its place, another friction law; what it may state and does not."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+from trunnion.joints.friction import FRICTION_LAWS
+from trunnion.model.parameters import Location
+from trunnion.model.quantity import Quantity
+
+__all__ = [
+    "assign",
+    "not_stated",
+    "with_law",
+]
+
+
+def assign(
+    data: dict[str, Any], location: Location, value: float | str | Quantity | list[str], coordinates: int
+) -> None:
+    """Put a value at its place in plain data, making the groups on the way and writing short forms out."""
+    holder: Any = data
+    for key, following in pairwise(location):
+        if isinstance(holder, dict) and holder.get(key) is None:
+            holder[key] = [0] * coordinates if isinstance(following, int) else {}
+        if following == "at" and isinstance(holder[key], list):
+            holder[key] = {"at": holder[key]}
+        elif isinstance(following, str) and not isinstance(holder[key], dict):
+            short = {"limits": holder[key]} if location[0] == "tolerances" else {"coefficient": holder[key]}
+            holder[key] = {} if key == "seat" else short  # the short form, of tolerances and of friction
+        holder = holder[key]
+    holder[location[-1]] = value
+
+
+def with_law(data: dict[str, Any], law: str, complete: bool = False) -> dict[str, Any]:
+    """The data, which are changed, with a friction law wherever there is friction, or for "off" without friction.
+
+    Parameters that the laws share are kept. complete: with a 1, in SI, for each parameter that the law needs and that
+    is not stated.
+    """
+    declared = {} if law == "off" else FRICTION_LAWS[law].parameters
+    needed = {key: 1.0 for key, one in declared.items() if complete and one.default is None}
+    shared = _kept(data.get("joint_defaults", {}).get("friction"), declared)
+    holders = [data.get("joint_defaults", {}), *data.get("joints", {}).values(), *data.get("loop", [])]
+    for holder in (one for one in holders if "friction" in one):
+        own = _kept(holder.pop("friction"), declared)
+        if law != "off":
+            missing = {key: one for key, one in needed.items() if key not in shared}
+            holder["friction"] = {"law": law, **missing, **own}
+    return data
+
+
+def _kept(friction: Any, declared: Collection[str]) -> dict[str, Any]:
+    """What a statement of friction, short or long, keeps where the parameters of the law are others."""
+    if friction is None:
+        return {}
+    stated = friction if isinstance(friction, Mapping) else {"coefficient": friction}
+    return {key: value for key, value in stated.items() if key in ("model", *declared)}
+
+
+def not_stated(model: BaseModel, name: str) -> str:
+    """The path of what an entry of a model could state, by a name such as `A.initial.speed`; or ""."""
+    keys = name.split(".")
+    for section in type(model).model_fields:
+        entries = getattr(model, section)
+        owner, *below = keys[1:] if keys[0] == section else keys
+        part = entries.get(owner) if isinstance(entries, dict) and below else None
+        if isinstance(part, BaseModel) and _has(type(part), below):
+            return ".".join([section, owner, *below])
+    return ""
+
+
+def _has(kind: type[BaseModel], keys: Sequence[str]) -> bool:
+    """Whether entries of a kind have such a key, and those below it too."""
+    fields = {field.alias or name: field for name, field in kind.model_fields.items()}
+    if keys[0] not in fields:
+        return False
+    return len(keys) == 1 or any(_has(part, keys[1:]) for part in _parts(fields[keys[0]].annotation))
+
+
+def _parts(annotation: object) -> Iterator[type[BaseModel]]:
+    """The kinds of entries that a field may be."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for one in get_args(annotation):
+        yield from _parts(one)

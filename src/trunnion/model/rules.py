@@ -1,0 +1,313 @@
+"""What a field of the model must be, stated with the field; one walker makes findings of what is not so.
+
+A marker stands in the `Annotated` type of a field. Checks, the JSON Schema and the limits of an identification read it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Annotated, Any, Protocol, Union, get_args, get_origin
+
+from pydantic import BaseModel, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding
+from trunnion.model.names import nearest
+from trunnion.model.units import KINDS, Kind
+
+__all__ = [
+    "Directed",
+    "NotNegative",
+    "NotZero",
+    "Positive",
+    "Rising",
+    "Within",
+    "group_findings",
+    "limit_findings",
+    "markers",
+]
+
+ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than it
+Values = Mapping[str, Number]
+
+
+# ---- of one number --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Within:
+    """A number between two limits, SI. A limit with a round bracket in `ends` is itself outside.
+
+    remedy: what to do about a number outside, where the limits alone do not say it.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    ends: str = "[]"
+    remedy: str = ""
+
+    def what(self, value: float, kind: Kind) -> str:
+        """What is wrong with a number; empty if nothing is, nan among it."""
+        slack = [ROUNDING * abs(end) if math.isfinite(end) else 0.0 for end in (self.low, self.high)]
+        below = value <= self.low if self.ends[0] == "(" else value < self.low - slack[0]
+        above = value >= self.high if self.ends[1] == ")" else value > self.high + slack[1]
+        if not (below or above):
+            return ""
+        negative = self.low == 0 and self.ends[0] == "[" and below
+        return f"is {_shown(value, kind)}, which is {'negative' if negative else f'not {self.limits(kind)}'}"
+
+    def limits(self, kind: Kind) -> str:
+        """The limits in words: `at least 0`, `above 0 and at most 1`."""
+        low = f"{'above' if self.ends[0] == '(' else 'at least'} {_shown(self.low, kind) if self.low else 0}"
+        high = f"{'below' if self.ends[1] == ')' else 'at most'} {_shown(self.high, kind)}"
+        return " and ".join(text for text, end in ((low, self.low), (high, self.high)) if math.isfinite(end))
+
+    def instead(self, kind: Kind) -> str:
+        """What to do about a number outside."""
+        of = "" if self.ends[0] == "(" else "of "
+        return f"give a value {of}{self.limits(kind)}" + f"; {self.remedy}" * bool(self.remedy)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The limits of a plain number, beside its form."""
+        found = handler(schema)
+        for end, key, bracket in ((self.low, "inimum", self.ends[0]), (self.high, "aximum", self.ends[1])):
+            if math.isfinite(end):
+                found[f"exclusiveM{key}" if bracket in "()" else f"m{key}"] = end
+        return found
+
+
+@dataclass(frozen=True)
+class NotZero:
+    """A number other than 0, which would mean something."""
+
+    meaning: str
+    remedy: str = "give another value"
+
+    def what(self, value: float, kind: Kind) -> str:
+        """What is wrong with a number; empty if nothing is."""
+        return f"is 0: {self.meaning}" if value == 0 else ""
+
+    def instead(self, kind: Kind) -> str:
+        """What to do about a 0."""
+        return self.remedy
+
+
+NotNegative = Within(0.0)
+Positive = Within(0.0, ends="(]")
+
+
+def _shown(value: float, kind: Kind) -> str:
+    """A number with its unit, an angle in degrees."""
+    if kind is KINDS["angle"]:
+        return f"{math.degrees(value):.4g} deg"
+    known = len(kind.dimensions) == 1 and kind.unit != "1"
+    return f"{value:g} {kind.unit}" if known else f"{value:g}"
+
+
+def limit_findings(rules: tuple[Any, ...], value: float, kind: Kind, where: str) -> Iterator[Finding]:
+    """Findings about a number that its rules exclude."""
+    for rule in rules:
+        if isinstance(rule, Within | NotZero) and (what := rule.what(value, kind)):
+            yield Finding(what, where, rule.instead(kind))
+
+
+# ---- of several numbers ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Directed:
+    """Components of a direction, of which one is other than 0."""
+
+    def check(self, path: str, values: Values) -> Iterator[Finding]:
+        """A finding where all are 0. path: of the field."""
+        components = [values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in values]
+        if components and all(one == 0 for one in components):
+            example = ", ".join(("1", "0", "0")[: len(components)])
+            yield Finding("has no direction: all its components are 0", path, f"write [{example}] for along x")
+
+
+@dataclass(frozen=True)
+class Rising:
+    """Points in the order of their first column, which has this name in paths."""
+
+    column: str
+
+    def check(self, path: str, values: Values) -> Iterator[Finding]:
+        """Findings about points that do not come after the one before. path: of the field."""
+        k, before = 0, -math.inf
+        while (here := values.get(f"{path}.{k}.{self.column}")) is not None:
+            if here <= before:
+                what = f"its {self.column} {here:g} does not come after {before:g} of the point before (SI)"
+                yield Finding(what, f"{path}.{k}", f"sort the points by {self.column}; make a jump steep, not upright")
+            k, before = k + 1, here
+
+
+def group_findings(path: str, part: BaseModel, values: Values) -> Iterator[Finding]:
+    """Findings about fields of several numbers, of a part and of what is in it."""
+    for where, below in parts(path, part):
+        for key, rules in markers(type(below)).items():
+            for rule in rules:
+                if isinstance(rule, Directed | Rising) and getattr(below, key) is not None:
+                    yield from rule.check(f"{where}.{key}", values)
+
+
+# ---- of names and keys ----------------------------------------------------------------------------------------
+
+
+class Model(Protocol):
+    """What these rules ask of a model."""
+
+    @property
+    def coordinates(self) -> int:
+        """How many a point has."""
+        ...
+
+    def named(self, noun: str) -> Collection[str]:
+        """The names of its links, joints, points …"""
+        ...
+
+
+@dataclass(frozen=True)
+class Refers:
+    """The name of another part, or several: of a link, joint, point, process …; distinct: no two alike."""
+
+    noun: str
+    distinct: bool = False
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """Findings about names that mean nothing. where: the part stands."""
+        value = getattr(part, key)
+        names, at = (value,) if isinstance(value, str) else value, f"{where}.{key}".lstrip(".")
+        for name in dict.fromkeys(names):
+            yield from self.missing(name, at, model)
+            if self.distinct and names.count(name) > 1:
+                yield Finding(
+                    f"names the {self.noun.removeprefix('any ')} '{name}' twice", at, "name two different ones"
+                )
+
+    def missing(self, name: str, where: str, model: Model) -> Iterator[Finding]:
+        """A finding if there is no part of this name."""
+        if name not in (names := model.named(self.noun)):
+            form = " (write link.point)" if self.noun == "point" else ""
+            what = f"there is no {self.noun.removeprefix('any ')} '{name}'"
+            yield Finding(what, where, nearest(name, names) + form)
+
+
+@dataclass(frozen=True)
+class InSpace:
+    """As many coordinates as a point of the model has."""
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """A finding about another number of coordinates; the position of a point is the point itself."""
+        yield from self.counted(getattr(part, key), where if key == "at" else f"{where}.{key}".lstrip("."), model)
+
+    def counted(self, value: object, where: str, model: Model) -> Iterator[Finding]:
+        """A finding about a list that has another number of coordinates."""
+        size = model.coordinates
+        if isinstance(value, tuple) and len(value) != size:
+            what = f"has {len(value)} coordinates, a {'planar' if size == 2 else 'spatial'} model needs {size}"
+            yield Finding(what, where, f"give {size}; a decimal comma would make two numbers of one")
+
+
+@dataclass(frozen=True)
+class OnlyWith:
+    """A key that has an effect only beside another. remedy: how to state that; words: what it is."""
+
+    key: str
+    remedy: str
+    words: str = ""
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """A finding if the other is not stated."""
+        if key in part.model_fields_set and not getattr(part, self.key):
+            yield Finding(f"has no effect without {self.words or self.key}", f"{where}.{key}", self.remedy)
+
+
+@dataclass(frozen=True, eq=False)
+class Selects:
+    """A word that says which other keys of its part are needed, and which have an effect.
+
+    table: by word, with `needs` and `takes`; also: keys beside any word; examples: of what is needed, by key; instead:
+    the key that may stand for one that is needed.
+    """
+
+    noun: str
+    table: Mapping[str, Any]
+    examples: Mapping[str, str]
+    also: tuple[str, ...] = ()
+    instead: Mapping[str, str] = field(default_factory=dict)
+
+    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+        """Findings about keys that are missing and keys without effect."""
+        word = getattr(part, key)
+        takes = {name: (*one.needs, *one.takes) for name, one in self.table.items()}
+        keys = {self.instead.get(one, one) for one in part.model_fields_set - {key, *self.also}}
+        yield from stray(keys, takes, key, word, self.noun, where)
+        for need in self.table[word].needs:
+            if getattr(part, need) is None and need not in keys:
+                example = f"add {need}: {self.examples[need]}"
+                yield Finding(f"'{need}' is missing", where, f"{example}, or state {key}: {' or '.join(self.table)}")
+
+
+def stray(
+    keys: Iterable[str], takes: Mapping[str, Collection[str]], key: str, word: str, noun: str, where: str
+) -> Iterator[Finding]:
+    """Findings about keys that have no effect beside a word; takes: keys by word."""
+    for one in sorted({*keys} - {*takes[word]}):
+        others = [name for name, taken in takes.items() if one in taken]
+        other = f", or state {key}: {' or '.join(others)}" if others else ""
+        own = ", ".join(takes[word]) or "nothing but limits"
+        remedy = f"remove it{other}; the parameters of {word} are {own}"
+        yield Finding(f"'{one}' has no effect on the {noun} {word}", f"{where}.{one}", remedy)
+
+
+def stated_findings(model: Any) -> Iterator[Finding]:
+    """Findings about names and keys, of every part of a model: its joints with their defaults."""
+    sections = {key: getattr(model, key) for key in type(model).model_fields if key not in ("joints", "loop")}
+    every: list[tuple[str, BaseModel]] = [("", model), *parts("", {**sections, "joints": model.effective_joints})]
+    for where, part in every:
+        for key, rules in markers(type(part)).items():
+            for rule in rules:
+                if isinstance(rule, Refers | InSpace | OnlyWith | Selects) and getattr(part, key) is not None:
+                    yield from rule.stated(key, part, where, model)
+
+
+# ---- where rules stand ----------------------------------------------------------------------------------------
+
+
+@cache
+def markers(kind: type[BaseModel]) -> Mapping[str, tuple[Any, ...]]:
+    """The rules of the fields of a part, by key."""
+    fields = {key: (*field.metadata, *_marked(field.annotation)) for key, field in kind.model_fields.items()}
+    return {key: found for key, all_of in fields.items() if (found := tuple(one for one in all_of if _is_rule(one)))}
+
+
+def _is_rule(marker: object) -> bool:
+    return isinstance(marker, Within | NotZero | Directed | Rising | Refers | InSpace | OnlyWith | Selects)
+
+
+def _marked(annotation: Any) -> Iterator[Any]:
+    """What an annotation is marked with, itself or as one of several forms."""
+    if get_origin(annotation) is Annotated:
+        yield from annotation.__metadata__
+        yield from _marked(get_args(annotation)[0])
+    elif get_origin(annotation) in (Union, type(int | str)):
+        for one in get_args(annotation):
+            yield from _marked(one)
+
+
+def parts(path: str, value: object) -> Iterator[tuple[str, BaseModel]]:
+    """A part of the model and every part in it, with their paths."""
+    if isinstance(value, BaseModel):
+        yield path, value
+        below: Mapping[str, object] = {key: getattr(value, key) for key in type(value).model_fields}
+    else:
+        below = value if isinstance(value, Mapping) else {}
+    for key, one in below.items():
+        if isinstance(one, BaseModel | Mapping):
+            yield from parts(f"{path}.{key}".lstrip("."), one)

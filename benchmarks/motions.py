@@ -140,7 +140,7 @@ def rattled(console: Console) -> None:
     mechanism, turn, short = rattling(), 2 * math.pi / SPEED, 2.9e-4
 
     def walked() -> None:
-        with mock.patch("trunnion.dynamics.simulate.compiled_rates", return_value=None):
+        with mock.patch("trunnion.dynamics.prepared.compiled_rates", return_value=None):
             trunnion.simulate(mechanism, short, 10)
 
     trunnion.simulate(mechanism, short, 1)  # compiles

@@ -39,7 +39,7 @@ METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
 BATCHES = 8  # of the kernel in a block, so that summing up costs little beside the analysis
 MOST = 2048  # samples in a block, so that few of them show how figures converge
-MOTIONS = 480  # the same of motions in time, each of which takes as long as a cycle of many positions
+MOTIONS, MOTION = 16, 30_000  # samples in a block with motions in time; positions that take about as long as one
 REPLICATES = 8  # independent scramblings, whose spread is the error
 CAUSES = len(Status) + 1  # by status; the last: a figure that does not exist, such as a dead centre out of range
 NOTHING, COARSE = 1e-9, 1e-2  # of the peak of a curve: scatter to first order that is none, and the scale of bins there
@@ -139,6 +139,12 @@ class Sampling:
         if any(measure.in_time for measure in self.measures):
             return MOTIONS
         return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
+
+    @property
+    def work(self) -> int:
+        """Positions of all samples, with as many for each motion in time as take as long."""
+        motions = {(measure.subject, measure.duration) for measure in self.measures if measure.in_time}
+        return self.samples * (self.positions + MOTION * len(motions))
 
     @cached_property
     def _points(self) -> int:

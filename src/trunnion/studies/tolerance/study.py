@@ -82,7 +82,7 @@ def tolerance(
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         if jobs is None:
-            jobs = 1 if job.samples * job.positions < FEW and cluster is None else None
+            jobs = 1 if job.work < FEW and cluster is None else None
         try:
             ran = runner.run(
                 job, jobs=jobs, chunk=chunk, cluster=cluster, checkpoint=checkpoint, resume=resume, progress=progress,

@@ -450,8 +450,8 @@ _CONTACT = (
     Fault(
         "machine-code-of-other-numbers",
         "dynamics/compiled_rates.py",
-        "whole = *key, *self.constant.items()",
-        "whole = key",
+        "self.motion.rests, *self.constant.items()",
+        "self.motion.rests",
         ("tests/invariants/test_motions_of_samples.py", "-k", "nothing_or_one"),
     ),
     Fault(

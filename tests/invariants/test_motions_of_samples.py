@@ -136,6 +136,17 @@ def test_numbers_that_were_nothing_or_one_are_looked_at_anew() -> None:
     assert abs(second - first) > 1e-6 * second
 
 
+def test_a_gear_without_loss_is_no_model_for_others() -> None:
+    """Without friction efforts are affine in the accelerations where no gear loses: which is the first sample alone."""
+    motor = {"kind": "linear", "stall_effort": 4, "no_load_speed": 150, "ratio": 2, "inertia": 0.01, "efficiency": 1}
+    mechanism = wheel(motor, drag=0.0)
+    run, efficiency = prepare(mechanism), np.array([[1.0], [0.8]])
+    values = dict(mechanism.parameters({"drivers.A.motor.efficiency": efficiency}))
+    speed = figures_in_time(run, "A", values, 2, 1.0)["steady_speed"]
+    alone = [figures_in_time(prepare(mechanism), "A", of_sample(values, i), 1, 1.0)["steady_speed"] for i in range(2)]
+    np.testing.assert_allclose(speed, np.ravel(alone), rtol=1e-9)
+
+
 def test_how_many_are_together_changes_nothing() -> None:
     mechanism = slider_crank(0.1)
     run, values = prepare(mechanism), spread(mechanism, 5, links__crank__points__P__x=0.01)

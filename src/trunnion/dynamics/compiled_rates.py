@@ -169,7 +169,7 @@ class CompiledRates:
         kinds, switches = tuple(map(_kind, onsets)), tuple(one.switches(now) for one in self.motion.drives.values())
         key = what, kinds, switches, senses, slips
         if key not in self._programs:
-            whole = *key, *self.constant.items()
+            whole = *key, self.motion.affine, self.motion.rests, *self.constant.items()
             if whole not in self.codes:
                 figures = self.figures(what, kinds)
                 self.codes[whole] = _code(self.motion, figures, kinds, switches, senses, slips, self.constant)

@@ -116,7 +116,7 @@ def many(console: Console, samples: int, plain: float) -> None:
     """Many toleranced start-ups: the figures themselves, and a whole study in one and in two processes."""
     mechanism = press()
     run, draw = prepare(mechanism), np.random.default_rng(1)
-    few = min(samples, 480)
+    few = min(samples, 100)
     moved = {
         "dimensions.r": 0.04 * (1 + SHARE * draw.uniform(-1, 1, (few, 1))),
         "links.crank.inertia": 22.0 * (1 + SHARE * draw.uniform(-1, 1, (few, 1))),
@@ -124,7 +124,7 @@ def many(console: Console, samples: int, plain: float) -> None:
     values = dict(mechanism.parameters(moved))
     (seconds,) = best(2, lambda: figures_in_time(run, "O", values, few, DURATION))
     table = Table("toleranced start-ups of 1 s", "ms CPU a start", "ratio to one by hand", "s wall")
-    table.add_row(f"{few} at once", f"{seconds / few * 1e3:.2f}", f"{seconds / few / plain:.2f}", "")
+    table.add_row(f"figures of {few}", f"{seconds / few * 1e3:.2f}", f"{seconds / few / plain:.2f}", "")
     job = study(mechanism).sampling("monte-carlo", samples, 1)
     for jobs in (1, 2):
         start = time.perf_counter()
@@ -139,7 +139,7 @@ def rattled(console: Console) -> None:
     mechanism, turn, short = rattling(), 2 * math.pi / SPEED, 2.9e-4
 
     def walked() -> None:
-        with mock.patch("trunnion.dynamics.simulate.compiled_rates", return_value=None):
+        with mock.patch("trunnion.dynamics.prepared.compiled_rates", return_value=None):
             trunnion.simulate(mechanism, short, 10)
 
     trunnion.simulate(mechanism, short, 1)  # compiles
@@ -183,7 +183,7 @@ def beside_exudyn(console: Console, rounds: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--samples", type=int, default=400)
     parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
     console = Console()

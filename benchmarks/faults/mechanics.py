@@ -352,9 +352,9 @@ _ENGINES = (
 _DYNAMICS = (
     Fault(
         "rotor-without-its-ratio",
-        "dynamics/tabulated.py",
-        "gear * drive.inertia * drive.ratio",
-        "gear * drive.inertia",
+        "dynamics/motor.py",
+        "integral, now) - self.inertia * self.ratio * second\n        return transmitted(",
+        "integral, now) - self.inertia * second\n        return transmitted(",
         ("tests/reference/test_motion_in_time.py", "-k", "rotor"),
     ),
     Fault(
@@ -363,13 +363,6 @@ _DYNAMICS = (
         "np.where(joint * speed >= 0.0, joint * efficiency, joint / efficiency)",
         "joint * efficiency",
         ("tests/reference/test_motion_in_time.py", "-k", "gear"),
-    ),
-    Fault(
-        "tables-without-dampers",
-        "dynamics/tabulated.py",
-        " + matrix[:, 2] * speed",
-        "",
-        ("tests/invariants/test_free_motion.py", "-k", "tables"),
     ),
     Fault(
         "friction-of-the-other-sense-at-rest",
@@ -384,13 +377,6 @@ _DYNAMICS = (
         "found = found - 0.5 * algebra.power",
         "found = found - algebra.power",
         ("tests/reference/test_energy_account.py", "-k", "works_and_energies"),
-    ),
-    Fault(
-        "inertia-of-the-other-sign-in-tables",
-        "dynamics/tables.py",
-        "_lanes(motion, values, q, 0.0, 1.0, False)",
-        "_lanes(motion, values, q, 0.0, -1.0, False)",
-        ("tests/invariants/test_free_motion.py", "-k", "tables"),
     ),
 )
 
@@ -453,6 +439,20 @@ _CONTACT = (
         "place = plus(end.place, scaled(self.wall, normal))",
         "place = end.place",
         ("tests/reference/test_pins_in_space.py", "-k", "let_go and 0.007"),
+    ),
+    Fault(
+        "machine-code-without-brakes",
+        "dynamics/motor.py",
+        "brake_from=ever if braked else never",
+        "brake_from=never",
+        ("tests/invariants/test_free_motion.py", "-k", "machine_code"),
+    ),
+    Fault(
+        "machine-code-of-other-numbers",
+        "dynamics/compiled_rates.py",
+        "self.motion.rests, *self.constant.items()",
+        "self.motion.rests",
+        ("tests/invariants/test_motions_of_samples.py", "-k", "nothing_or_one"),
     ),
     Fault(
         "mass-matrix-of-the-other-sign",

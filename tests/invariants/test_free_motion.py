@@ -1,4 +1,4 @@
-"""What holds of every motion in time: tables equal walks, rest is kept, energy is kept, bad numbers are refused."""
+"""What holds of every motion in time: machine code equals walks, rest and energy are kept, bad numbers are refused."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from scipy.special import ellipk
 from playing import rattling
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
+from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
-from trunnion.dynamics.start import initial_row, places
+from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.tables import tabulated
-from trunnion.dynamics.tabulated import TabulatedRates
 from trunnion.joints.motors import MOTORS
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute
@@ -44,46 +43,53 @@ def motored(name: str, driver: dict[str, Any]) -> Mechanism:
 
 
 def compared(mechanism: Mechanism, lanes: int = 5) -> None:
-    """Tables against walks at random states."""
+    """Machine code against walks at random states."""
     motion = FreeMotion.of(prepare(mechanism))
-    tables = tabulated(motion, places(motion))
-    assert tables is not None
-    assert tables.error < 1e-11
+    compiled = compiled_rates(motion)
+    assert compiled is not None
     walks, rng, pace = Walks(motion), np.random.default_rng(7), float(motion.unit[0]) ** 0.5
-    asked: list[int] = []
-
-    def counted(at: Moment) -> Any:
-        asked.append(1)
-        return walks(at)
-
-    fast = TabulatedRates(tables, counted)
+    compiled.walks = None  # type: ignore[assignment]  # they are not asked
     for _ in range(lanes):
         q, v = rng.uniform(-10, 10), rng.normal() * pace
         bristles = rng.normal(0, 1e-6, (len(motion.bristles), 1))
         sense = float(np.sign(v)) if motion.sticking else 0.0
         at = Moment(np.array([0.1]), np.array([[q]]), np.array([[v]]), np.zeros((1, 1)), bristles, sense, 0.1)
         with np.errstate(all="ignore"):
-            wanted, found = walks(at), fast(at)
+            wanted, found = walks(at), compiled(at)
         assert found.second == pytest.approx(wanted.second, rel=1e-9)
         assert found.bristles == pytest.approx(wanted.bristles, rel=1e-9)
         size = np.max(np.abs(wanted.works))
         assert np.abs(found.works - wanted.works).max() < 1e-9 * size
-    assert not asked
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_tables_are_what_walks_find(law: str) -> None:
+def test_machine_code_is_what_walks_find(law: str) -> None:
     compared(
         slider_crank(LAWS[law], springs={"damper": {"joint": "S", "stiffness": 200, "free_length": 0.1, "damping": 30}})
     )
 
 
+DRIVES: dict[str, dict[str, Any]] = {
+    "constant": {"kind": "constant", "effort": 5.0},
+    "geared": {
+        "kind": "linear",
+        "stall_effort": 5,
+        "no_load_speed": 90,
+        "ratio": 3,
+        "efficiency": 0.9,
+        "inertia": 1e-3,
+    },
+    "controlled": {"kind": "speed-control", "target": 9, "proportional": 0.3, "integral": 0.5, "limit": 8},
+    "table": {"kind": "table", "points": [[0, 9], [8, 7], [16, 0]]},
+    "braked": {"kind": "constant", "effort": 6, "off_from": 0.05, "brake": 2, "brake_from": 0.06},
+}
+
+
+@pytest.mark.parametrize("kind", DRIVES)
 @pytest.mark.parametrize("name", ["durango-fourbar", "whitworth-quick-return", "jansen"])
-def test_tables_of_examples_are_what_walks_find(name: str) -> None:
-    """Dyads of several kinds, one behind the other."""
-    driver = next(iter(read(EXAMPLES / f"{name}.yaml").drivers))
-    assert driver
-    compared(motored(name, {"motor": {"kind": "constant", "effort": 5.0}}), lanes=3)
+def test_machine_code_of_examples_is_what_walks_find(name: str, kind: str) -> None:
+    """Dyads of several kinds, one behind the other, driven by every kind of motor."""
+    compared(motored(name, {"motor": DRIVES[kind]}), lanes=3)
 
 
 def test_slow_motion_is_the_quasi_static_cycle() -> None:

@@ -11,11 +11,9 @@ import pytest
 from timed import slider_crank, wheel
 from trunnion import MechanismError, simulate
 from trunnion.dynamics.batch import figures_in_time
+from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.rates import Walks
-from trunnion.dynamics.start import places
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.tables import tabulated
-from trunnion.dynamics.tabulated import TabulatedRates
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import attribute
 from trunnion.solve.run import prepare
@@ -151,16 +149,16 @@ def test_a_linkage_with_friction_is_started_by_its_clutch() -> None:
 
 
 @pytest.mark.parametrize("slips", [-1.0, 0.0, 1.0])
-def test_tables_and_walks_agree_while_it_slips(slips: float) -> None:
+def test_machine_code_and_walks_agree_while_it_slips(slips: float) -> None:
     motor = {"kind": "linear", "stall_effort": 6, "no_load_speed": 100, "inertia": 0.01, "efficiency": 0.9, "clutch": 3}
     data = slider_crank().model_dump(exclude_unset=True)
     data["drivers"]["O"]["motor"] = motor
     motion = FreeMotion.of(prepare(Mechanism(**data)))
-    tables, walks = tabulated(motion, places(motion)), Walks(motion)
-    assert tables is not None
+    compiled, walks = compiled_rates(motion), Walks(motion)
+    assert compiled is not None
     one = np.ones((1, 1))
     at = Moment(np.zeros(1), 0.7 * one, 12.0 * one, 0.0 * one, np.empty((0, 1)), slip=slips * one, slips=slips)
-    found, wanted = TabulatedRates(tables, walks)(at), walks(at)
+    found, wanted = compiled(at), walks(at)
     assert found.second == pytest.approx(wanted.second, rel=1e-10)
     assert found.works == pytest.approx(wanted.works, rel=1e-10)
 

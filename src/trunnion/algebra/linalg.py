@@ -17,7 +17,7 @@ from trunnion.algebra.literal import is_zero, plus
 from trunnion.algebra.namespace import Number, namespace
 
 __all__ = [
-    "condition", "cross", "determinant", "dot", "inverse", "quick_inverse", "solve", "solve_and_determinant",
+    "condition", "cross", "determinant", "dot", "inverse", "solve", "solve_and_determinant",
     "weighted",
 ]  # fmt: skip
 
@@ -186,54 +186,6 @@ def inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
     sides = ([1.0 if i == j else 0.0 for i in range(n)] for j in range(n))
     columns = solve(matrix, *sides)
     return [[columns[j][i] for j in range(n)] for i in range(n)]
-
-
-def quick_inverse(matrix: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """A⁻¹ as rows without pivots: adj A / det A up to 3 × 3, of more rows by blocks.
-
-    It takes half the passes over the arrays that elimination takes, and loses digits where A is badly conditioned or
-    its diagonal small: for an iteration that corrects itself.
-    """
-    a = _quiet([list(row) for row in matrix])
-    if len(a) > 3:
-        return _inverse_by_blocks(a)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        if len(a) == 1:
-            return [[1 / a[0][0]]]
-        if len(a) == 2:
-            ((p, q), (r, s)) = a
-            scale = 1 / (p * s - q * r)
-            return [[s * scale, -q * scale], [-r * scale, p * scale]]
-        minors = [
-            [a[(j + 1) % 3][(i + 1) % 3] * a[(j + 2) % 3][(i + 2) % 3]
-             - a[(j + 1) % 3][(i + 2) % 3] * a[(j + 2) % 3][(i + 1) % 3] for j in range(3)]
-            for i in range(3)
-        ]  # fmt: skip
-        scale = 1 / (a[0][0] * minors[0][0] + a[0][1] * minors[1][0] + a[0][2] * minors[2][0])
-        return [[minor * scale for minor in row] for row in minors]
-
-
-def _inverse_by_blocks(a: list[list[Number]]) -> list[list[Number]]:
-    """(P Q; R S)⁻¹ by S − R P⁻¹ Q, the complement of P."""
-    k = len(a) // 2
-    q, r, s = ([row[k:] for row in a[:k]], [row[:k] for row in a[k:]], [row[k:] for row in a[k:]])
-    p = quick_inverse([row[:k] for row in a[:k]])
-    before, after = _product(p, q), _product(r, p)
-    lower = quick_inverse(
-        [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(s, _product(r, before), strict=True)]
-    )
-    upper_right, lower_left = _product(before, lower), _product(lower, after)
-    upper = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(p, _product(upper_right, after), strict=True)]
-    return [
-        *([*row, *(-x for x in right)] for row, right in zip(upper, upper_right, strict=True)),
-        *([*(-x for x in left), *row] for left, row in zip(lower_left, lower, strict=True)),
-    ]
-
-
-def _product(a: Sequence[Sequence[Number]], b: Sequence[Sequence[Number]]) -> list[list[Number]]:
-    """A B."""
-    columns = list(zip(*b, strict=True))
-    return [[weighted(row, column) for column in columns] for row in a]
 
 
 def determinant(matrix: Sequence[Sequence[Number]]) -> Number:

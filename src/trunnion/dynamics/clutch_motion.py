@@ -13,25 +13,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
-from trunnion.dynamics.rates import WORKS, Dynamics, Rates
+from trunnion.dynamics.rates import WORKS, Rates, Walks
 from trunnion.dynamics.rest import Meanwhile, Rest
 from trunnion.dynamics.solution import Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.tabulated import TabulatedRates
 
 __all__ = ["ClutchMotion"]
 
 Array = NDArray[np.float64]
 
 LOOKED = 8  # parts of a step at whose ends slip and carried effort are looked at
-LANES = ("time", "q", "rate", "integral", "bristles", "slip")
 EXACT = 1e-14  # of the time: to which an event is located
 ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
 
@@ -45,7 +45,7 @@ def _drive(motion: FreeMotion) -> Drive:
 class ClutchRates:
     """The rates of a motion with those of the slip and of what is lost in it beside them."""
 
-    def __init__(self, drive: Drive, inner: Dynamics) -> None:
+    def __init__(self, drive: Drive, inner: CompiledRates | Walks) -> None:
         self.drive, self.inner = drive, inner
 
     def __call__(self, at: Moment) -> Rates:
@@ -84,7 +84,7 @@ class ClutchMotion(Integration):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.drive = _drive(self.motion)
-        self.rates = ClutchRates(self.drive, self.dynamics)
+        self.rates = ClutchRates(self.drive, cast("CompiledRates | Walks", self.dynamics))
         self.dynamics = self.rates
         self.resting = False  # whether the rotor alone moves, or it and what prescribed drivers move
         self.meanwhile: Meanwhile | None = None  # what those do
@@ -112,7 +112,7 @@ class ClutchMotion(Integration):
     def _overloaded(self, time: float, row: Array, now: float) -> float:
         """The sense in which a clutch without slip begins to slip, 0 if it holds."""
         n = self.layout.coordinates
-        sense, rests = (float(np.sign(row[n])) if self.sticks else 0.0), False
+        sense, rests = (float(np.sign(row[n])) if self.motion.rests else 0.0), False
         if self.rest is not None and row[n] == 0.0:
             sense = Rest(self.motion, self.layout).sense(time, row, now)
             rests = sense == 0.0
@@ -126,20 +126,10 @@ class ClutchMotion(Integration):
 
     def _carried(self, at: Moment, rests: bool) -> Array:
         """Effort through a clutch that holds, (lane,): the motor's, less what the rotor takes."""
-        second = 0.0 * at.rate[0] if rests else self._second(at)
+        second = 0.0 * at.rate[0] if rests else self.rates.inner.seconds(at)[0]
         shaft = self.drive.shaft(at.time, at.rate[0], at.integral[0], at.now)
         found: Array = shaft - self.drive.inertia * self.drive.ratio * second
         return found
-
-    def _second(self, at: Moment) -> Array:
-        """Accelerations, (lane,): from tables lane by lane, by walks all at once."""
-        if not isinstance(self.rates.inner, TabulatedRates):
-            found: Array = self.motion.accelerate(at).second[0]
-            return found
-        return np.array([
-            self.rates.inner(at._replace(**{key: getattr(at, key)[..., [i]] for key in LANES})).second[0]
-            for i in range(len(at.time))
-        ])  # fmt: skip
 
     # ---- where that changes -------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -26,9 +26,8 @@ from trunnion.dynamics.compiled_rates import (
     eliminated,
     errors_of,
     missing_of,
-    works_recorded,
 )
-from trunnion.dynamics.rates import Seen
+from trunnion.dynamics.rates import Seen, works_of
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import ContactState
 from trunnion.solve.forward import Forward
@@ -48,12 +47,11 @@ class CompiledClosed(CompiledRates):
 
     def figures(self, what: str, kinds: Kinds) -> Figures:
         """Rates and contacts of closed ones come from one program."""
-        unit = self.motion.trial.tolist()
         if what == "linear":
-            return functools.partial(_linear, unit=unit)
+            return _linear
         if what == "rates" and any(kinds):
             assert isinstance(self.motion, ClosedMotion)
-            return functools.partial(_closed, unit=unit, force=self.motion.force)
+            return functools.partial(_closed, force=self.motion.force)
         return super().figures(what, kinds)
 
     def touches(self, at: Moment) -> Seen | None:
@@ -78,7 +76,7 @@ class CompiledClosed(CompiledRates):
 # ---- what is recorded -----------------------------------------------------------------------------------------
 
 
-def _linear(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
+def _linear(motion: FreeMotion, at: Moment) -> list[Number]:
     """Columns of M, of W for rates of gaps and slips, these at rest, and gaps."""
     count = len(motion.names)
     nothing: Any = [0.0] * count
@@ -91,7 +89,7 @@ def _linear(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Numbe
     for k in range(count):
         moved = _rates(states([1.0 if i == k else 0.0 for i in range(count)]))
         columns += [one - zero for one, zero in zip(moved, rest, strict=True)]
-    mass = [one for column in columns_of(motion, at, unit) for one in column]
+    mass = [one for column in columns_of(motion, at) for one in column]
     return [*mass, *columns, *rest, *(state.gap for state in still), 0.0]
 
 
@@ -99,15 +97,15 @@ def _rates(states: Sequence[ContactState]) -> list[Number]:
     return [*(state.rate for state in states), *(state.slip for state in states)]
 
 
-def _closed(motion: FreeMotion, at: Moment, unit: Sequence[float], force: float) -> list[Number]:
+def _closed(motion: FreeMotion, at: Moment, force: float) -> list[Number]:
     """What the rates are, and of every contact what `rates.Seen` has."""
     assert isinstance(motion, ClosedMotion)
     nothing: Any = [0.0] * len(motion.names)
     free = at._replace(onsets=(None,) * len(at.onsets))
     still = free._replace(rate=nothing)
     closed, sticks = motion.closed(at)
-    columns = [column + more for column, more in zip(columns_of(motion, at, unit),
-               _driven(motion, still, closed, sticks, unit), strict=True)]  # fmt: skip
+    columns = [column + more for column, more in zip(columns_of(motion, at),
+               _driven(motion, still, closed, sticks), strict=True)]  # fmt: skip
     zero = missing_of(motion, still, nothing)
     for k in range(len(closed) + len(sticks)):
         forces = [force if i == k else 0.0 for i in range(len(closed) + len(sticks))]
@@ -126,14 +124,12 @@ def _closed(motion: FreeMotion, at: Moment, unit: Sequence[float], force: float)
     least = functools.reduce(xp.minimum, pivots)
     second = [xp.where(least > 0.0, one, np.nan) for one in second]
     back = motion.solve(done, second, sliding=True)
-    return [*second, *errors_of(motion, at), *works_recorded(motion, done, back), *seen, 0.0]
+    return [*second, *errors_of(motion, at), *works_of(back, done, motion.contacts), *seen, 0.0]
 
 
-def _driven(
-    motion: ClosedMotion, still: Moment, closed: Sequence[int], sticks: Sequence[int], unit: Sequence[float]
-) -> list[list[Number]]:
+def _driven(motion: ClosedMotion, still: Moment, closed: Sequence[int], sticks: Sequence[int]) -> list[list[Number]]:
     """W: accelerations of gaps and of slips that stay 0, by those of the coordinates; a list for each coordinate."""
-    nothing: Any = [0.0] * len(unit)
+    unit, nothing = motion.trial, cast("Any", [0.0] * len(motion.trial))
     zero, found = _kept(motion, motion.walk(still, nothing), closed, sticks), []
     for k, size in enumerate(unit):
         step: Any = [size if i == k else 0.0 for i in range(len(unit))]

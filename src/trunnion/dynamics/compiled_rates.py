@@ -11,24 +11,27 @@ slide and what is switched on decides which program it is; while a joint sticks 
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, UntraceableError, looped
-from trunnion.dynamics.rates import Layout, Rates, Seen, Walks
+from trunnion.dynamics.motor import drives
+from trunnion.dynamics.rates import WORKS, Layout, Rates, Seen, Walks, bristle_rates, works_of
 from trunnion.dynamics.state import DIFFERENCE, FreeMotion, Moment
 from trunnion.dynamics.touching import Closed, Onset
 from trunnion.engines.kernel import literals
-from trunnion.solve.backward import Backward
+
+if TYPE_CHECKING:
+    from trunnion.engines.machine_code import MachineCode
 
 __all__ = [
+    "Codes",
     "CompiledRates",
     "Figures",
     "Kinds",
@@ -38,7 +41,6 @@ __all__ = [
     "eliminated",
     "errors_of",
     "missing_of",
-    "works_recorded",
 ]
 
 Array = NDArray[np.float64]
@@ -49,7 +51,9 @@ CLOSE = 1e-8  # of an acceleration: a last step of which the next is below round
 MOST_LANES = 64  # that a program takes at a time
 TOUCHES, SLIPS, STICKS = 1, 2, 3  # how a contact touches: by a law, or closed between rigid bodies
 TOLD = (TOUCHES, SLIPS)  # of which something is told
+TRIAL = "trial."  # in the path of an acceleration, see `FreeMotion.trial`
 Kinds = tuple[int | None, ...]
+Codes = dict[tuple[Any, ...], "Code"]  # by what it is for, with the numbers that are compiled in
 
 
 def _kind(onset: Onset) -> int | None:
@@ -65,38 +69,44 @@ def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
     return next(told) if kind == TOUCHES else Closed(0) if kind == STICKS else None
 
 
-def compiled_rates(motion: FreeMotion) -> CompiledRates | None:
-    """The rates as machine code; None where they cannot be: losses in gears, brakes, clutches, friction with a memory
-    or at rest of one coordinate, an assembly that is followed."""
-    resting = motion.sticking and len(motion.names) == 1
-    if resting or motion.bristles or not compilable(motion):
+def compiled_rates(
+    motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()
+) -> CompiledRates | None:
+    """The rates as machine code; None where they cannot be.
+
+    codes: of motions of mechanisms that differ in numbers alone, to be added to; varied: paths of those numbers, none
+    of which is compiled in.
+    """
+    if not compilable(motion):
         return None
-    found = CompiledRates(motion)
-    return found if found.works() else None
+    rates = CompiledRates(motion, codes, varied)
+    return rates if rates.works() else None
 
 
 def compilable(motion: FreeMotion) -> bool:
-    """Whether it may be: without losses in gears, brakes, clutches and an assembly that is followed."""
-    lossy = any(drive.brake or drive.clutched or drive.efficiency < 1.0 for drive in motion.drives.values())
-    return not (lossy or motion.followed)
+    """Whether it may be: without an assembly that is followed."""
+    return not motion.followed
 
 
 class CompiledRates:
-    """The rates of `motion`, one program for every set of contacts that touch."""
+    """The rates of `motion`, one program for every set of contacts that touch, senses and switches."""
 
-    def __init__(self, motion: FreeMotion) -> None:
+    def __init__(self, motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> None:
         self.motion = motion
+        self.codes: Codes = {} if codes is None else codes
+        self.constant = literals({path: value for path, value in motion.values.items() if path not in varied})
         self.walks = Walks(motion)
         self.layout = Layout.of(motion)
-        self.last = 2 * self.layout.coordinates + len(self.layout.works_named)  # of the numbers that are integrated
+        self._works = 2 * self.layout.coordinates + self.layout.bristles  # where they begin
+        self.last = self._works + len(WORKS) + self.layout.touching  # of the numbers that are integrated
         self._programs: dict[tuple[Any, ...], Program] = {}
 
     def works(self, onset: Onset = 1.0) -> bool:
         """Whether it can be recorded, with all contacts touching."""
-        n, count = self.layout.coordinates, len(self.motion.contacts.each)
-        q, rate, integral, none = (np.zeros((k, 1)) for k in (n, n, n, 0))
+        n, contacts = self.layout.coordinates, len(self.motion.contacts.each)
+        q, rate, integral, bristles = (np.zeros((k, 1)) for k in (n, n, n, self.layout.bristles))
         senses = (1,) * len(self.motion.resisted)
-        at = Moment(np.zeros(1), q, rate, integral, none, onsets=(onset,) * count, senses=senses)
+        at = Moment(np.zeros(1), q, rate, integral, bristles, onsets=(onset,) * contacts, senses=senses)
         try:
             self._program("rates", at)
         except UntraceableError:
@@ -105,13 +115,23 @@ class CompiledRates:
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
-        n = self.layout.coordinates
         if 0 in at.senses:
             return self.walks(at)
-        found = self._program("rates", at).run(at)[:, 0]
-        if found[-1] != 0.0 or not np.all(np.isfinite(found)):
+        state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
+        rates = self._program("rates", at).of_row(float(at.time[0]), state, at.onsets, at.sense)
+        if rates[-1] != 0.0 or not math.isfinite(rates.sum()):
             return self.walks(at)
-        return Rates(found[:n], found[n : 2 * n], np.empty(0), found[2 * n : self.last], True)
+        n, memory = 2 * self.layout.coordinates, self._works
+        second, integral, bristles = rates[: n // 2].copy(), rates[n // 2 : n].copy(), rates[n:memory].copy()
+        return Rates(second, integral, bristles, rates[memory : self.last].copy(), True)
+
+    def seconds(self, at: Moment) -> Array:
+        """See `Walks.seconds`."""
+        if 0 not in at.senses:
+            numbers = self._program("rates", at).run(at)
+            if np.all(numbers[-1] == 0.0) and np.all(np.isfinite(numbers)):
+                return numbers[: self.layout.coordinates]
+        return self.walks.seconds(at)
 
     def derivative(
         self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
@@ -119,8 +139,8 @@ class CompiledRates:
         """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
         n, found = self.layout.coordinates, np.empty(len(row))
         if 0 not in senses:
-            rates = self._program_of("rates", onsets, now, senses).of_row(time, row[: 3 * n], onsets)
-            found[:n], found[n : 3 * n], found[3 * n :] = row[n : 2 * n], rates[: 2 * n], rates[2 * n : self.last]
+            rates = self._program_of("rates", onsets, now, senses).of_row(time, row[: self.layout.slip], onsets)
+            found[:n], found[n:] = row[n : 2 * n], rates[: self.last]
             if rates[-1] == 0.0 and math.isfinite(found.sum()):
                 return found
         at = self.layout.moment(np.array([time]), row[:, None], now=now)
@@ -141,66 +161,99 @@ class CompiledRates:
         return Seen(*found[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
     def _program(self, what: str, at: Moment) -> Program:
-        return self._program_of(what, at.onsets, at.now, at.senses if what == "rates" else ())
+        return self._program_of(what, at.onsets, at.now, at.senses if what == "rates" else (), at.slips)
 
-    def _program_of(self, what: str, onsets: Sequence[Onset], now: float, senses: tuple[int, ...]) -> Program:
-        kinds = tuple(map(_kind, onsets))
-        key = what, kinds, now, senses
+    def _program_of(
+        self, what: str, onsets: Sequence[Onset], now: float, senses: tuple[int, ...], slips: float = 0.0
+    ) -> Program:
+        kinds, switches = tuple(map(_kind, onsets)), tuple(one.switches(now) for one in self.motion.drives.values())
+        key = what, kinds, switches, senses, slips
         if key not in self._programs:
-            self._programs[key] = Program(self.motion, self.figures(what, kinds), kinds, now, senses)
+            whole = *key, self.motion.affine, self.motion.rests, *self.constant.items()
+            if whole not in self.codes:
+                figures = self.figures(what, kinds)
+                self.codes[whole] = _code(self.motion, figures, kinds, switches, senses, slips, self.constant)
+            self._programs[key] = Program(self.motion, self.codes[whole])
         return self._programs[key]
 
     def figures(self, what: str, kinds: Kinds) -> Figures:
         """What a program computes: the rates, how near assemblies are to each other, or how the contacts are."""
-        if what == "rates":
-            return functools.partial(_rates_of, unit=self.motion.trial.tolist())
-        return _margins if what == "margins" else _seen
+        return {"rates": _rates_of, "margins": _margins, "look": _seen}[what]
+
+
+class Code(NamedTuple):
+    """Machine code of some numbers of a motion; the last of them: whether there is any doubt.
+
+    paths: of the numbers of the mechanism that it takes; states: names of what it takes of every state; onsets: names
+    of what is told of contacts; size: how many numbers it gives.
+    """
+
+    machine: MachineCode
+    paths: tuple[str, ...]
+    states: tuple[str, ...]
+    onsets: tuple[str, ...]
+    size: int
+
+
+def _code(
+    motion: FreeMotion, figures: Figures, kinds: Kinds, switches: Sequence[tuple[bool, bool, bool]],
+    senses: tuple[int, ...], slips: float, constant: Mapping[str, Any],
+) -> Code:  # fmt: skip
+    """Record some numbers of a motion, and compile what is recorded. constant: numbers that are compiled in."""
+    from trunnion.engines.graph import POSITION, Graph
+    from trunnion.engines.machine_code import MachineCode, vector_width
+    from trunnion.engines.program import program
+    from trunnion.engines.recorded import Recorded, number_of
+
+    n, graph = len(motion.names), Graph()
+    paths = tuple(path for path in _numbers(motion) if path not in constant)
+    recorded: dict[str, Any] = {path: Recorded(graph, graph.input(path, 0)) for path in paths}
+    kept = (*(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n)), *motion.bristles)
+    states = ("time", *(f"state.{name}" for name in kept), "sense")
+    time, *state, sense = [Recorded(graph, graph.input(name, POSITION)) for name in states]
+    onsets = tuple(f"onset{k}" for k, kind in enumerate(kinds) if kind in TOLD)
+    told: Any = iter([Recorded(graph, graph.input(name, 0)) for name in onsets])
+    q, rate, integral, bristles = cast("Any", (state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]))
+    touching = tuple(_onset(kind, told) for kind in kinds)
+    at = Moment(cast("Any", time), q, rate, integral, bristles, onsets=touching, senses=senses, slips=slips)
+    if motion.rests:  # also where a speed is lost in rounding, it is known in which sense joints slide
+        at = at._replace(sense=cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)))
+    bare = _recorded(motion, {**constant, **recorded}, switches)
+    with np.errstate(all="ignore"):
+        *wanted, doubt = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]
+    for one in graph.doubts:
+        doubt = graph.apply("max", doubt, graph.as_float(one))
+    outputs = [*wanted, graph.as_float(doubt)]
+    return Code(MachineCode(program(graph, outputs, vector_width())), paths, states, onsets, len(outputs))
+
+
+def _numbers(motion: FreeMotion) -> dict[str, Any]:
+    """Every number of a mechanism by its path, with accelerations by whose forces inertias are told."""
+    return {**motion.values, **{f"{TRIAL}{name}": motion.trial[i] for i, name in enumerate(motion.names)}}
 
 
 class Program:
-    """Some numbers of a motion as machine code, of lanes of states; the last of them: whether there is any doubt."""
+    """The machine code of some numbers with the numbers of one motion, for lanes of states."""
 
-    def __init__(self, motion: FreeMotion, figures: Figures, kinds: Kinds, now: float, senses: tuple[int, ...]) -> None:
-        from trunnion.engines.graph import POSITION, Graph
-        from trunnion.engines.machine_code import MachineCode, vector_width
-        from trunnion.engines.program import program
-        from trunnion.engines.recorded import Recorded, number_of
+    def __init__(self, motion: FreeMotion, code: Code) -> None:
+        from trunnion.engines.machine_code import vector_width
 
-        n, graph = len(motion.names), Graph()
-        constant = literals(motion.values)
-        given = {path: value for path, value in motion.values.items() if path not in constant}
-        recorded = {path: Recorded(graph, graph.input(path, 0)) for path in given}
-        self.states = ["time", *(f"{kind}{i}" for kind in ("q", "rate", "integral") for i in range(n))]
-        state = [Recorded(graph, graph.input(name, POSITION)) for name in self.states]
-        self.onsets = [f"onset{k}" for k, kind in enumerate(kinds) if kind in TOLD]
-        told: Any = iter([Recorded(graph, graph.input(name, 0)) for name in self.onsets])
-        onsets = tuple(_onset(kind, told) for kind in kinds)
-        parts: Any = [state[1 + k * n : 1 + (k + 1) * n] for k in range(3)]
-        q, rate, integral = parts
-        at = Moment(cast("Any", state[0]), q, rate, integral, cast("Any", []), now=now, onsets=onsets, senses=senses)
-        bare = replace(motion, run=replace(motion.run, values={**constant, **recorded}))
-        with np.errstate(all="ignore"):
-            *wanted, doubtful = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]
-        doubt = doubtful
-        for one in graph.doubts:
-            doubt = graph.apply("max", doubt, graph.as_float(one))
-        outputs = [*wanted, graph.as_float(doubt)]
-        self.lanes, width = MOST_LANES, vector_width()
-        code = MachineCode(program(graph, outputs, width))
-        self.numbers = {path: np.array([float(np.ravel(primal(value))[0])]) for path, value in given.items()}
-        self.numbers.update({name: np.zeros(1) for name in self.onsets})
-        self.state = np.zeros((len(self.states), self.lanes))
-        self.numbers.update(zip(self.states, self.state, strict=True))
-        self.found = np.zeros((len(outputs), self.lanes))
+        values = _numbers(motion)
+        self.lanes, self.width, self.onsets = MOST_LANES, vector_width(), code.onsets
+        self.numbers = {path: np.array([float(np.ravel(primal(values[path]))[0])]) for path in code.paths}
+        self.numbers.update({name: np.zeros(1) for name in code.onsets})
+        self.state = np.zeros((len(code.states), self.lanes))
+        self.numbers.update(zip(code.states, self.state, strict=True))
+        self.found = np.zeros((code.size, self.lanes))
         rows = [row[None] for row in self.found]
         # one state is done as one vector of the same lane
-        self._short = code.bound(self.numbers, rows, (0, 1), (0, width))
-        self._long = code.bound(self.numbers, rows, (0, 1), (0, self.lanes))
-        self.width = width
+        self._short = code.machine.bound(self.numbers, rows, (0, 1), (0, self.width))
+        self._long = code.machine.bound(self.numbers, rows, (0, 1), (0, self.lanes))
 
     def run(self, at: Moment) -> Array:
         """The numbers, (number, lane)."""
-        state, parts = np.vstack([at.time[None], at.q, at.rate, at.integral]), list[Array]()
+        sense = np.full((1, len(at.time)), at.sense)
+        state, parts = np.vstack([at.time[None], at.q, at.rate, at.integral, at.bristles, sense]), list[Array]()
         self._begin(at.onsets)
         for low in range(0, state.shape[1], self.lanes):
             part = state[:, low : low + self.lanes]
@@ -209,11 +262,12 @@ class Program:
             parts.append(self.found[:, : part.shape[1]].copy())
         return np.hstack(parts)
 
-    def of_row(self, time: float, state: Array, onsets: Sequence[Onset]) -> Array:
-        """The numbers of one state: coordinates, rates, integrals; overwritten by the next."""
+    def of_row(self, time: float, state: Array, onsets: Sequence[Onset], sense: float = 0.0) -> Array:
+        """The numbers of one state: coordinates, rates, integrals, deflections; overwritten by the next."""
         self._begin(onsets)
         self.state[0, : self.width] = time
-        self.state[1:, : self.width] = state[:, None]
+        self.state[1:-1, : self.width] = state[:, None]
+        self.state[-1, : self.width] = sense
         self._short()
         found: Array = self.found[:, 0]
         return found
@@ -227,23 +281,35 @@ class Program:
 # ---- what is recorded -----------------------------------------------------------------------------------------
 
 
-def _rates_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
-    """Accelerations, rates of the controllers' integrals, works, as `rates.Walks` has them; 1 where there is doubt."""
+def _recorded(motion: FreeMotion, values: dict[str, Any], switches: Sequence[tuple[bool, bool, bool]]) -> FreeMotion:
+    """The motion with numbers that write down what is done with them; what depends on their size is as it is."""
+    own = drives(motion.system, values, lambda value: value)
+    own = {name: drive.switched(*on) for (name, drive), on in zip(own.items(), switches, strict=True)}
+    recorded = replace(motion, run=replace(motion.run, values=values), drives=own)
+    trial = [values[f"{TRIAL}{name}"] for name in motion.names]
+    vars(recorded).update(affine=motion.affine, resisted=motion.resisted, trial=trial)
+    return recorded
+
+
+def _rates_of(motion: FreeMotion, at: Moment) -> list[Number]:
+    """Accelerations, rates of the controllers' integrals and of deflections, works, as `rates.Walks` has them; 1 where
+    there is doubt."""
     doubt: Number = 0.0
     if motion.affine:
-        second = _affine(motion, at, unit)
+        second = _affine(motion, at)
     else:
-        second, doubt = _by_rounds(motion, at, unit)
+        second, doubt = _by_rounds(motion, at)
     back = motion.solve(at, cast("Any", second), sliding=True)
     for one in back.settled:
         doubt = np.maximum(doubt, np.where(one.converged, 0.0, 1.0))
-    return [*second, *errors_of(motion, at), *works_recorded(motion, at, back), doubt]
+    memory = bristle_rates(motion, at, back)
+    return [*second, *errors_of(motion, at), *memory, *works_of(back, at, motion.contacts), doubt]
 
 
-def _by_rounds(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> tuple[list[Number], Number]:
+def _by_rounds(motion: FreeMotion, at: Moment) -> tuple[list[Number], Number]:
     """Accelerations by Newton's method with slopes by differences, and 1 where it did not end, or where more
     acceleration takes less effort."""
-    count = len(motion.names)
+    count, unit = len(motion.names), motion.trial
 
     def step(numbers: list[Number]) -> list[Number]:
         second, columns = numbers[:count], []
@@ -268,20 +334,20 @@ def _by_rounds(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> tuple[l
     return found[:count], doubt
 
 
-def _affine(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[Number]:
+def _affine(motion: FreeMotion, at: Moment) -> list[Number]:
     """Accelerations where efforts are affine in them."""
     nothing: Any = [0.0] * len(motion.names)
-    matrix = [list(row) for row in zip(*columns_of(motion, at, unit), strict=True)]
+    matrix = [list(row) for row in zip(*columns_of(motion, at), strict=True)]
     return eliminated(matrix, [-one for one in missing_of(motion, at, nothing)])[0]
 
 
-def columns_of(motion: FreeMotion, at: Moment, unit: Sequence[float]) -> list[list[Number]]:
+def columns_of(motion: FreeMotion, at: Moment) -> list[list[Number]]:
     """The columns of M, from rest and without contacts, whose forces would leave no digits to the differences."""
     count = len(motion.names)
     nothing: Any = [0.0] * count
     still = at._replace(rate=nothing, onsets=(None,) * len(at.onsets))
     zero, columns = missing_of(motion, still, nothing), []
-    for k, size in enumerate(unit):
+    for k, size in enumerate(motion.trial):
         step = [size if i == k else 0.0 for i in range(count)]
         columns.append([(one - rest) / size for one, rest in zip(missing_of(motion, still, step), zero, strict=True)])
     return columns
@@ -296,24 +362,8 @@ def errors_of(motion: FreeMotion, at: Moment) -> list[Number]:
 def missing_of(motion: FreeMotion, at: Moment, second: Any) -> list[Number]:
     """E − T of every free coordinate."""
     back = motion.solve(at, second, sliding=True)
-    found = []
-    for i, (name, drive) in enumerate(motion.drives.items()):
-        given = drive.effort(at.time, at.rate[i], second[i], at.integral[i], at.now)
-        found.append(back.efforts[name] - given)
-    return found
-
-
-def works_recorded(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
-    """Powers, as `rates.works_of` has them."""
-    stated = motion.system.mechanism.loads
-    drive = sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0)
-    loads = sum((power for name, power in back.load_powers.items() if name in stated), 0.0)
-    springs = sum((state.power for state in back.springs.values()), 0.0)
-    friction = sum((back.losses[joint] for joint in back.walk.system.joints), 0.0)
-    found = [drive, loads, springs, friction]
-    if motion.contacts.each:
-        found.append(sum((push.loss for _, push in motion.contacts.pushes(back.walk, at.onsets)), 0.0))
-    return found
+    driven = motion.driven(at, second, motion.beginning(at))
+    return [back.efforts[name] - effort for name, effort in zip(motion.names, driven, strict=True)]
 
 
 def _seen(motion: FreeMotion, at: Moment) -> list[Number]:

@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 MOST_EVENTS = 100_000
 MOST_EVALUATIONS = 2_000_000  # of the forces, if not stated otherwise
-WALK = 25  # evaluations by tables or machine code that take about as long as a walk through the modules
+WALK = 25  # evaluations by machine code that take about as long as a walk through the modules
 CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the duration: it does not get on
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
@@ -68,8 +68,8 @@ class Integration:
 
     bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
     limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
-    reached; inside: share of the coordinate by which forces are asked for on this side of a bend; times: s, at which a
-    load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK; meetings: see `Places`.
+    reached; times: s, at which a load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK;
+    meetings: see `Places`.
     """
 
     motion: FreeMotion
@@ -80,7 +80,6 @@ class Integration:
     period: float | None = None
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     progress: Callable[[float], None] | None = None
-    inside: float = INSIDE
     times: Sequence[float] = ()
     evaluations: int = MOST_EVALUATIONS
     meetings: Sequence[tuple[float, int]] = ()
@@ -92,20 +91,13 @@ class Integration:
         times = {time for time in (*known, *self.times) if 0 < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
         self.turned_over, self.asked_for, self.slips = 0.0, 0, 0.0
-        self._unique, self._doubts = True, 0
+        self._doubts = 0
         self.breaks = [*sorted(times), self.duration]
-        self.rest = Rest(self.motion, self.layout) if self.sticks else None
+        self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
         self.ends = np.array([self.limits.get(name, (-np.inf, np.inf)) for name in self.motion.names], float).T
         margins = getattr(self.dynamics, "margins", Walks(self.motion).margins)
         self._walked = self.motion.walked[0]
         self.guards = Guards(self.motion, self.layout, self.limits, margins)
-
-    @property
-    def sticks(self) -> bool:
-        """Whether the one free coordinate may rest in friction."""
-        braked = any(np.isfinite(drive.brake_from) for drive in self.motion.drives.values())
-        lossy = any(drive.efficiency < 1.0 for drive in self.motion.drives.values())
-        return len(self.motion.names) == 1 and bool(self.motion.sticking or braked or lossy)
 
     # ---- the whole way ----------------------------------------------------------------------------------------
 
@@ -120,7 +112,7 @@ class Integration:
         if not self._begins(row):
             return
         before, time, step, stayed = -1.0, 0.0, None, 0
-        sense = float(np.sign(row[self.layout.coordinates])) if self.sticks else 0.0
+        sense = float(np.sign(row[self.layout.coordinates])) if self.motion.rests else 0.0
         for _ in range(MOST_EVENTS):
             if time >= self.duration * (1 - CLOSE) or self.solution.ended:
                 return
@@ -151,14 +143,18 @@ class Integration:
         """Whether there are accelerations at the start; they also tell what rates are typical."""
         n, now = self.layout.coordinates, 0.5 * self.breaks[0]
         if self.rest is not None and row[n] == 0.0:
-            if self._cause(0.0, row, 1.0, now) != "not_assembled":
+            if self._assembled(self.moment(0.0, row, 1.0, now)):
                 return True
             self._stop("not_assembled", 0.0, row)
             return False
-        sense = float(np.sign(row[n])) if self.sticks else 0.0
+        sense = float(np.sign(row[n])) if self.motion.rests else 0.0
         at = self.moment(0.0, row, sense, now)
         with np.errstate(all="ignore"):
             second = self.dynamics(at).second
+            if n == 1 and row[n] != 0.0 and not np.all(np.isfinite(second)):  # as where the ends of a spring meet
+                ahead = at.q + np.sign(row[n]) * self._inside(row[0])
+                second = self.dynamics(at._replace(q=ahead)).second
+                self.bends = (*self.bends, float(row[0] % self.period if self.period else row[0]))
         if not np.all(np.isfinite(second)):
             cause = self._cause(0.0, row, sense, now) or "no_acceleration"
             if self._locked(0.0, row, sense, now, [cause]):
@@ -293,7 +289,6 @@ class Integration:
             at = self.moment(moment, asked, sense, now)
             with np.errstate(all="ignore"):
                 rates = self.dynamics(at)
-            self._unique = rates.unique
             return self.layout.row(speeds, rates) if rates.sound else np.full(len(numbers), np.nan)
 
         return rate
@@ -302,7 +297,7 @@ class Integration:
         """How far from the end of a stretch forces are asked for."""
         if not np.isfinite(end):
             return 0.0
-        return (self.inside if self._meeting(end) is None else MEETING) * max(1.0, abs(end))
+        return (INSIDE if self._meeting(end) is None else MEETING) * max(1.0, abs(end))
 
     def _in_range(self, coordinates: Array) -> Array:
         """Coordinates of which none is beyond its range, where no force may be known."""
@@ -529,7 +524,7 @@ class Integration:
     def _compare(self, time: float, row: Array, sense: float, now: float) -> None:
         """Tell where one free coordinate has several accelerations, every few steps: E − T, which is continuous, has
         other roots than that which is followed where it falls far out."""
-        if self._unique or self.motion.affine or len(self.motion.names) != 1 or SEVERAL in self.solution.notes:
+        if self.motion.affine or len(self.motion.names) != 1 or SEVERAL in self.solution.notes:
             return
         self._doubts += 1
         if self._doubts % LOOKED == 1 and np.any(self.motion.growth(self.moment(time, row, sense, now)) < 0.0):
@@ -562,12 +557,16 @@ class Integration:
     def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
         """Why a state has no acceleration; empty if it has one."""
         at = self.moment(time, row, sense, now)
+        if not self._assembled(at):
+            return "not_assembled"
         with np.errstate(all="ignore"):
-            walk = self.motion.walk(at, np.zeros_like(at.q))
-            if int(pose_status(walk, (1,))[0]) == Status.NOT_ASSEMBLED:
-                return "not_assembled"
             rates = self.dynamics(at)
         return "" if rates.sound else "locked" if rates.locked else "no_acceleration"
+
+    def _assembled(self, at: Moment) -> bool:
+        with np.errstate(all="ignore"):
+            status = pose_status(self.motion.walk(at, np.zeros_like(at.q)), (1,))
+        return int(status[0]) != Status.NOT_ASSEMBLED
 
     def _kinetic(self, time: float, row: Array, sense: float, now: float) -> float:
         at = self.moment(time, row, sense, now)

@@ -5,7 +5,7 @@ They have no course over a cycle. Of dual numbers the derivatives are central di
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,15 +13,13 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import Dual, derivative, primal
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.batch import figures_in_time, one_by_one
+from trunnion.dynamics.batch import figures_in_time
 from trunnion.dynamics.prepared import CYCLES
-from trunnion.errors import Finding
 from trunnion.measures.evaluation import Curves, NumpyKernel, shape_of, step_of
 from trunnion.measures.measures import Measure
-from trunnion.results.sentences import finding_for
 from trunnion.solve.run import Run
 
-__all__ = ["MotionKernel", "courses_in_time", "numbers_in_time", "slow_motions", "unfound"]
+__all__ = ["MotionKernel", "courses_in_time", "numbers_in_time", "unfound"]
 
 Array = NDArray[np.float64]
 
@@ -35,13 +33,6 @@ class MotionKernel(NumpyKernel):
         """As `NumpyKernel.courses`; a measure of a motion in time is one number a sample."""
         found, status = super().courses(values, time)
         return found | courses_in_time(self.run, self.measures, values, shape_of(values, time)), status
-
-
-def slow_motions(run: Run, measures: Iterable[Measure], varied: Iterable[str]) -> Iterator[Finding]:
-    """A note where motions in time are integrated one by one. varied: paths of the numbers in which they differ."""
-    timed = [measure.name for measure in measures if measure.in_time]
-    if timed and (why := one_by_one(run, varied)):
-        yield finding_for("motions.one_by_one", f"measures.{timed[0]}", phrases={"why": why}, measures=timed)
 
 
 def unfound(run: Run, measure: Measure) -> dict[str, Any]:
@@ -67,42 +58,32 @@ def courses_in_time(
 
 
 def numbers_in_time(
-    run: Run, driver: str, duration: float | None, values: Mapping[str, Number], shape: tuple[int, ...],
-    times: Array | None = None,
-) -> dict[str, Number]:  # fmt: skip
-    """What `figures_in_time` tells, one number a sample or (sample, time), with derivatives where values are dual."""
+    run: Run, driver: str, duration: float | None, values: Mapping[str, Number], shape: tuple[int, ...]
+) -> dict[str, Number]:
+    """What `figures_in_time` tells, one number a sample, with derivatives where values are dual."""
     count = shape[0] if len(shape) == 2 else 1
     dual = {path: value for path, value in values.items() if isinstance(value, Dual)}
     own = {path: _column(primal(value), count) for path, value in values.items()}
     column = (count, 1) if len(shape) == 2 else (1,)
     if not dual:
-        figures = _known(run, driver, own, count, duration, times)
-        return {name: _row(figure, column) for name, figure in figures.items()}
+        return {name: figure.reshape(column) for name, figure in _known(run, driver, own, count, duration).items()}
     slopes = {path: np.broadcast_to(np.asarray(derivative(value), float), (count, 1)) for path, value in dual.items()}
     step = step_of(run, values, count)
     moved = np.flatnonzero(np.any(np.array(list(slopes.values())) != 0.0, axis=(0, 2)))
     tried = {path: _tried(value, slopes.get(path), step, moved) for path, value in own.items()}
-    figures = _known(run, driver, tried, count + 2 * len(moved), duration, times)
     found: dict[str, Number] = {}
-    for name, figure in figures.items():
-        change = np.zeros_like(figure[:count])
-        above, below = figure[count:].reshape(2, len(moved), *figure.shape[1:])
-        change[moved] = (above - below) / (2.0 * step[moved].reshape(-1, *[1] * (figure.ndim - 1)))
-        found[name] = Dual(_row(figure[:count], column), _row(change, column))
+    for name, figure in _known(run, driver, tried, count + 2 * len(moved), duration).items():
+        change = np.zeros(count)
+        above, below = figure[count:].reshape(2, len(moved))
+        change[moved] = (above - below) / (2.0 * np.ravel(step[moved]))
+        found[name] = Dual(figure[:count].reshape(column), change.reshape(column))
     return found
 
 
-def _row(figure: Array, column: tuple[int, ...]) -> Array:
-    """One number a sample as a column; numbers over time as they are."""
-    return figure.reshape(column) if figure.ndim == 1 else figure
-
-
-def _known(
-    run: Run, driver: str, values: Mapping[str, Number], count: int, duration: float | None, times: Array | None
-) -> dict[str, Array]:
+def _known(run: Run, driver: str, values: Mapping[str, Number], count: int, duration: float | None) -> dict[str, Array]:
     """`figures_in_time`; those of few samples are kept, as a search asks for the same ones measure by measure."""
-    if count > FEW or times is not None:
-        return figures_in_time(run, driver, values, count, duration, times=times)
+    if count > FEW:
+        return figures_in_time(run, driver, values, count, duration)
     kept: dict[Any, dict[str, Array]] = run.once("figures in time", dict)
     numbers = tuple((path, np.asarray(value, float).tobytes()) for path, value in values.items())
     what = driver, duration, count, numbers

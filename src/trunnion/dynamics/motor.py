@@ -58,20 +58,25 @@ class Drive:
         if self.clutched:
             found += [self.clutch_from, self.clutch_until]
         if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
-            found += list(self.parameters["points.place"])
+            found += self.parameters["points.place"]
         return [time for time in found if np.isfinite(time)]
-
-    def times_of(self, duration: float) -> list[Any]:
-        """Those before the end of a motion, for many drives at once (lane,): the end where one has none."""
-        found = [self.off_from, self.brake_from]
-        if self.motor is not None and self.motor.kind == "table" and self.motor.over == "time":
-            found += list(self.parameters["points.place"])
-        return [np.where((one > 0.0) & (one < duration), one, duration) for one in map(np.asarray, found)]
 
     @property
     def timed(self) -> bool:
         """Whether its effort may change while the coordinate rests."""
         return bool(self.times) or self.controlled
+
+    def switches(self, now: float) -> tuple[bool, bool, bool]:
+        """Whether the motor is off, the brake on and the clutch engaged. now: see `Moment`."""
+        return now >= self.off_from, now >= self.brake_from, self.engaged(now)
+
+    def switched(self, off: bool, braked: bool, engaged: bool) -> Drive:
+        """It as it is with these `switches`, at all times."""
+        never, ever = np.inf, -np.inf
+        return replace(
+            self, off_from=ever if off else never, brake_from=ever if braked else never,
+            clutch_from=ever if engaged else never, clutch_until=never,
+        )  # fmt: skip
 
     def shaft(self, time: Array, speed: Array, integral: Array, now: float) -> Array:
         """Effort at the motor's shaft. now: a time, s, that says what is switched on: within one stretch all is."""
@@ -149,7 +154,7 @@ def switched(drives_: Mapping[str, Drive], end: float) -> Iterator[tuple[float, 
 
 
 def drives(system: System, values: Values, number: Callable[[Any], Any] = float) -> dict[str, Drive]:
-    """What drives each free coordinate, by driver. number: what becomes of a value; points of a table are floats."""
+    """What drives each free coordinate, by driver. number: what becomes of a value."""
     found: dict[str, Drive] = {}
     for name, driver in system.mechanism.drivers.items():
         if not driver.found:
@@ -161,8 +166,7 @@ def drives(system: System, values: Values, number: Callable[[Any], Any] = float)
         own = {key.removeprefix(path): number(value) for key, value in values.items() if key.startswith(path)}
         parameters: dict[str, Any] = {"integral": 0.0, **own, "over": motor.over}
         for key in ("place", "effort"):
-            rows = range(len(motor.points or ()))
-            parameters[f"points.{key}"] = np.array([float(own[f"points.{k}.{key}"]) for k in rows])
+            parameters[f"points.{key}"] = [own[f"points.{k}.{key}"] for k in range(len(motor.points or ()))]
         known = ("ratio", "efficiency", "inertia", "off_from", "brake", "brake_from",
                  "clutch", "clutch_from", "clutch_until")  # fmt: skip
         found[name] = Drive(motor, parameters, **{key: own[key] for key in known if key in own})

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.solve.backward import Backward
@@ -24,6 +25,7 @@ __all__ = [
     "Seeing",
     "Seen",
     "Walks",
+    "bristle_rates",
     "powers_of",
     "seen_of",
     "works_of",
@@ -41,7 +43,7 @@ CLUTCH = "clutch"  # lost in a clutch that slips
 class Rates(NamedTuple):
     """Second derivatives (coordinate,), rates of the controllers' integrals (coordinate,), of the deflections
     (bristle,), of the works, W, and of a clutch's slip, if there is one. sound: whether there is one acceleration;
-    locked: whether friction has no solution; unique: whether no other acceleration can obey.
+    locked: whether friction has no solution.
     """
 
     second: Array
@@ -51,7 +53,6 @@ class Rates(NamedTuple):
     sound: bool
     locked: bool = False
     slip: Array = np.empty(0)
-    unique: bool = False
 
 
 class Dynamics(Protocol):
@@ -143,9 +144,13 @@ class Walks:
         ]).reshape(at.q.shape)  # fmt: skip
         sound = bool(np.all(found.converged & ~found.turned))
         locked = any(bool(np.any(np.less(one.share, 1.0))) for one in found.back.settled)
-        memory = bristle_rates(motion, at, found.back)[:, 0]
-        works = works_of(found.back, at._replace(onsets=found.onsets), motion.contacts)
+        memory = _of_one_lane(bristle_rates(motion, at, found.back))
+        works = _of_one_lane(works_of(found.back, at._replace(onsets=found.onsets), motion.contacts))
         return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
+
+    def seconds(self, at: Moment) -> Array:
+        """The accelerations, (coordinate, lane)."""
+        return self.motion.accelerate(at).second
 
     def margins(self, at: Moment) -> Array:
         """See `FreeMotion.margins`, (module, lane)."""
@@ -166,37 +171,39 @@ def seen_of(found: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:
     return Seen(*(np.array([np.broadcast_to(one[i], lanes) for one in parts]) for i in range(len(Seen._fields))))
 
 
-def works_of(back: Backward, at: Moment, contacts: Contacts | None = None) -> Array:
-    """Power of the drivers, loads and springs into the mechanism, and to friction and contacts, W; one lane."""
-    found = powers_of(back, 1)[:, 0]
-    if contacts is None or not contacts.each:
-        return found
-    contact = sum(float(np.ravel(push.loss)[0]) for _, push in contacts.pushes(back.walk, at.onsets))
-    return np.append(found, contact)
+def _of_one_lane(numbers: Sequence[Number]) -> Array:
+    return np.array([float(np.ravel(primal(number))[0]) for number in numbers])
+
+
+def works_of(back: Backward, at: Moment, contacts: Contacts) -> list[Number]:
+    """Power of the drivers, loads and springs into the mechanism, to friction, and to contacts if there are any, W."""
+    powers = _powers(back)
+    if contacts.each:
+        powers.append(sum((push.loss for _, push in contacts.pushes(back.walk, at.onsets)), 0.0))
+    return powers
 
 
 def powers_of(back: Backward, lanes: int) -> Array:
     """Power of the drivers, loads and springs into the mechanism, and to friction, W; (work, lane)."""
-    walk, stated = back.walk, back.walk.system.mechanism.loads
-    each = (
-        [effort * walk.rate(name) for name, effort in back.efforts.items()],
-        [power for name, power in back.load_powers.items() if name in stated],
-        [state.power for state in back.springs.values()],
-        [back.losses[joint] for joint in walk.system.joints],
-    )
-    found = np.zeros((len(each), lanes))
-    for row, powers in zip(found, each, strict=True):
-        for power in powers:
-            row += np.ravel(primal(power))
-    return found
+    return np.array([np.broadcast_to(primal(power), lanes) for power in _powers(back)], float)
 
 
-def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> Array:
-    """ż = v − d(v) z of every contact with a memory, m/s, (bristle, lane)."""
-    found = np.empty(at.bristles.shape)
-    for row, joint, deflection in zip(found, motion.bristles, at.bristles, strict=True):
+def _powers(back: Backward) -> list[Number]:
+    stated = back.walk.system.mechanism.loads
+    return [
+        sum((effort * back.walk.rate(name) for name, effort in back.efforts.items()), 0.0),
+        sum((power for name, power in back.load_powers.items() if name in stated), 0.0),
+        sum((state.power for state in back.springs.values()), 0.0),
+        sum((back.losses[joint] for joint in back.walk.system.joints), 0.0),
+    ]
+
+
+def bristle_rates(motion: FreeMotion, at: Moment, back: Backward) -> list[Number]:
+    """ż = v − d(v) z of every contact with a memory, m/s."""
+    rates = list[Number]()
+    for joint, deflection in zip(motion.bristles, at.bristles, strict=True):
         law, slip = law_of(motion.system, joint), primal(back.contacts[joint][0].slip)
         parameters = {key: motion.values[f"joints.{joint}.friction.{key}"] for key in law.parameters}
         assert law.relaxation is not None  # or it would have no bristles
-        row[:] = slip - law.relaxation(slip, **parameters) * deflection
-    return found
+        rates.append(slip - law.relaxation(slip, **parameters) * deflection)
+    return rates

@@ -14,7 +14,6 @@ from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
 from trunnion.dynamics.contact_motion import Impact
-from trunnion.dynamics.course import Courses as DriveCourses
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
@@ -458,7 +457,7 @@ def _summary(motion: FreeMotion, own: Found, run: Run, scales: Scales) -> Sequen
         # of others it is rounding; where nothing has inertia at a dead centre there is none
         if motion.system.mechanism.drivers[name].motor is not None and np.isfinite(peak[0]):
             found.append(_largest(f"{name}.effort_max", f"{noun} of {name}", effort, *peak))
-        found += steady_figures(motion, solution, i, DriveCourses.of_solution(motion, solution, i))
+        found += steady_figures(motion, solution, i)
     ended = solution.ended is not None and solution.ended.code == "simulate.change_point"
     if not ended and not any(event.kind == "change-point" for event in solution.events):  # there they have no bound
         for i, joint in enumerate(run.system.joints):

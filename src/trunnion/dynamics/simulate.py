@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_closed import compiled_closed
-from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
-from trunnion.dynamics.rates import Layout, Seeing, Walks
+from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
 from trunnion.dynamics.state import FreeMotion
@@ -136,12 +135,12 @@ def simulated(
         return _with_play(run, duration, steps, tolerance, progress, impact_step, evaluations, pass_change_points)
     motion = StickingMotion.of(run, passing=pass_change_points)
     known = places(motion)
-    rates, row, time = rates_of(motion, known), initial_row(motion), np.linspace(0.0, duration, steps + 1)
+    rates, row, time = rates_of(motion), initial_row(motion), np.linspace(0.0, duration, steps + 1)
     _check_start(motion, row, ranges(motion, motion.names, known))
 
     def found(tolerance: float) -> Found:
         motion.begin(None)
-        integration = integration_of(motion, known, duration, tolerance, progress, rates, evaluations)
+        integration = integration_of(motion, rates, known, duration, tolerance, progress, evaluations)
         solution = integration.run(row.copy())
         return Found.of(run, solution, time, lambda when: Filling(motion, solution, when).books())
 
@@ -208,8 +207,7 @@ def _integrating(motion: FreeMotion, impact_step: float | None) -> Callable[...,
     """What integrates a motion with joints in play."""
     if isinstance(motion, ClosedMotion):
         return partial(ImpactMotion, motion, ClosedRates(motion, compiled_closed(motion)), impact_step=impact_step)
-    rates: Seeing = compiled_rates(motion) or Walks(motion)
-    return partial(StickMotion if motion.resisted else ContactMotion, motion, rates)
+    return partial(StickMotion if motion.resisted else ContactMotion, motion, rates_of(motion))
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.algebra.namespace import Number
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.state import FreeMotion
 from trunnion.solve.switches import Mechanisms, bends
-from trunnion.solve.system import Cycle, Values
 
-__all__ = ["Places", "initial_row", "load_times", "nominal_motion", "placed", "places", "ranges"]
+__all__ = ["Places", "initial_row", "load_times", "places", "ranges"]
 
 Array = NDArray[np.float64]
 
@@ -95,8 +93,9 @@ def places(motion: FreeMotion) -> Places:
     """Of one free driver that alone moves the mechanism; of several, none are known beforehand."""
     if len(motion.system.mechanism.drivers) != 1:
         return Places()
-    run, cycle = motion.run, motion.cycle
-    begin, speed = map(_number, nominal_motion(motion, run.values))
+    run, cycle, (name,) = motion.run, motion.cycle, motion.names
+    nominal = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(run.values, name))
+    begin, speed = _number(nominal.value), _number(nominal.rate)
     meetings = [
         (time, module)
         for module, each in run.chosen.meetings.items()
@@ -104,27 +103,14 @@ def places(motion: FreeMotion) -> Places:
         for meeting in each
         for time in sorted(set(meeting))
     ]
+    met = tuple((begin + speed * time, module) for time, module in meetings)
     times = bends(Mechanisms(run.system, run.chosen.assembly, run.values, [cycle]))[0]
-    known = placed(np.append(times, [time for time, _ in meetings]), begin, speed, cycle)
-    return replace(known, meetings=tuple((begin + speed * time, module) for time, module in meetings))
-
-
-def nominal_motion(motion: FreeMotion, values: Values) -> tuple[Number, Number]:
-    """Coordinate and speed at which the one free driver is taken to begin its cycle."""
-    (name,) = motion.names
-    found = motion.system.mechanism.drivers[name].motion.function(0.0, motion.system.motion_of(values, name))
-    return found.value, found.rate
-
-
-def placed(times: Array, begin: float, speed: float, cycle: Cycle) -> Places:
-    """Coordinates from the times of bends in a cycle."""
-    coordinates = begin + speed * np.append(times, [0.0, cycle.duration][: 0 if cycle.periodic else 2])
+    coordinates, way = begin + speed * np.append(times, [time for time, _ in meetings]), abs(speed) * cycle.duration
     if cycle.periodic:
-        period = abs(speed) * cycle.duration
-        return Places(_apart(np.mod(coordinates, period), period), period)
-    ends = begin, begin + speed * cycle.duration
-    inside = coordinates[(coordinates > min(ends)) & (coordinates < max(ends))]
-    return Places(_apart(inside, ends[1] - ends[0]), None, (min(ends), max(ends)))
+        return Places(_apart(np.mod(coordinates, way), way), way, meetings=met)
+    low, high = sorted((begin, begin + speed * cycle.duration))
+    inside = coordinates[(coordinates > low) & (coordinates < high)]
+    return Places(_apart(inside, way), None, (low, high), met)
 
 
 def _apart(coordinates: Array, way: float) -> tuple[float, ...]:

@@ -151,6 +151,12 @@ class FreeMotion:
         return tuple(name for name in self.system.joints if name in held)
 
     @cached_property
+    def rests(self) -> bool:
+        """Whether the one free coordinate may rest in friction."""
+        held = any(np.isfinite(drive.brake_from) or drive.efficiency < 1.0 for drive in self.drives.values())
+        return len(self.names) == 1 and bool(self.sticking or held)
+
+    @cached_property
     def affine(self) -> bool:
         """Whether efforts are affine in the accelerations."""
         return not rubbing(self.system) and all(drive.efficiency == 1.0 for drive in self.drives.values())
@@ -229,10 +235,11 @@ class FreeMotion:
         which joints slide."""
         if at.senses:
             return {joint: float(sense) for joint, sense in zip(self.resisted, at.senses, strict=True)}
-        if len(self.names) != 1 or not self.sticking or not np.any(np.asarray(at.sense)):
+        if len(self.names) != 1 or not self.sticking or not np.any(at.sense):
             return {}
-        rate = np.broadcast_to(self.unit[0] ** 0.5, at.q.shape)
-        walk = self.walk(at._replace(rate=rate), np.zeros_like(at.q))
+        zero: Any = [0.0 * at.q[0]]
+        rate: Any = [np.sqrt(self.trial[0]) + zero[0]]
+        walk = self.walk(at._replace(rate=rate), zero)
         found: dict[str, Sense] = {}
         for joint in self.sticking:
             sign = np.where(walk.still(joint, self.system.turns(joint)), 0.0, np.sign(walk.speed(joint)))
@@ -260,19 +267,23 @@ class FreeMotion:
 
     # ---- accelerations ----------------------------------------------------------------------------------------
 
-    def given(self, at: Moment, second: Array, senses: Mapping[str, Sense] | None = None) -> Array:
-        """What the motors give, less the brakes, (coordinate, lane). senses: shares of what resists the joints that
+    def driven(self, at: Moment, second: Any, senses: Mapping[str, Sense]) -> list[Number]:
+        """What the motors give, less the brakes, of each coordinate. senses: shares of what resists the joints that
         stick, and senses of those that slide, where several coordinates are free."""
-        found = []
+        efforts = list[Number]()
         for i, (name, own) in enumerate(self.drives.items()):
             rate, drive = at.rate[i], own.seen(at.now, at.slips)
-            if at.senses and senses and name in senses:
-                found.append(drive.resisted(at.time, rate, second[i], at.integral[i], at.now, senses[name]))
+            if at.senses and name in senses:
+                efforts.append(drive.resisted(at.time, rate, second[i], at.integral[i], at.now, senses[name]))
                 continue
             effort = drive.effort(at.time, rate, second[i], at.integral[i], at.now, at.sense)
             sense = np.where(rate != 0.0, np.sign(rate), at.sense)
-            found.append(effort - sense * drive.braking(at.now))
-        return np.array(found).reshape(at.q.shape)
+            efforts.append(effort - sense * drive.braking(at.now))
+        return efforts
+
+    def given(self, at: Moment, second: Array, senses: Mapping[str, Sense] | None = None) -> Array:
+        """The same of many lanes, (coordinate, lane)."""
+        return np.array(self.driven(at, second, senses or {})).reshape(at.q.shape)
 
     def demanded(self, back: Backward, shape: tuple[int, ...]) -> Array:
         """Efforts that a walk demands of the free drivers, (coordinate, lane)."""

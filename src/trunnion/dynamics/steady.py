@@ -8,10 +8,10 @@ import numpy as np
 
 from trunnion.cycle import summary
 from trunnion.cycle.positions import Positions, positions
-from trunnion.dynamics.course import Courses
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.repeated import Repeated, motion_law
+from trunnion.dynamics.started import DriveCourse
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.steady_cycle import INDIFFERENT, SteadyCycle, refuse_unsteady, steady_cycle
 from trunnion.errors import Finding, MechanismError, Status
@@ -75,9 +75,9 @@ def _missing(found: SteadyCycle, at: Positions) -> float:
 def _figures(found: SteadyCycle, each: Sequence[Repeated], missing: float) -> list[Figure]:
     """What is said of a steady cycle before what is said of any cycle."""
     name, one = found.motion.names[found.first], each[found.first]
-    course = Courses.of_solution(found.motion, found.solution, found.first)
-    speed, mean = course.numbers[2], abs(one.advance) / one.period
-    most, least = float(course.largest(np.abs(speed))[0]), -float(course.largest(-np.abs(speed))[0])
+    course, mean = DriveCourse.of(found.motion, found.solution, found.first), abs(one.advance) / one.period
+    speed = np.abs(course.speed)
+    most, least = course.largest(speed), -course.largest(-speed)
     return [
         Figure("cycle_time", "time of the cycle", one.period, "s"),
         Figure(f"{name}.speed_mean", f"speed of {name}", mean, "rad/s", "mean"),

@@ -16,15 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.course import Courses
+from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.followed import Snapshot
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.opened import in_play
 from trunnion.dynamics.prepared import FINEST, integration_of, rates_of
-from trunnion.dynamics.rates import Dynamics, Layout
+from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.result import motion_findings
 from trunnion.dynamics.solution import Solution
 from trunnion.dynamics.start import Places, initial_row, places
+from trunnion.dynamics.started import DriveCourse
 from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
@@ -126,16 +127,16 @@ def steady_cycle(
         what = "no free driver goes round, so there is no steady cycle"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}", "leave --steady out"))
     known = places(motion)
-    rates = rates_of(motion, known)
+    rates = rates_of(motion)
     unstable = None  # one that no run-up comes to, unless it begins there
     for longer in LONGER:
         end = longer * duration
-        integration = integration_of(motion, known, end, tolerance, progress, rates, evaluations)
+        integration = integration_of(motion, rates, known, end, tolerance, progress, evaluations)
         solution = integration.run(initial_row(motion))
-        course = Courses.of_solution(motion, solution, first)
+        course = DriveCourse.of(motion, solution, first)
         if solution.ended or solution.stretches[-1].resting:
             break
-        if not course.runs[0]:
+        if not course.runs:
             continue
         section = Section.of(motion, known, rates, max(FINER * tolerance, FINEST), solution, course, first)
         found = section.repeated()
@@ -147,13 +148,13 @@ def steady_cycle(
     raise UnsteadyError(_why(motion, solution, course, first))
 
 
-def _why(motion: FreeMotion, solution: Solution, course: Courses, first: int) -> list[Finding]:
+def _why(motion: FreeMotion, solution: Solution, course: DriveCourse, first: int) -> list[Finding]:
     """Why there is no steady cycle, from the end of the longest run-up."""
-    name, turns = motion.names[first], float(course.gone[0]) / TURN
-    if not course.runs[0] or solution.ended or solution.stretches[-1].resting:
+    name, turns = motion.names[first], course.travel / TURN
+    if not course.runs or solution.ended or solution.stretches[-1].resting:
         none = finding_for("simulate.not_round", f"drivers.{name}", driver=name, turns=turns, time=solution.end)
         return [none, *motion_findings(motion, solution, motion.run)]
-    takes = [float(course.at(course.gone - k * TURN, 0)[0]) for k in range(3)]
+    takes = [course.at(course.travel - k * TURN, course.time) for k in range(3)]
     before, last = (TURN / (takes[k] - takes[k + 1]) for k in (1, 0))
     where, change = f"drivers.{name}", last - before
     return [finding_for("simulate.not_repeating", where, driver=name, speed=last, change=change, time=solution.end)]
@@ -168,7 +169,7 @@ class Section:
 
     motion: FreeMotion
     known: Places
-    rates: Dynamics
+    rates: CompiledRates | Walks
     tolerance: float
     first: int
     begin: float
@@ -179,17 +180,17 @@ class Section:
 
     @classmethod
     def of(
-        cls, motion: FreeMotion, known: Places, rates: Dynamics, tolerance: float, solution: Solution,
-        course: Courses, first: int,
+        cls, motion: FreeMotion, known: Places, rates: CompiledRates | Walks, tolerance: float, solution: Solution,
+        course: DriveCourse, first: int,
     ) -> Section:  # fmt: skip
         """The last passage of a run-up through the begin of the cycle."""
         way = known.period if known.period is not None else TURN
-        start, gone = float(course.numbers[1, 0, 0, 0]), float(course.gone[0])
-        sense = 1.0 if course.numbers[1, 0, -1, -1] > start else -1.0
+        start, gone = float(course.coordinate[0, 0]), course.travel
+        sense = 1.0 if course.coordinate[-1, -1] > start else -1.0
         begin = float(np.ravel(primal(motion.system.drive(motion.values, motion.names[first], 0.0)[0]))[0])
         ahead = np.mod(sense * (begin - start), way)
         passed = ahead + way * np.floor((gone - ahead) / way)
-        time, before = (float(course.at(np.array([max(at, 0.0)]), 0)[0]) for at in (passed, passed - way))
+        time, before = (course.at(max(at, 0.0), course.time) for at in (passed, passed - way))
         rows, which = solution.at(np.array([time]))
         snapshot = solution.stretches[which[0]].snapshot
         if snapshot is not None:
@@ -230,19 +231,19 @@ class Section:
             self.motion.begin(self.snapshot)
             integration = self._integration(longer * self.takes)
             solution = integration.run(row)
-            course = Courses.of_solution(self.motion, solution, self.first)
-            gone = np.sign(self.way) * (course.numbers[1, 0] - self.begin).ravel()
+            course = DriveCourse.of(self.motion, solution, self.first)
+            gone = np.sign(self.way) * (course.coordinate - self.begin).ravel()
             if np.any(np.diff(gone) < -BACKWARD) or not len(solution.stretches):
                 return None
             if gone[-1] >= abs(self.way):
-                period = float(course.at(np.array([abs(self.way)]), 0)[0])
+                period = course.at(abs(self.way), course.time)
                 return Passage(solution.at(np.array([period]))[0][self._numbers, 0], period, _until(solution, period))
             if solution.ended:
                 return None
         return None
 
     def _integration(self, duration: float) -> Integration:
-        return integration_of(self.motion, self.known, duration, self.tolerance, rates=self.rates)
+        return integration_of(self.motion, self.rates, self.known, duration, self.tolerance)
 
     def _miss(self, state: Array, passage: Passage, scale: Array) -> Array:
         """P(x) − x, in parts of what is typical."""

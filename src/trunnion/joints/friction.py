@@ -28,6 +28,8 @@ __all__ = [
     "viscous",
 ]
 
+GONE = -700.0  # of which e^x leaves nothing of a coefficient, and which machine code still takes
+
 
 @dataclass(frozen=True)
 class LawParameter:
@@ -187,7 +189,8 @@ def lugre_relaxation(slip: Number, **parameters: Number) -> Number:
 def _stribeck_curve(slip: Number, parameters: Mapping[str, Number]) -> Number:
     """Coefficient of steady sliding without its viscous part."""
     f, ratio = parameters["coefficient"], slip / parameters["stribeck_speed"]
-    return f + (parameters["static"] - f) * namespace(ratio).exp(-(ratio * ratio))
+    xp = namespace(ratio)
+    return f + (parameters["static"] - f) * xp.exp(xp.maximum(-(ratio * ratio), GONE))
 
 
 def rolling_bearing(normal: Number, slip: Number, **parameters: Number) -> Number:

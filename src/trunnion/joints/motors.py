@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.algebra.spline import look_up
+
 __all__ = [
     "MOTORS",
     "MotorKind",
@@ -27,7 +29,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-# What a motor states, by key, SI; `points` and the like are arrays.
+# What a motor states, by key, SI; of `points` lists.
 Parameters = Mapping[str, Any]
 
 
@@ -78,8 +80,9 @@ def induction(speed: Array, time: Array, parameters: Parameters, integral: Array
 
 def table(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:
     """Points (speed or time, effort) joined by straight lines; before the first and after the last the effort stays."""
-    place = time + 0.0 * speed if parameters["over"] == "time" else speed
-    return np.interp(place, parameters["points.place"], parameters["points.effort"])
+    knots, place = parameters["points.place"], time + 0.0 * speed if parameters["over"] == "time" else speed
+    found: Array = look_up(knots, parameters["points.effort"], np.clip(place, knots[0], knots[-1]))
+    return found
 
 
 def speed_control(speed: Array, time: Array, parameters: Parameters, integral: Array) -> Array:

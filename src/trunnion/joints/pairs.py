@@ -179,10 +179,6 @@ class PlanarContactLoad(NamedTuple):
         arm = None if self.arm is None else (change(self.arm[0]), change(self.arm[1]))
         return PlanarContactLoad(across, change(self.length), arm)
 
-    def sides(self, reaction: Reaction) -> tuple[Number, Number]:
-        """F_n and 2 M/length of a guide, N: the larger of their sizes is its normal load."""
-        return self._across(reaction), self._couple(reaction)
-
     def _across(self, reaction: Reaction) -> Number:
         """F_n."""
         if self.across is None:

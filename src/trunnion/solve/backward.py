@@ -26,8 +26,8 @@ from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
-    "Backward", "Given", "Sense", "backward", "body_loads", "pass_on", "sense_of", "solve",
-    "stated_actions", "under", "unloaded",
+    "Backward", "Given", "Sense", "backward", "pass_on", "sense_of", "solve",
+    "under", "unloaded",
 ]  # fmt: skip
 
 
@@ -172,21 +172,6 @@ def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
         reactions = walk.reactions(number, [back.loads[link] for link in module.links], group)
         pass_on(back, number, reactions, (), (), toothed=False)
     return back
-
-
-def body_loads(walk: Forward) -> dict[str, Any]:
-    """Gravity and inertia of every link."""
-    back = Backward(walk, unloaded(walk))
-    _add_body_loads(back)
-    return back.loads
-
-
-def stated_actions(walk: Forward, zero_slip: Mapping[str, Sense]) -> tuple[dict[str, Any], Number, Number]:
-    """What the stated loads and springs do to every link, and the power of both, W. zero_slip: see `Given`."""
-    back = Backward(walk, unloaded(walk))
-    _add_stated_loads(back, zero_slip, ())
-    powers = sum(back.load_powers.values(), 0.0), sum((state.power for state in back.springs.values()), 0.0)
-    return back.loads, *powers
 
 
 def unloaded(walk: Forward) -> dict[str, Any]:

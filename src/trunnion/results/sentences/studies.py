@@ -226,11 +226,6 @@ TOLERANCE = {
         "{count:,} of {samples:#sample} ({share:.2%}) could not be solved: {why}",
         "they count as outside every limit; mean and standard deviation are of the others",
     ),
-    "motions.one_by_one": Sentence(
-        NOTE,
-        "motions in time are integrated one by one, which is slower by far: {why}",
-        "begin with few samples or points",
-    ),
     "samples.engine": Sentence(NOTE, "the samples are computed by the engine {engine}", quiet=True),
 }
 

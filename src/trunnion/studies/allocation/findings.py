@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion.dynamics.measured import slow_motions
 from trunnion.errors import Finding, Severity
 from trunnion.results.dataset import units_along
 from trunnion.results.figure import Figure
@@ -49,9 +48,8 @@ def summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> I
 
 def findings_of(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
     """Why there is no allocation; that it is proven; limits that are not kept on the mechanism itself."""
-    answer, study = found.answer, found.study
+    answer = found.answer
     yield from found.findings
-    yield from slow_motions(study.run, (of.measure for of in study.linear.measures), study.inputs.names)
     yield from answer.findings
     if not answer.found:
         return

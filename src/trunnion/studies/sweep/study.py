@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from trunnion.cycle.cycle_kernel import Engine
 from trunnion.cycle.scales import peak, scales_of
 from trunnion.cycle.summary import inputs, member_units, references
-from trunnion.dynamics.measured import slow_motions, unfound
+from trunnion.dynamics.measured import unfound
 from trunnion.errors import Finding, Severity, Status, counted
 from trunnion.joints.pairs import PAIRS
 from trunnion.measures.measures import Measure
@@ -93,7 +93,6 @@ def sweep(
     found = [*_answers(points.swept, arrays), *_shared(points), *left_out(mechanism, measures)]
     found = _with_bare(mechanism, points.swept, found)
     found += [*_no_efficiency(points, arrays), *_not_steady(points, watched.values(), arrays)]
-    found += slow_motions(points.run, watched.values(), (one.path for one in points.swept))
     if not points.erring:
         of_errors = {name for name, one in FIGURES.items() if one.part == "errors"}
         arrays = {name: array for name, array in arrays.items() if name not in of_errors}

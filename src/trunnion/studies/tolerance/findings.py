@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.cycle.findings import model_notes, shared_dimensions
 from trunnion.cycle.scales import scales_of
-from trunnion.dynamics.measured import slow_motions, unfound
+from trunnion.dynamics.measured import unfound
 from trunnion.errors import Finding, Severity, Status
 from trunnion.model.checks.values import check_values
 from trunnion.model.parameters import measured
@@ -115,7 +115,6 @@ def findings_of(outcome: Outcome, counted: Sampled | None) -> Iterator[Finding]:
     if study.effects.correlated:
         yield finding_for("tolerance.correlations_left_out", "correlations")
     yield from shared_dimensions(mechanism)
-    yield from slow_motions(study.run, (of.measure for of in study.linear.measures), study.inputs.names)
     yield from _measured(outcome)
     yield from _impossible(outcome)
     yield from _range_ends(outcome)

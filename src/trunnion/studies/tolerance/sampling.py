@@ -34,7 +34,7 @@ METHODS: tuple[Method, ...] = ("monte-carlo", "quasi-monte-carlo")
 
 BATCHES = 8  # of the kernel in a block, so that what a block costs by itself is little beside the analysis
 MOST = 2048  # samples in a block
-MOTIONS = 480  # the same of motions in time, each of which takes as long as a cycle of many positions
+MOTIONS, MOTION = 16, 30_000  # samples in a block with motions in time; positions that take about as long as one
 REPLICATES = 8  # independent scramblings, whose spread is the error
 CURVES = 1 << 22  # numbers of the curves of a measure that are kept, for the bands over the cycle
 
@@ -89,6 +89,12 @@ class Sampling:
         if any(measure.in_time for measure in self.measures):
             return MOTIONS
         return max(1, min(BATCHES * batch_of("numpy", self.positions), MOST))
+
+    @property
+    def work(self) -> int:
+        """Positions of all samples, with as many for each motion in time as take as long."""
+        motions = {(measure.subject, measure.duration) for measure in self.measures if measure.in_time}
+        return self.samples * (self.positions + MOTION * len(motions))
 
     @cached_property
     def _points(self) -> int:

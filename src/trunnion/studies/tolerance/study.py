@@ -81,7 +81,7 @@ def tolerance(
         engine, chosen = _engine(found, engine, samples, cluster)
         job = found.sampling(method, samples, seed, engine)
         if jobs is None:
-            jobs = 1 if job.samples * job.positions < FEW and cluster is None else None
+            jobs = 1 if job.work < FEW and cluster is None else None
 
         def tell(share: float) -> None:
             if progress is not None:

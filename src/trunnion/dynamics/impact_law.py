@@ -38,24 +38,22 @@ class Struck(NamedTuple):
     kept: float = 1.0
 
 
-def strike(
-    delassus: Array, before: Array, restitution: Array, friction: Array, old: Array | None = None
-) -> Struck | None:
+def strike(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:
     """The impact at some places; None if no case fits.
 
     delassus: G, 1/kg, (2 places, 2 places); before: γ⁻, m/s, (2 places,), normals first; restitution, friction: of each
-    place; old: rates to which the restitution refers, where forces have changed them since.
+    place.
     Newton's law may gain energy where friction turns the slip round (T. R. Kane, D. A. Levinson, Dynamics: Theory and
     Applications, McGraw-Hill, 1985); the restitutions are then lowered together until nothing is gained, for without
     any the law always loses.
     """
-    found = _struck(delassus, before, restitution, friction, old)
+    found = _struck(delassus, before, restitution, friction)
     if found is None or found.loss >= -CLOSE * _energy(found, before):
         return found
     low, high, best = 0.0, 1.0, None
     for _ in range(HALVINGS):
         share = 0.5 * (low + high) if best is not None else 0.0
-        tried = _struck(delassus, before, share * restitution, friction, old)
+        tried = _struck(delassus, before, share * restitution, friction)
         if tried is not None and tried.loss >= 0.0:
             low, best = share, tried._replace(kept=share)
         elif best is None:
@@ -69,17 +67,16 @@ def _energy(found: Struck, before: Array) -> float:
     return float(np.abs(found.impulse) @ (np.abs(before) + np.abs(found.after)))
 
 
-def _struck(delassus: Array, before: Array, restitution: Array, friction: Array, old: Array | None) -> Struck | None:
+def _struck(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:
     """The first case that fits."""
     places = len(restitution)
-    first = before if old is None else old
-    back = -restitution * np.minimum(first[:places], 0.0)
+    back = -restitution * np.minimum(before[:places], 0.0)
     speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
     for cases in _cases(friction, before):
         found = _solved(delassus, before, back, friction, cases)
         if found is not None and _fits(*found, back, friction, cases, speed):
             impulse, after = found
-            loss = -0.5 * float(impulse @ (first + after))
+            loss = -0.5 * float(impulse @ (before + after))
             return Struck(impulse, after, cases, loss)
     return None
 

@@ -3,7 +3,7 @@
 A step ends where a gap closes, and Newton's law gives the rates after it (`impact_law`). Where the rebounds become
 lower than what the gap is known to, the impacts accumulate: the contact closes, and stays so under a force that keeps
 its gap at 0 (`closed`), until that force becomes 0. A closed contact slips or sticks; a change of that ends a step,
-too. Where there are impacts without end the time is stepped from then on (`impact_steps`).
+too. Where impacts of several places crowd without end, one without restitution ends them.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact, step_nodes
-from trunnion.dynamics.impact_law import OPEN, Struck
-from trunnion.dynamics.impact_steps import SteppedMotion
+from trunnion.dynamics.closed import ClosedMotion, ClosedRates, Linear
+from trunnion.dynamics.contact_motion import ContactMotion, Crossing, Dense, Impact, OpenContact, step_nodes
+from trunnion.dynamics.impact_law import OPEN, Struck, strike
 from trunnion.dynamics.rates import Seen
-from trunnion.dynamics.solution import Stretch
-from trunnion.dynamics.state import Accelerated
+from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.state import Accelerated, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ImpactMotion"]
@@ -33,36 +33,30 @@ Onsets = tuple[Onset, ...]
 LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
 MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
 CROWD, CROWDED = 100, 1e-9  # events within so much of the duration: they have no end
-STEPPED = 1e-4  # of a cycle: the step from there on
 FLIGHT = 0.1  # of the time to the next impact: the first step after one
 SMALL = 1e-9  # of the largest force or acceleration: what is 0 but for rounding
 STILL = 1e-12  # of the speeds of an impact: a slip that is 0
 
 
 @dataclass
-class ImpactMotion(SteppedMotion):
+class ImpactMotion(ContactMotion):
     """An integration that follows the impacts of rigid bodies from event to event."""
 
     recent: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        assert isinstance(self.motion, ClosedMotion)
+        assert isinstance(self.dynamics, ClosedRates)
+        self.closed_rates = self.dynamics
+        self.rigid, each = self.motion, self.motion.contacts.each
+        self.count = len(each)
+        self.friction = np.array([one.coefficient for one in each])
+        self.restitution = np.array([one.restitution for one in each])
         size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
         self.pull = size * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
         self.meet = MEET * self.motion.contacts.least_clearance
         self.low = np.array([max(LOW * one.clearance, ROUNDED * size) for one in self.motion.contacts.each])
-
-    def _move(
-        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
-    ) -> tuple[float, Array, float | None]:
-        """Move until something changes at a contact, or the next break; step through where that has no end."""
-        if len(self.recent) == CROWD and self.recent[-1] - self.recent[0] < CROWDED * self.duration:
-            self.impact_step = STEPPED * (self.motion.cycle.duration or self.duration)
-            self.solution.notes["simulate.stepped"] = {"time": time, "step": self.impact_step}
-            self.recent.clear()
-        if self.impact_step is not None:
-            return SteppedMotion._move(self, time, row, until, sense, now, step)
-        return super(SteppedMotion, self)._move(time, row, until, sense, now, step)
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
@@ -88,9 +82,8 @@ class ImpactMotion(SteppedMotion):
         return found
 
     def _measured(self, stretch: Stretch) -> None:
-        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step; where
-        it is stepped they are those of the impulses."""
-        if not self._open or self.solution.stepped:
+        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step."""
+        if not self._open:
             return
         times, weights = step_nodes(stretch.begin, stretch.end)
         seen = self._touches(stretch.state, times)
@@ -139,22 +132,66 @@ class ImpactMotion(SteppedMotion):
         rates = linear.driven + linear.ways @ at.rate[:, 0]
         meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
-        found, pauses = self._law(linear, places, rates, self.restitution), dict[int, float]()
+        crowded = len(self.recent) == CROWD and self.recent[-1] - self.recent[0] < CROWDED * self.duration
+        restitution = np.zeros(self.count) if crowded else self.restitution
+        found, pauses = self._law(linear, places, rates, restitution), dict[int, float]()
         if found is not None:
             flights = self._flights(time, row, places, rates, *found)
             pauses = {i: pause for i, (pause, low) in flights.items() if low}
             if pauses:
-                restitution = np.where([i in pauses for i in range(self.count)], 0.0, self.restitution)
+                restitution = np.where([i in pauses for i in range(self.count)], 0.0, restitution)
                 found = self._law(linear, places, rates, restitution)
         if found is None:
             self._stop("no_contact_force", time, row)
             return np.inf
         struck, change = found
-        if struck.kept < 1.0:
-            self._lowered(time, struck.kept)
+        if crowded:
+            self.recent.clear()
+        if crowded or struck.kept < 1.0:
+            self._lowered(time, 0.0 if crowded else struck.kept)
         self._strike_off(row, change, self._driven(at, change, struck, places, linear.driven), struck.loss)
         self._after(time, row, places, rates, struck, pauses)
         return FLIGHT * min((pause for pause, low in flights.values() if not low), default=np.inf)
+
+    def _law(self, linear: Linear, places: list[int], rates: Array, restitution: Array) -> tuple[Struck, Array] | None:
+        """The law's answer at some places, and the change of the rates of the coordinates. rates: of gaps and slips of
+        all contacts."""
+        rows = [*places, *(self.count + k for k in places)]
+        ways = linear.ways[rows]
+        spread = np.linalg.solve(linear.mass, ways.T)
+        struck = strike(ways @ spread, rates[rows], restitution[places], self.friction[places])
+        return None if struck is None else (struck, spread @ struck.impulse)
+
+    def _driven(self, at: Moment, change: Array, struck: Struck, places: list[int], driven: Array) -> float:
+        """Work that drivers whose motion is stated do in an impact, J."""
+        names = [name for name in self.motion.system.mechanism.drivers if name not in self.motion.names]
+        if not names:
+            return 0.0
+        free = at._replace(onsets=(None,) * self.count)
+        still, struck_so = (self.motion.solve(free, second) for second in (0.0 * at.q, change[:, None]))
+        given = sum(
+            float(np.ravel(primal((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)))[0])
+            for name in names
+        )
+        rows = [*places, *(self.count + k for k in places)]
+        return given - float(struck.impulse @ driven[rows])
+
+    def _strike_off(self, row: Array, change: Array, drive: float, loss: float) -> None:
+        """Let an impact change a row: rates, and the works of drivers and contacts."""
+        n, works = self.layout.coordinates, self.layout.works(row)
+        row[n : 2 * n] += change
+        works[0] += drive
+        works[-1] += loss
+
+    def _say(self, time: float, kind: str, k: int, figure: float) -> None:
+        self.solution.events.append(Event(time, kind, self.motion.contacts.labels[k], figure, "m/s"))
+
+    def _end(self, k: int, time: float, rate: float) -> None:
+        """A contact lifts off."""
+        one = self._open.pop(k)
+        label = self.motion.contacts.labels[k]
+        self.impacts.append(Impact(label, one.begin, time, one.approach, rate, one.force, 0.0, one.wear, one.impulse))
+        self._say(time, "lift-off", k, rate)
 
     def _lowered(self, time: float, kept: float) -> None:
         """Take down that an impact kept less than its restitution."""

@@ -315,7 +315,7 @@ WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 def _unbalanced(found: Found) -> Iterator[Finding]:
     if found.share > WORST:
-        yield finding_for("simulate.energy_stepped" if found.solution.stepped else "simulate.energy", share=found.share)
+        yield finding_for("simulate.energy", share=found.share)
 
 
 def _undefined(books: Books) -> Iterator[Finding]:

@@ -404,7 +404,7 @@ _STICKING = (
     ),
     Fault(
         "shares-that-are-not-the-least",
-        "dynamics/sticking.py",
+        "dynamics/bordered.py",
         "abs(normal @ wanted) / whole <= best",
         "abs(normal @ wanted) / whole >= best >= 0.0",
         ("tests/invariants/test_least_shares.py",),

@@ -9,11 +9,11 @@ import pytest
 
 import trunnion.dynamics.impact_motion as impact_motion
 from trunnion import simulate
-from trunnion.dynamics.closed import ClosedMotion, ClosedRates, rates_of
 from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.opened import opened
-from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
+from trunnion.dynamics.state import FreeMotion, rates_of
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.touching import Closed
 from trunnion.errors import MechanismError
@@ -263,10 +263,9 @@ def test_machine_code_of_closed_contacts_and_walks() -> None:
     """Rates, works, forces of contacts and what impulses come to, for contacts that fly, slip and stick."""
     mechanism = trammel()
     run = prepare(mechanism)
-    motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, ["H", "V"]))
-    swift, layout = compiled_closed(motion), Layout.of(motion)
-    assert swift is not None
-    fast, slow = ClosedRates(motion, swift), ClosedRates(motion, None)
+    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, ["H", "V"]))
+    fast, slow, layout = compiled_closed(motion), Walks(motion), Layout.of(motion)
+    assert fast is not None
     row = initial_row(motion)
     row[layout.coordinates : 2 * layout.coordinates] = [0.3, -0.2, 0.5, 2.0, -1.0]
     fly: Any = (None,) * 8
@@ -277,7 +276,6 @@ def test_machine_code_of_closed_contacts_and_walks() -> None:
         assert found == pytest.approx(expected, rel=1e-10, abs=1e-9)
         at = layout.moment(np.zeros(2), np.column_stack([row, row]))._replace(onsets=onsets)
         if closed:
-            assert swift.touches(at) is not None
             for here, there in zip(fast.touches(at), slow.touches(at), strict=True):
                 np.testing.assert_allclose(here, there, rtol=1e-10, atol=1e-10)
     one = layout.moment(np.zeros(1), row[:, None])._replace(onsets=fly)
@@ -329,7 +327,7 @@ def test_gaps_and_slips_accelerate_as_their_rates_change(mechanism: Mechanism) -
     """Against central differences of the rates along a motion."""
     run, random = prepare(mechanism), np.random.default_rng(7)
     playing = [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
-    motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, playing))
+    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, playing))
     layout, row = Layout.of(motion), initial_row(motion)
     q, rate, second = (random.normal(size=(len(motion.names), 1)) * size for size in (0.2, 30.0, 500.0))
     q[:, 0] = 0.02 * q[:, 0] + row[: len(q)] + 0.3

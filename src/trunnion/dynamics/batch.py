@@ -21,7 +21,6 @@ from trunnion.dynamics.sampled import picked, sampled_tables, tabulates
 from trunnion.dynamics.start import initial_row, nominal_motion, places
 from trunnion.dynamics.starts import ENDED, LEFT, Starts
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.sticking import StickingMotion
 from trunnion.dynamics.tables import Tables
 from trunnion.errors import MechanismError
 from trunnion.solve.run import Run
@@ -129,7 +128,7 @@ def _alone(
     """The figures of one motion by itself; none where it cannot begin or ends before its time."""
     try:
         own = Run(run.system, values, run.system.cycle(values), run.chosen)
-        motion = StickingMotion.of(own)
+        motion = FreeMotion.of(own)
         known = places(motion)
         row = initial_row(motion)
         if not known.limits[0] <= row[0] <= known.limits[1]:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.energy import kinetic_energy
-from trunnion.dynamics.state import Accelerated, Moment, repeated
-from trunnion.dynamics.sticking import RANK, StickingMotion
+from trunnion.dynamics.state import Accelerated, FreeMotion, Moment, repeated
 
 __all__ = ["Case", "Cases", "Lock", "Senses"]
 
@@ -57,7 +57,7 @@ class Lock(NamedTuple):
 class Cases:
     """The cases of a motion whose joints stick one by one; moments of one lane. pace: a typical rate."""
 
-    free: StickingMotion
+    free: FreeMotion
     pace: float
 
     def of(self, at: Moment, before: Senses, crossed: int | None = None) -> Case:

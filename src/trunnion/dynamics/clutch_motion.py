@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
+from trunnion.dynamics.guards import first_crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.rates import WORKS, Dynamics, Rates
@@ -32,7 +32,6 @@ Array = NDArray[np.float64]
 
 LOOKED = 8  # parts of a step at whose ends slip and carried effort are looked at
 LANES = ("time", "q", "rate", "integral", "bristles", "slip")
-EXACT = 1e-14  # of the time: to which an event is located
 ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
 
 
@@ -146,23 +145,19 @@ class ClutchMotion(Integration):
     def _add(self, stretch: Stretch) -> None:
         """Add a step, up to where the slip becomes 0 or a clutch that holds carries its capacity."""
         stretch = stretch._replace(slips=self.slips, resting=stretch.resting or self.resting)
-        times = np.linspace(stretch.begin, stretch.end, LOOKED + 1)
-        left = self._left(stretch, times)
-        over = np.flatnonzero(left[1:] < 0.0)
-        if not len(over):
+        times = np.linspace(stretch.begin, stretch.end, LOOKED + 1)[1:]
+        crossing = first_crossing(lambda moments: self._left(stretch, moments)[None], stretch.begin, times)
+        if crossing is None:
             super()._add(stretch)
             return
-        low, high = float(times[over[0]]), float(times[over[0] + 1])
-        if left[over[0]] > 0.0:
-            low = brentq(lambda t: float(self._left(stretch, np.array([t]))[0]), low, high, xtol=EXACT * high)
-        super()._add(stretch._replace(end=low))
-        row = stretch.state(np.array([low]))[:, 0]
+        super()._add(stretch._replace(end=crossing.time))
+        row = stretch.state(np.array([crossing.time]))[:, 0]
         if self.slips:
             row[self.layout.slip] = 0.0
         else:
-            at = self._held(stretch, np.array([high]))
+            at = self._held(stretch, np.array([crossing.time]))
             self.let_go = float(np.sign(self._carried(at, stretch.resting)[0]))
-        raise _Changed(low, row)
+        raise _Changed(crossing.time, row)
 
     def _left(self, stretch: Stretch, times: Array) -> Array:
         """What is left of the slip, or of the capacity of a clutch that holds; below 0 it has changed."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 from scipy.optimize import brentq
 
+from trunnion.dynamics.guards import Crossing, first_crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seeing, Seen
 from trunnion.dynamics.solution import Event, Stretch
@@ -32,7 +33,6 @@ Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 CLOSELY = 33  # times about a largest force
 GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
 LOOKS = 12  # times within a step at which gaps are looked at
-FINE = 40  # halvings towards the beginning of a step, where a gap that has just changed its sign is next to nothing
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
 
 
@@ -65,13 +65,6 @@ class OpenContact:
     impulse: float = 0.0
     separation: float = 0.0
     loss: float = 0.0
-
-
-class Crossing(NamedTuple):
-    """A gap that changes its sign: contact, and time, s."""
-
-    contact: int
-    time: float
 
 
 @dataclass
@@ -111,7 +104,7 @@ class ContactMotion(Integration):
                 return self._failed(before, held, sense, now, failed)
             dense, after = solver.dense_output(), float(solver.t)
             times = before + (after - before) * np.arange(1, LOOKS + 1) / LOOKS
-            crossing = self._first(dense, before, times)
+            crossing = first_crossing(lambda moments, dense=dense: self._gaps(dense, moments), before, times)
             end = after if crossing is None else crossing.time
             self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets, self.senses))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
@@ -123,17 +116,15 @@ class ContactMotion(Integration):
         return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
-        """The derivative of a row by time, by machine code where there is any."""
-        derivative = getattr(self.dynamics, "derivative", None)
-        if derivative is None:
-            return super()._rate(sense, now, between)
+        """The derivative of a row by time."""
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
             inside = numbers.copy()
             inside[: len(self.motion.names)] = self._in_range(numbers[: len(self.motion.names)])
-            found: Array = derivative(moment, inside, self.onsets, now, self.senses)
-            return found
+            if not np.all(np.isfinite(numbers)):
+                return numbers * np.nan
+            return self.seeing.derivative(moment, inside, self.onsets, now, self.senses)
 
         return rate
 
@@ -152,27 +143,6 @@ class ContactMotion(Integration):
         """Gaps, m, (contact, time), negative where a contact that touches is open or another has closed."""
         sign = np.array([1.0 if onset is None else -1.0 for onset in self.onsets])
         found: Array = sign[:, None] * self._look(dense, times).gap
-        return found
-
-    def _first(self, dense: Dense, begin: float, times: Array) -> Crossing | None:
-        """The first gap that changes its sign within a step."""
-        crossed = self._gaps(dense, times) < 0.0
-        found: Crossing | None = None
-        for contact in np.flatnonzero(crossed.any(axis=1)):
-            k = int(np.argmax(crossed[contact]))
-            low, high = float(times[k - 1]) if k else begin, float(times[k])
-            if k == 0:  # it may have changed its sign at the beginning: look for where it is as it should be
-                nearer: Array = begin + (high - begin) * 0.5 ** np.arange(1.0, FINE + 1.0)
-                good = np.flatnonzero(self._gaps(dense, nearer)[contact] > 0.0)
-                if not len(good):
-                    return Crossing(int(contact), begin + (high - begin) * 0.5**FINE)
-                low = float(nearer[good[0]])
-            place = brentq(
-                lambda time, contact=contact: float(self._gaps(dense, np.array([time]))[contact, 0]),
-                low, high, xtol=1e-16, rtol=8.9e-16,
-            )  # fmt: skip
-            if found is None or place < found.time:
-                found = Crossing(int(contact), float(place))
         return found
 
     def _changed(self, crossing: Crossing, row: Array) -> float:

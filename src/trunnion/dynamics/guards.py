@@ -1,7 +1,9 @@
-"""Where a step ends a motion: at the end of a driver's range, or where two assemblies of the links meet.
+"""Where something changes within a step: located on its dense output.
 
-Both are looked for on the dense output of every step, and located there. Of one driver alone the places are known
-beforehand, and are approached from one side: see `integrate`.
+What ends a step - a gap that closes, a joint that comes to rest or breaks away, a clutch that lets go - is a number
+that becomes negative, see `first_crossing`. A motion ends at the end of a driver's range, or where two assemblies of
+the links meet, see `Guards`; of one driver alone these places are known beforehand, and are approached from one side:
+see `integrate`.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +22,7 @@ from trunnion.dynamics.solution import Ended, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.change_points import touched
 
-__all__ = ["Guards"]
+__all__ = ["Crossing", "Guards", "first_crossing"]
 
 Array = NDArray[np.float64]
 
@@ -29,6 +32,49 @@ NEARLY = 0.1  # of 1/condition: where a straight line from the last two looks le
 
 
 FORESEEN = 1e-3  # of 1/condition: from there on it is foreseen where it touches zero
+FINE = 40  # halvings towards the beginning of a step, where a number that has just changed its sign is next to nothing
+LARGE = 1e300  # for a number without bound
+
+
+class Crossing(NamedTuple):
+    """A number that becomes negative: its row, and the time, s."""
+
+    row: int
+    time: float
+
+
+def first_crossing(values: Callable[[Array], Array], begin: float, times: Array) -> Crossing | None:
+    """The first number that becomes negative within a step, at a time at which it is negative.
+
+    values: (number, time), which are not negative where the step begins but for rounding; times: at which one looks, up
+    to the end of the step.
+    """
+    negative, first = values(times) < 0.0, None
+    for row in np.flatnonzero(negative.any(axis=1)):
+
+        def value(time: float, row: int = int(row)) -> float:
+            return min(float(values(np.array([time]))[row, 0]), LARGE)
+
+        k = int(np.argmax(negative[row]))
+        low, high = float(times[k - 1]) if k else begin, float(times[k])
+        if k == 0:  # it may have changed its sign at the beginning: look for where it is as it should be
+            nearer = begin + (high - begin) * 0.5 ** np.arange(FINE, -1.0, -1.0)
+            near = values(nearer)[row]
+            good = np.flatnonzero(near > 0.0)
+            low, high = (nearer[good[-1]], high) if len(good) else (nearer[np.argmax(near < 0.0)],) * 2
+        place = _far_side(value, low, high)
+        if first is None or place < first.time:
+            first = Crossing(int(row), place)
+    return first
+
+
+def _far_side(value: Callable[[float], float], low: float, high: float) -> float:
+    """Where a number becomes negative, on the side on which it is: a force that begins there has begun."""
+    place = float(brentq(value, low, high, xtol=1e-16, rtol=8.9e-16)) if value(low) > 0.0 else low
+    step = np.spacing(abs(place))
+    while place < high and value(place) >= 0.0:
+        place, step = min(place + step, high), 2.0 * step
+    return place
 
 
 @dataclass

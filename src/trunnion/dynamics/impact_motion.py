@@ -11,18 +11,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.closed import ClosedMotion, ClosedRates, Linear
-from trunnion.dynamics.contact_motion import ContactMotion, Crossing, Dense, Impact, OpenContact, step_nodes
+from trunnion.dynamics.bordered import nearest
+from trunnion.dynamics.contact_motion import ContactMotion, Dense, Impact, OpenContact, step_nodes
+from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.impact_law import OPEN, Struck, strike
-from trunnion.dynamics.rates import Seen
+from trunnion.dynamics.rates import Rigid, Seen
 from trunnion.dynamics.solution import Event, Stretch
-from trunnion.dynamics.state import Accelerated, Moment
+from trunnion.dynamics.state import Accelerated, Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ImpactMotion"]
@@ -46,10 +48,7 @@ class ImpactMotion(ContactMotion):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        assert isinstance(self.motion, ClosedMotion)
-        assert isinstance(self.dynamics, ClosedRates)
-        self.closed_rates = self.dynamics
-        self.rigid, each = self.motion, self.motion.contacts.each
+        self.rigid, each = cast("Rigid", self.dynamics), self.motion.contacts.each
         self.count = len(each)
         self.friction = np.array([one.coefficient for one in each])
         self.restitution = np.array([one.restitution for one in each])
@@ -64,7 +63,7 @@ class ImpactMotion(ContactMotion):
         """The contacts with their forces at times of a step."""
         at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
-            return self.closed_rates.touches(at)
+            return self.rigid.touches(at)
 
     def _gaps(self, dense: Dense, times: Array) -> Array:
         """What stays above 0 within a step, (2 contacts, time): gap or normal force, and slip or what friction has left
@@ -94,12 +93,12 @@ class ImpactMotion(ContactMotion):
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
-        k, time = crossing.contact % self.count, crossing.time
+        k, time = crossing.row % self.count, crossing.time
         self.recent = [*self.recent, time][-CROWD:]
         onset = self.onsets[k]
         if not isinstance(onset, Closed):
             return self._impact(k, time, row)
-        if crossing.contact < self.count:
+        if crossing.row < self.count:
             self._end(k, time, 0.0)
             self._set({k: None})
             return np.inf
@@ -128,7 +127,7 @@ class ImpactMotion(ContactMotion):
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
         at = self.moment(time, row, 0.0, 0.0)
-        linear = self.closed_rates.linear(at)
+        linear = self.rigid.linear(at)
         rates = linear.driven + linear.ways @ at.rate[:, 0]
         meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
@@ -287,7 +286,7 @@ class ImpactMotion(ContactMotion):
         """Whether the forces of a case push, and nothing sinks in or slips against its friction."""
         if np.any(found.turned) or not np.all(np.isfinite(found.second)):
             return False
-        walk, force = found.back.walk, SMALL * self.rigid.force
+        walk, force = found.back.walk, SMALL * self.motion.force
         small = SMALL * max(float(np.max(np.abs(found.second / self.motion.unit[:, None]))), 1.0) * self.pull
         for k, (onset, one) in enumerate(zip(self.onsets, self.motion.contacts.each, strict=True)):
             if onset is None:
@@ -312,18 +311,18 @@ class ImpactMotion(ContactMotion):
         n, closed = self.layout.coordinates, self._closed()
         at = self.moment(time, row, 0.0, 0.0)
         for _ in range(2):
-            linear = self.closed_rates.linear(at)
+            linear = self.rigid.linear(at)
             shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
             if not shut:
                 return
-            row[:n] -= _nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
+            row[:n] -= nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
             at = self.moment(time, row, 0.0, 0.0)
         if not closed:
             return
-        linear = self.closed_rates.linear(at)
+        linear = self.rigid.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
-        row[n : 2 * n] -= _nearest(linear.mass, ways, rates[[*closed, *sticks]])
+        row[n : 2 * n] -= nearest(linear.mass, ways, rates[[*closed, *sticks]])
 
     def _held(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""
@@ -339,10 +338,3 @@ class ImpactMotion(ContactMotion):
         """Why a state has no acceleration; empty if it has one."""
         found = super()._cause(time, row, sense, now)
         return "no_contact_force" if found == "no_acceleration" and any(self.onsets) else found
-
-
-def _nearest(mass: Array, ways: Array, missed: Array) -> Array:
-    """The least change of coordinates, in the sense of the masses, that changes W x by so much."""
-    spread = np.linalg.solve(mass, ways.T)
-    found: Array = spread @ np.linalg.lstsq(ways @ spread, missed, rcond=1e-13)[0]
-    return found

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
-from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.contact_motion import ContactMotion
@@ -26,7 +25,6 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.steady import steady as steady_result
 from trunnion.dynamics.stick_motion import StickMotion
-from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -127,7 +125,7 @@ def simulated(
         return steady_result(mechanism, duration, steps, tolerance, progress, evaluations)
     if playing:
         return _with_play(run, duration, steps, tolerance, progress, evaluations, pass_change_points)
-    motion = StickingMotion.of(run, passing=pass_change_points)
+    motion = FreeMotion.of(run, passing=pass_change_points)
     known = places(motion)
     rates, row, time = rates_of(motion, known), initial_row(motion), np.linspace(0.0, duration, steps + 1)
     _check_start(motion, row, ranges(motion, motion.names, known))
@@ -174,13 +172,13 @@ def _with_play(
     contacts = contacts_of(run, in_play(run.system.mechanism))
     loose = prepare(bare.mechanism, free=True)
     refuse_undetermined(loose, in_play(run.system.mechanism))
-    motion = (ClosedMotion if is_rigid(run.system.mechanism) else StickingMotion).of(loose, contacts, passing)
+    motion = FreeMotion.of(loose, contacts, passing)
     row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
     _check_start(motion, row, limits)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
     times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
-    integrating = _integrating(motion)
+    integrating = _integrating(motion, is_rigid(run.system.mechanism))
 
     def found(tolerance: float) -> Found:
         integration = integrating(
@@ -196,10 +194,10 @@ def _with_play(
     return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
 
 
-def _integrating(motion: FreeMotion) -> Callable[..., ContactMotion]:
+def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ContactMotion]:
     """What integrates a motion with joints in play."""
-    if isinstance(motion, ClosedMotion):
-        return partial(ImpactMotion, motion, ClosedRates(motion, compiled_closed(motion)))
+    if rigid:
+        return partial(ImpactMotion, motion, compiled_closed(motion) or Walks(motion))
     rates: Seeing = compiled_rates(motion) or Walks(motion)
     return partial(StickMotion if motion.resisted else ContactMotion, motion, rates)
 

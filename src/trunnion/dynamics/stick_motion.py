@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
+from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.cases import IDLE, SLACK, Case, Cases, Senses
-from trunnion.dynamics.contact_motion import ContactMotion, Crossing, Dense
+from trunnion.dynamics.contact_motion import ContactMotion, Dense
+from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import AHEAD, SEVERAL
 from trunnion.dynamics.solution import Event, Stretch
 from trunnion.dynamics.state import Moment
-from trunnion.dynamics.sticking import RANK, StickingMotion
 
 __all__ = ["StickMotion"]
 
@@ -35,7 +35,7 @@ class StickMotion(ContactMotion):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.free = cast("StickingMotion", self.motion)
+        self.free = self.motion
         self.count = len(self.motion.contacts.each)
         self.now = 0.5 * self.breaks[0]
         self._crossed: int | None = None
@@ -80,9 +80,9 @@ class StickMotion(ContactMotion):
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """Let a contact begin or end; of a joint that is decided before the next step."""
-        if crossing.contact < self.count:
+        if crossing.row < self.count:
             return super()._changed(crossing, row)
-        self._crossed = crossing.contact - self.count
+        self._crossed = crossing.row - self.count
         return np.inf
 
     # ---- what sticks and what slides --------------------------------------------------------------------------

@@ -48,10 +48,9 @@ class ContactState(NamedTuple):
 
 class Closed(NamedTuple):
     """A contact of rigid bodies that stays closed: it slips forward (+1), backward (−1) or sticks (0), under a normal
-    force and one along the tangent on the pin or slider, N, that are found with the accelerations; None: the forces
-    are given."""
+    force and one along the tangent on the pin or slider, N, that are found with the accelerations."""
 
-    sense: int | None
+    sense: int
     normal: Array | float = 0.0
     friction: Array | float = 0.0
 

@@ -397,7 +397,7 @@ _DYNAMICS = (
 _STICKING = (
     Fault(
         "shares-beyond-their-end",
-        "dynamics/cases.py",
+        "dynamics/active.py",
         "if most > 1.0 + SLACK or",
         "if most > 1.5 + SLACK or",
         ("tests/reference/test_sticking.py", "-k", "blocks"),

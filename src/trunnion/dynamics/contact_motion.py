@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple, cast
 
@@ -104,7 +105,7 @@ class ContactMotion(Integration):
                 return self._failed(before, held, sense, now, failed)
             dense, after = solver.dense_output(), float(solver.t)
             times = before + (after - before) * np.arange(1, LOOKS + 1) / LOOKS
-            crossing = first_crossing(lambda moments, dense=dense: self._gaps(dense, moments), before, times)
+            crossing = first_crossing(partial(self._gaps, dense), before, times)
             end = after if crossing is None else crossing.time
             self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets, self.senses))
             found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]

@@ -8,8 +8,7 @@ too. Where impacts of several places crowd without end, one without restitution 
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -18,13 +17,14 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
+from trunnion.dynamics.active import ActiveSet
 from trunnion.dynamics.bordered import nearest
 from trunnion.dynamics.contact_motion import ContactMotion, Dense, Impact, OpenContact, step_nodes
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.impact_law import OPEN, Struck, strike
 from trunnion.dynamics.rates import Rigid, Seen
 from trunnion.dynamics.solution import Event, Stretch
-from trunnion.dynamics.state import Accelerated, Linear, Moment
+from trunnion.dynamics.state import Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ImpactMotion"]
@@ -36,7 +36,6 @@ LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low i
 MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
 CROWD, CROWDED = 100, 1e-9  # events within so much of the duration: they have no end
 FLIGHT = 0.1  # of the time to the next impact: the first step after one
-SMALL = 1e-9  # of the largest force or acceleration: what is 0 but for rounding
 STILL = 1e-12  # of the speeds of an impact: a slip that is 0
 
 
@@ -53,7 +52,6 @@ class ImpactMotion(ContactMotion):
         self.friction = np.array([one.coefficient for one in each])
         self.restitution = np.array([one.restitution for one in each])
         size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
-        self.pull = size * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
         self.meet = MEET * self.motion.contacts.least_clearance
         self.low = np.array([max(LOW * one.clearance, ROUNDED * size) for one in self.motion.contacts.each])
 
@@ -250,60 +248,19 @@ class ImpactMotion(ContactMotion):
     # ---- closed -----------------------------------------------------------------------------------------------
 
     def _settle(self, time: float, row: Array, pauses: Mapping[int, float] | None = None) -> None:
-        """Which of the contacts that could be closed are, and whether those without slip stick: the first case that
-        forces and accelerations allow."""
-        at, may = self.moment(time, row, 0.0, 0.0), dict(enumerate(self.onsets))
-        for onsets in self._cases():
-            found = self.motion.accelerate(at._replace(onsets=onsets))
-            if not self._holds(onsets, found):
-                continue
-            self.onsets = onsets
-            for k, onset in enumerate(onsets):
-                if onset is not None and k not in self._open:
-                    self._open[k] = OpenContact(time + (pauses or {}).get(k, 0.0), 0.0)
-                    self._say(self._open[k].begin, "closes", k, np.nan)
-                elif onset is None and may[k] is not None and k in self._open:
-                    self._end(k, time, 0.0)
+        """Which of the contacts that could be closed are, and whether those without slip stick."""
+        at, closed = self.moment(time, row, 0.0, 0.0), self._closed()
+        case = ActiveSet(self.motion, float(np.max(self.pace))).of(at, ())
+        if case.senses is None:
+            self._stop("no_contact_force", time, row)
             return
-        self._stop("no_contact_force", time, row)
-
-    def _cases(self) -> Iterator[Onsets]:
-        """What the closed contacts may do: go on slipping, stick, begin to slip either way, or open."""
-        own: list[tuple[Onset, ...]] = []
-        for k, onset in enumerate(self.onsets):
-            if not isinstance(onset, Closed):
-                own.append((None,))
-            elif onset.sense or self.friction[k] == 0.0:
-                own.append((Closed(onset.sense or 1), None))
-            else:
-                own.append((Closed(0), Closed(1), Closed(-1), None))
-        for case in itertools.product(*own):  # what lies on one wall sticks or slips as one
-            senses = [(self._surface(k), one.sense) for k, one in enumerate(case) if isinstance(one, Closed)]
-            if len(set(senses)) == len({surface for surface, _ in senses}):
-                yield case
-
-    def _holds(self, onsets: Onsets, found: Accelerated) -> bool:
-        """Whether the forces of a case push, and nothing sinks in or slips against its friction."""
-        if np.any(found.turned) or not np.all(np.isfinite(found.second)):
-            return False
-        walk, force = found.back.walk, SMALL * self.motion.force
-        small = SMALL * max(float(np.max(np.abs(found.second / self.motion.unit[:, None]))), 1.0) * self.pull
-        for k, (onset, one) in enumerate(zip(self.onsets, self.motion.contacts.each, strict=True)):
-            if onset is None:
-                continue
-            gap, slip = (float(np.ravel(part)[0]) for part in one.accelerations(walk))
-            now = found.onsets[k]
-            if not isinstance(now, Closed):
-                if gap < -small:
-                    return False
-                continue
-            normal, friction = (float(np.ravel(part)[0]) for part in (now.normal, now.friction))
-            begins = isinstance(onset, Closed) and onset.sense == 0
-            if normal < -force or (begins and now.sense and now.sense * slip < -small):
-                return False
-            if now.sense == 0 and abs(friction) > self.friction[k] * normal + force:
-                return False
-        return True
+        self.onsets = case.onsets
+        for k in closed:
+            if self.onsets[k] is None and k in self._open:
+                self._end(k, time, 0.0)
+            elif self.onsets[k] is not None and k not in self._open:
+                self._open[k] = OpenContact(time + (pauses or {}).get(k, 0.0), 0.0)
+                self._say(self._open[k].begin, "closes", k, np.nan)
 
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
         """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:

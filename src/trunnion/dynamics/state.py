@@ -374,8 +374,9 @@ class FreeMotion:
         able = np.max(np.abs(slopes[:count, joints]), axis=0) > 0.0  # others have nothing to be held by
         converged &= np.all(np.abs(missed[joints]) <= HELD * np.maximum(np.where(able, 1.0, 1e-6), largest), axis=0)
         numbers = np.where(turned, np.nan, numbers)
+        if held.closed:
+            onsets = self.shared(self.forced(at.onsets, numbers[count : joints.start], held), held.walls)
         if held.walls:
-            onsets = self.shared(onsets, held.walls)
             back = self.solve(at._replace(onsets=onsets), numbers[:count], senses, sliding=True)
         shares = None
         if held.joints:

@@ -2,7 +2,7 @@
 
 A step ends where a joint that slides comes to rest, and where one that sticks breaks away. Which joints stick from then
 on is the answer of a complementarity of friction and acceleration, and so is which of them lock where there is none:
-see `cases`.
+see `active`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
+from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Case, Senses
 from trunnion.dynamics.bordered import RANK
-from trunnion.dynamics.cases import IDLE, SLACK, Case, Cases, Senses
 from trunnion.dynamics.contact_motion import ContactMotion, Dense
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import AHEAD, SEVERAL
@@ -88,15 +88,15 @@ class StickMotion(ContactMotion):
     # ---- what sticks and what slides --------------------------------------------------------------------------
 
     @property
-    def _cases(self) -> Cases:
-        return Cases(self.free, float(np.max(self.pace)))
+    def _active(self) -> ActiveSet:
+        return ActiveSet(self.free, float(np.max(self.pace)))
 
     def _decided(self, time: float, row: Array) -> bool:
         """Find what sticks, slides and locks from here; `row` is what it is after it."""
         before, crossed, n = self.senses, self._crossed, self.layout.coordinates
         at, self._crossed = self.moment(time, row, 0.0, self.now), None
         with np.errstate(all="ignore"):
-            case = self._cases.of(at, before, crossed)
+            case = self._active.of(at, before, crossed)
             if case.senses is None:
                 if self._jammed(time, row, case.base):
                     return self._decided(time, row)
@@ -118,7 +118,7 @@ class StickMotion(ContactMotion):
 
     def _jammed(self, time: float, row: Array, senses: Senses) -> bool:
         """Let joints lock, if they can: they stop at once."""
-        found = self._cases.lock(self.moment(time, row, 0.0, self.now), senses)
+        found = self._active.lock(self.moment(time, row, 0.0, self.now), senses)
         if found is None:
             return False
         energy = self._stopped(time, row, found.rate, 0.0, self.now)
@@ -163,7 +163,7 @@ class StickMotion(ContactMotion):
 
     def _others(self, time: float, row: Array, case: Case) -> None:
         """Tell where there are several accelerations."""
-        if SEVERAL not in self.solution.notes and self._cases.several(self.moment(time, row, 0.0, self.now), case.may):
+        if SEVERAL not in self.solution.notes and self._active.several(self.moment(time, row, 0.0, self.now), case.may):
             self.solution.notes[SEVERAL] = {"time": time}
 
     def _held(self, solver: OdeSolver, row: Array) -> None:
@@ -173,4 +173,4 @@ class StickMotion(ContactMotion):
         if self._steps % FEW:
             return
         with np.errstate(all="ignore"):
-            self._others(float(solver.t), row, Case(self.senses, (), self.senses))
+            self._others(float(solver.t), row, Case(self.senses, self.onsets, (), self.senses))

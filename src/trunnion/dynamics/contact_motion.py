@@ -14,14 +14,12 @@ from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolver
 from scipy.optimize import brentq
 
-from trunnion.dynamics.guards import Crossing, first_crossing
+from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Seeing, Seen
 from trunnion.dynamics.solution import Event, Stretch
-from trunnion.dynamics.state import Moment
 from trunnion.dynamics.touching import FIRST, SLOWEST, Onset
 from trunnion.joints.contact import elastic_force
 
@@ -33,7 +31,6 @@ Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
 
 CLOSELY = 33  # times about a largest force
 GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
-LOOKS = 12  # times within a step at which gaps are looked at
 NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
 
 
@@ -70,51 +67,17 @@ class OpenContact:
 
 @dataclass
 class ContactMotion(Integration):
-    """An integration that follows the contacts of `motion`.
-
-    onsets: of each contact its speed of approach, m/s, None while it does not touch; impacts: those that are over;
-    senses: of joints that may stick, see `Moment`.
-    """
+    """An integration that follows the contacts of `motion`. impacts: those that are over."""
 
     impacts: list[Impact] = field(default_factory=list)
-    senses: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         each = self.motion.contacts.each
         self.seeing = cast("Seeing", self.dynamics)
-        self.onsets: tuple[Onset, ...] = (None,) * len(each)
+        self.onsets = (None,) * len(each)
         self._open: dict[int, OpenContact] = {}
         self._clearance = self.motion.contacts.least_clearance
-
-    def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
-        """The state of a row, with the contacts as they are."""
-        return super().moment(time, row, sense, now)._replace(onsets=self.onsets)
-
-    def _move(
-        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
-    ) -> tuple[float, Array, float | None]:
-        """Move until a contact begins or ends, or the next break."""
-        rate = self._rate(sense, now, (-np.inf, np.inf))
-        first = min(step, 0.5 * (until - time)) if step else None
-        solver = self._solver(rate, time, row, until, self._absolute(row), first)
-        while solver.status == "running":
-            before, held = float(solver.t), np.array(solver.y)
-            failed = solver.step()
-            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
-                return self._failed(before, held, sense, now, failed)
-            dense, after = solver.dense_output(), float(solver.t)
-            times = before + (after - before) * np.arange(1, LOOKS + 1) / LOOKS
-            crossing = first_crossing(partial(self._gaps, dense), before, times)
-            end = after if crossing is None else crossing.time
-            self._add(Stretch(before, end, dense, sense, False, now, self.snapshot, self.onsets, self.senses))
-            found = np.array(solver.y) if crossing is None else np.asarray(dense(np.array([end])))[:, 0]
-            self._follow(end, found, sense, now)
-            self._held(solver, found)
-            if crossing is not None:
-                ahead = self._changed(crossing, found)
-                return end, found, min(ahead, float(solver.step_size or np.inf))
-        return float(solver.t), np.array(solver.y), float(solver.step_size or 0.0) or None
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
         """The derivative of a row by time."""
@@ -129,9 +92,6 @@ class ContactMotion(Integration):
 
         return rate
 
-    def _held(self, solver: OdeSolver, row: Array) -> None:
-        """What else a step may need at its end."""
-
     # ---- gaps -------------------------------------------------------------------------------------------------
 
     def _look(self, dense: Dense, times: Array) -> Seen:
@@ -139,6 +99,9 @@ class ContactMotion(Integration):
         at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
             return self.seeing.look(at)
+
+    def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
+        return partial(self._gaps, stretch.state)
 
     def _gaps(self, dense: Dense, times: Array) -> Array:
         """Gaps, m, (contact, time), negative where a contact that touches is open or another has closed."""

@@ -281,7 +281,7 @@ class ImpactMotion(ContactMotion):
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
         row[n : 2 * n] -= nearest(linear.mass, ways, rates[[*closed, *sticks]])
 
-    def _held(self, solver: OdeSolver, row: Array) -> None:
+    def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""
         if not any(self.onsets):
             return

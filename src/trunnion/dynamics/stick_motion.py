@@ -19,8 +19,7 @@ from trunnion.dynamics.bordered import RANK
 from trunnion.dynamics.contact_motion import ContactMotion, Dense
 from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import AHEAD, SEVERAL
-from trunnion.dynamics.solution import Event, Stretch
-from trunnion.dynamics.state import Moment
+from trunnion.dynamics.solution import Event
 
 __all__ = ["StickMotion"]
 
@@ -40,24 +39,14 @@ class StickMotion(ContactMotion):
         self.now = 0.5 * self.breaks[0]
         self._crossed: int | None = None
         self._slow = np.sqrt(self.free.typical)
-        self._resting = False  # whether nothing moves
         self._steps = 0
-
-    def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
-        """The state of a row, with contacts and joints as they are."""
-        return super().moment(time, row, sense, now)._replace(senses=self.senses)
 
     def _begins(self, row: Array) -> bool:
         return self._decided(0.0, row) and super()._begins(row)
 
-    def _move(
-        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
-    ) -> tuple[float, Array, float | None]:
-        """Move until a joint begins to stick or to slide, a contact begins or ends, or the next break."""
+    def _couple(self, time: float, row: Array, now: float) -> None:
         self.now = now
-        if not self._decided(time, row):
-            return time, row, None
-        return super()._move(time, row, until, sense, now, step)
+        self._decided(time, row)
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
@@ -145,19 +134,16 @@ class StickMotion(ContactMotion):
 
     def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
         """Whether all free coordinates rest from here on, in what resists the joints."""
-        n, before, self._resting = self.layout.coordinates, self._resting, False
+        n, before, self.resting = self.layout.coordinates, self.resting, False
         at = self.moment(time, row, 0.0, self.now)
         if set(self.motion.names) != set(self.motion.system.mechanism.drivers) or not sticks:
             return
         ways = self.free.ways(at)[0][sticks]
         if np.linalg.matrix_rank(ways, tol=RANK) < n or np.any(np.abs(row[n : 2 * n]) > IDLE * self.pace):
             return
-        row[n : 2 * n], self._resting = 0.0, True
+        row[n : 2 * n], self.resting = 0.0, True
         if not before:
             self._note(time, "rest")
-
-    def _add(self, stretch: Stretch) -> None:
-        super()._add(stretch._replace(resting=self._resting))
 
     # ---- other accelerations ----------------------------------------------------------------------------------
 
@@ -166,9 +152,9 @@ class StickMotion(ContactMotion):
         if SEVERAL not in self.solution.notes and self._active.several(self.moment(time, row, 0.0, self.now), case.may):
             self.solution.notes[SEVERAL] = {"time": time}
 
-    def _held(self, solver: OdeSolver, row: Array) -> None:
+    def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Look for other accelerations at the end of every few steps."""
-        super()._held(solver, row)
+        super()._end_step(solver, row)
         self._steps += 1
         if self._steps % FEW:
             return

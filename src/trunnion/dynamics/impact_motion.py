@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.active import ActiveSet
+from trunnion.dynamics.active import MEET as SLOW
+from trunnion.dynamics.active_motion import ActiveMotion, Dense, Impact, OpenContact, step_nodes
 from trunnion.dynamics.bordered import nearest
-from trunnion.dynamics.contact_motion import ContactMotion, Dense, Impact, OpenContact, step_nodes
-from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.impact_law import OPEN, Struck, strike
 from trunnion.dynamics.rates import Rigid, Seen
 from trunnion.dynamics.solution import Event, Stretch
@@ -40,15 +39,16 @@ STILL = 1e-12  # of the speeds of an impact: a slip that is 0
 
 
 @dataclass
-class ImpactMotion(ContactMotion):
+class ImpactMotion(ActiveMotion):
     """An integration that follows the impacts of rigid bodies from event to event."""
 
     recent: list[float] = field(default_factory=list)
+    pauses: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.rows = 2 * self.count
         self.rigid, each = cast("Rigid", self.dynamics), self.motion.contacts.each
-        self.count = len(each)
         self.friction = np.array([one.coefficient for one in each])
         self.restitution = np.array([one.restitution for one in each])
         size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
@@ -59,18 +59,17 @@ class ImpactMotion(ContactMotion):
 
     def _touches(self, dense: Dense, times: Array) -> Seen:
         """The contacts with their forces at times of a step."""
-        at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
-            return self.rigid.touches(at)
+            return self.rigid.touches(self._at(dense, times))
 
-    def _gaps(self, dense: Dense, times: Array) -> Array:
-        """What stays above 0 within a step, (2 contacts, time): gap or normal force, and slip or what friction has left
+    def _gaps(self, at: Moment) -> Array:
+        """What stays above 0 within a step, (2 contacts, lane): gap or normal force, and slip or what friction has left
         before it slips."""
-        found = np.ones((2 * self.count, len(times)))
+        found = np.ones((2 * self.count, len(at.time)))
         if not any(self.onsets):
-            found[: self.count] = self._look(dense, times).gap
+            found[: self.count] = self.rigid.look(at).gap
             return found
-        seen = self._touches(dense, times)
+        seen = self.rigid.touches(at)
         for k, onset in enumerate(self.onsets):
             found[k] = seen.normal[k] if onset else seen.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
@@ -89,24 +88,23 @@ class ImpactMotion(ContactMotion):
             one.impulse += float(weights @ seen.normal[k])
             one.wear += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
 
-    def _changed(self, crossing: Crossing, row: Array) -> float:
+    def _met(self, k: int, time: float, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
-        k, time = crossing.row % self.count, crossing.time
+        contact = k % self.count
         self.recent = [*self.recent, time][-CROWD:]
-        onset = self.onsets[k]
+        onset = self.onsets[contact]
         if not isinstance(onset, Closed):
-            return self._impact(k, time, row)
-        if crossing.row < self.count:
-            self._end(k, time, 0.0)
-            self._set({k: None})
+            return self._impact(contact, time, row)
+        if k < self.count:
+            self._end(contact, time, 0.0)
+            self._set({contact: None})
             return np.inf
-        together = [other for other in self._closed() if self._surface(other) == self._surface(k)]
+        together = [other for other in self._closed() if self._surface(other) == self._surface(contact)]
         if onset.sense:  # the slip ends
             self._set(dict.fromkeys(together, Closed(0)))
             self._project(time, row)
-            self._settle(time, row)
         else:
-            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[k, 0]
+            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[contact, 0]
             self._set(dict.fromkeys(together, Closed(-int(np.sign(friction)))))
         return np.inf
 
@@ -180,16 +178,6 @@ class ImpactMotion(ContactMotion):
         works[0] += drive
         works[-1] += loss
 
-    def _say(self, time: float, kind: str, k: int, figure: float) -> None:
-        self.solution.events.append(Event(time, kind, self.motion.contacts.labels[k], figure, "m/s"))
-
-    def _end(self, k: int, time: float, rate: float) -> None:
-        """A contact lifts off."""
-        one = self._open.pop(k)
-        label = self.motion.contacts.labels[k]
-        self.impacts.append(Impact(label, one.begin, time, one.approach, rate, one.force, 0.0, one.wear, one.impulse))
-        self._say(time, "lift-off", k, rate)
-
     def _lowered(self, time: float, kept: float) -> None:
         """Take down that an impact kept less than its restitution."""
         note = self.solution.notes.setdefault("simulate.restitution_lowered", {"times": 0, "time": time, "share": 1.0})
@@ -242,25 +230,34 @@ class ImpactMotion(ContactMotion):
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
         self._project(time, row, places)
-        if closed:
-            self._settle(time, row, pauses)
+        self.pauses = dict(pauses)
+        if self.senses:
+            self._torn(time, row)
+
+    def _torn(self, time: float, row: Array) -> None:
+        """Joints that stuck until an impact slide on with the speeds that it leaves them."""
+        senses = list(self.senses)
+        for k, speed in enumerate(self.motion.ways(self.moment(time, row, 0.0, 0.0))[1]):
+            if abs(speed) > SLOW and np.sign(speed) != senses[k]:
+                if senses[k] == 0:
+                    self.solution.events.append(
+                        Event(time, "break-away", self.motion.resisted[k], float(np.sign(speed)))
+                    )
+                senses[k] = int(np.sign(speed))
+        self.senses = tuple(senses)
 
     # ---- closed -----------------------------------------------------------------------------------------------
 
-    def _settle(self, time: float, row: Array, pauses: Mapping[int, float] | None = None) -> None:
-        """Which of the contacts that could be closed are, and whether those without slip stick."""
-        at, closed = self.moment(time, row, 0.0, 0.0), self._closed()
-        case = ActiveSet(self.motion, float(np.max(self.pace))).of(at, ())
-        if case.senses is None:
-            self._stop("no_contact_force", time, row)
-            return
-        self.onsets = case.onsets
-        for k in closed:
-            if self.onsets[k] is None and k in self._open:
+    def _let(self, time: float, onsets: tuple[Onset, ...]) -> None:
+        """Tell which of the contacts that could be closed are."""
+        before, self.onsets = self._closed(), onsets
+        for k in before:
+            if onsets[k] is None and k in self._open:
                 self._end(k, time, 0.0)
-            elif self.onsets[k] is not None and k not in self._open:
-                self._open[k] = OpenContact(time + (pauses or {}).get(k, 0.0), 0.0)
+            elif onsets[k] is not None and k not in self._open:
+                self._open[k] = OpenContact(time + self.pauses.get(k, 0.0), 0.0)
                 self._say(self._open[k].begin, "closes", k, np.nan)
+        self.pauses = {}
 
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
         """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
@@ -276,6 +273,9 @@ class ImpactMotion(ContactMotion):
             at = self.moment(time, row, 0.0, 0.0)
         if not closed:
             return
+        if stuck := [k for k, sense in enumerate(self.senses) if sense == 0]:
+            row[n : 2 * n] = self.motion.stopped(at, stuck)
+            return
         linear = self.rigid.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
@@ -283,6 +283,7 @@ class ImpactMotion(ContactMotion):
 
     def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""
+        super()._end_step(solver, row)
         if not any(self.onsets):
             return
         time = float(solver.t)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.clutch_motion import ClutchMotion
 from trunnion.dynamics.compiled_rates import compiled_rates
 from trunnion.dynamics.integrate import INSIDE, MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Dynamics, Walks
 from trunnion.dynamics.start import Places, load_times, ranges
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.stick_motion import StickMotion
 from trunnion.dynamics.tables import tabulated
 from trunnion.dynamics.tabulated import TabulatedRates
 
@@ -37,7 +37,7 @@ def integration_of(
     limits = ranges(motion, motion.names, known)
     if motion.resisted:
         assert not isinstance(rates, TabulatedRates)  # which are of one coordinate
-        return StickMotion(
+        return ActiveMotion(
             motion, rates, duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
         )
     kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration

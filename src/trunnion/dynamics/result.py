@@ -13,7 +13,7 @@ from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
-from trunnion.dynamics.contact_motion import Impact
+from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.course import Courses as DriveCourses
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid

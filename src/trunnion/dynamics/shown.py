@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.cycle import fill
-from trunnion.dynamics.contact_motion import Impact
+from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.touching import Contacts, ContactState, Push
 from trunnion.results import variables as results
 from trunnion.results.dataset import Variable

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.compiled_rates import compiled_rates
-from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
@@ -24,7 +24,6 @@ from trunnion.dynamics.start import Places, initial_row, load_times, places, ran
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.steady import steady as steady_result
-from trunnion.dynamics.stick_motion import StickMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -194,12 +193,12 @@ def _with_play(
     return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
 
 
-def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ContactMotion]:
+def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ActiveMotion]:
     """What integrates a motion with joints in play."""
     if rigid:
         return partial(ImpactMotion, motion, compiled_closed(motion) or Walks(motion))
     rates: Seeing = compiled_rates(motion) or Walks(motion)
-    return partial(StickMotion if motion.resisted else ContactMotion, motion, rates)
+    return partial(ActiveMotion, motion, rates)
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:

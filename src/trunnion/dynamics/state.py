@@ -499,11 +499,17 @@ class FreeMotion:
         return ways / slow[:, None] * np.sqrt(self.unit), (driven + ways @ at.rate[:, 0]) / slow
 
     def stopped(self, at: Moment, sticks: Sequence[int]) -> Array:
-        """Rates after joints begin to stick, (coordinate,): the momentum of what stays free is kept, and energy only
-        falls; one lane."""
-        (ways, speeds), scale = self.ways(at), np.sqrt(self.unit)
+        """Rates after joints begin to stick, (coordinate,), beside contacts that stay closed: the momentum of what
+        stays free is kept, and energy only falls; one lane."""
+        (ways, speeds), scale, held = self.ways(at), np.sqrt(self.unit), self.held(at)
+        ways, speeds = ways[list(sticks)], speeds[list(sticks)]
+        if held.closed:
+            linear, rows = self.linear(at), [*held.closed, *(len(at.onsets) + k for k in held.walls)]
+            speed = float(np.ravel(self.system.size(self.values) * primal(self.system.pace(self.values)))[0])
+            ways = np.vstack([ways, linear.ways[rows] * scale / speed])
+            speeds = np.concatenate([speeds, (linear.driven + linear.ways @ at.rate[:, 0])[rows] / speed])
         mass = self._mass(at) * scale * scale[:, None]
-        rates: Array = at.rate[:, 0] - scale * nearest(mass, ways[list(sticks)], speeds[list(sticks)], RANK)
+        rates: Array = at.rate[:, 0] - scale * nearest(mass, ways, speeds, RANK)
         return rates
 
     # ---- contacts of rigid bodies -----------------------------------------------------------------------------------

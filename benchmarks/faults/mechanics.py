@@ -449,7 +449,7 @@ _CONTACT = (
     ),
     Fault(
         "slip-of-a-pin-in-space-at-its-axis",
-        "dynamics/touching_space.py",
+        "dynamics/touching.py",
         "place = plus(end.place, scaled(self.wall, normal))",
         "place = end.place",
         ("tests/reference/test_pins_in_space.py", "-k", "let_go and 0.007"),

@@ -21,10 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
-from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.guards import Crossing, Guards, first_crossing
+from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time

@@ -383,14 +383,14 @@ _DYNAMICS = (
 _STICKING = (
     Fault(
         "shares-beyond-their-end",
-        "dynamics/cases.py",
+        "dynamics/active.py",
         "if most > 1.0 + SLACK or",
         "if most > 1.5 + SLACK or",
         ("tests/reference/test_sticking.py", "-k", "blocks"),
     ),
     Fault(
         "shares-that-are-not-the-least",
-        "dynamics/sticking.py",
+        "dynamics/bordered.py",
         "abs(normal @ wanted) / whole <= best",
         "abs(normal @ wanted) / whole >= best >= 0.0",
         ("tests/invariants/test_least_shares.py",),
@@ -435,7 +435,7 @@ _CONTACT = (
     ),
     Fault(
         "slip-of-a-pin-in-space-at-its-axis",
-        "dynamics/touching_space.py",
+        "dynamics/touching.py",
         "place = plus(end.place, scaled(self.wall, normal))",
         "place = end.place",
         ("tests/reference/test_pins_in_space.py", "-k", "let_go and 0.007"),

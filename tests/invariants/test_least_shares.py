@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from trunnion.dynamics.sticking import least_shares
+from trunnion.dynamics.bordered import least_shares
 
 
 @pytest.mark.parametrize(("rank", "count"), [(1, 1), (1, 4), (2, 2), (2, 5), (3, 6)])

@@ -19,7 +19,6 @@ from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
-from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import MechanismError
 from trunnion.joints.contact import CONTACT_LAWS, hertz_stiffness, loss_factor, restitution_of
 from trunnion.model.mechanism import Mechanism
@@ -157,7 +156,7 @@ def test_machine_code_has_the_rates_of_the_walks() -> None:
 
 def _opened(mechanism: Mechanism) -> tuple[FreeMotion, Array]:
     run = prepare(mechanism)
-    motion = StickingMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
+    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, in_play(mechanism)))
     return motion, initial_row(motion)
 
 

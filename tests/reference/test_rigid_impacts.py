@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import trunnion.dynamics.impact_motion as impact_motion
 from trunnion import simulate
-from trunnion.cli.app import app
-from trunnion.dynamics.closed import ClosedMotion, ClosedRates, rates_of
 from trunnion.dynamics.compiled_closed import compiled_closed
 from trunnion.dynamics.opened import opened
-from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.start import initial_row
+from trunnion.dynamics.state import FreeMotion, rates_of
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.touching import Closed
 from trunnion.errors import MechanismError
@@ -144,28 +141,72 @@ def test_the_speeds_after_the_first_impact() -> None:
     assert np.all(result["impact_impulse"].values > 0)
 
 
-@pytest.mark.slow
-def test_stepping_converges_to_the_events_to_the_first_order() -> None:
-    duration = 4e-3  # one impact
-    followed = simulate(guide(), duration, 1)
-    exact = float(followed["drive_rate"].values[0, -1])
-    steps = np.array([50, 100, 200, 400])
-    found = [simulate(guide(), duration, 1, impact_step=duration / n) for n in steps]
-    errors = np.abs([float(one["drive_rate"].values[0, -1]) - exact for one in found])
-    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.05)
-    assert codes(found[-1]) == ["simulate.energy_stepped"]
-    assert len(events(found[-1], "impact", "S.1")) == 1
-    impulse = float(found[-1]["impact_impulse"].values[0])
-    assert impulse == pytest.approx(float(followed["impact_impulse"].values[0]), rel=0.02)
-
-
-def test_impacts_without_end_are_stepped_through(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_impacts_without_end_are_ended_by_one_without_restitution(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(impact_motion, "CROWD", 2)
     monkeypatch.setattr(impact_motion, "CROWDED", 1.0)
     result = simulate(guide(), 7e-3, 7)
-    (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.stepped"]
+    (finding,) = [one for one in result.trunnion.findings if one.code == "simulate.restitution_lowered"]
     assert finding.figures["time"] == pytest.approx(SECOND, rel=1e-8)
-    assert np.all(np.isfinite(result["drive_rate"].values))
+    assert finding.figures["share"] == 0.0
+    assert events(result, "closes", "S.1")[0] == pytest.approx(SECOND, rel=1e-8)
+    assert balanced(result)
+
+
+def falling(restitution: float, **more: Any) -> Mechanism:
+    """A slider that falls through the play of its guide, on a shoe that holds it upright."""
+    along, upward = {"at": [0, 0], "axis": [1, 0]}, {"at": [0, 0], "axis": [0, 1]}
+    play = {"guide": {"length": 0.1, "height": 0.05, "clearance": CLEARANCE}}
+    return Mechanism(
+        gravity=[0, -9.81],
+        links={
+            "frame": {"points": {"S": along, "Y": along}},
+            "slider": {"points": {"S": along, "B": [0, 0]}, "mass": 0.3, "inertia": 1e-4},
+            "shoe": {"points": {"B": [0, 0], "X": upward}},
+            "ram": {"points": {"X": upward, "Y": along}},
+        },
+        ground="frame",
+        joints={
+            "S": {"type": "prismatic", "links": ["frame", "slider"], **play,
+                  "contact": {"law": "rigid", "restitution": restitution}},
+            "B": {"type": "revolute", "links": ["slider", "shoe"]},
+            "X": {"type": "prismatic", "links": ["ram", "shoe"]},
+            "Y": {"type": "prismatic", "links": ["frame", "ram"]},
+        },
+        drivers={"Y": {"speed": 0.01, "range": [0, 1]}},
+        **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("restitution", "drag"), [(0.3, 0.0), (0.7, 0.0), (0.5, 1.0), (0.5, 2.0)])
+def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: float, drag: float) -> None:
+    """It falls with g − R/m and rises with g + R/m under a resistance R beside it; all bounces are a geometric series,
+    and the drop's energy is lost."""
+    load = {"loads": {"drag": {"joint": "X", "resisting_force": drag}}} if drag else {}
+    result = simulate(falling(restitution, **load), 0.2, 10)
+    down, up = 9.81 - drag / 0.3, 9.81 + drag / 0.3
+    first, speed, slower = np.sqrt(2 * CLEARANCE / down), np.sqrt(2 * CLEARANCE * down), np.sqrt(down / up)
+    rest = first + restitution * speed * (1 / up + slower / down) / (1 - restitution * slower)
+    for corner in ("S.3", "S.4"):
+        assert events(result, "impact", corner)[0] == pytest.approx(first, rel=1e-8)
+        assert events(result, "closes", corner) == [pytest.approx(rest, rel=1e-5)]
+    assert result["contact_touching"].values[:, -1].tolist() == [0, 0, 1, 1]
+    lost = float(result["work_contact"][-1] - result["work_loads"][-1])
+    assert lost == pytest.approx(0.3 * 9.81 * CLEARANCE, rel=1e-8)
+    assert not codes(result)
+
+
+@pytest.mark.slow
+def test_friction_of_other_joints_beside_rigid_impacts() -> None:
+    """Coulomb's, at rest and sliding: the account is right, and less of the speed is left than without."""
+    data = {key: part for key, part in guide().data().items() if part and key not in ("trunnion", "space")}
+    joints = {name: dict(one) for name, one in data["joints"].items()}
+    for name in ("O", "A"):
+        joints[name] |= {"pin": {"radius": 0.01}, "friction": 0.3}
+    found, bare = (simulate(model, 6e-3, 6) for model in (Mechanism(**{**data, "joints": joints}), guide()))
+    assert {of for kind, of, *_ in attribute(found, "events") if kind == "impact"} >= {"S.1", "S.2"}
+    assert float(found["work_friction"][-1]) > 0
+    assert abs(found["drive_rate"].values[0, -1]) < abs(bare["drive_rate"].values[0, -1])
+    assert balanced(found)
 
 
 # ---- closed, stuck and jammed -----------------------------------------------------------------------------------
@@ -246,10 +287,9 @@ def test_machine_code_of_closed_contacts_and_walks() -> None:
     """Rates, works, forces of contacts and what impulses come to, for contacts that fly, slip and stick."""
     mechanism = trammel()
     run = prepare(mechanism)
-    motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, ["H", "V"]))
-    swift, layout = compiled_closed(motion), Layout.of(motion)
-    assert swift is not None
-    fast, slow = ClosedRates(motion, swift), ClosedRates(motion, None)
+    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, ["H", "V"]))
+    fast, slow, layout = compiled_closed(motion), Walks(motion), Layout.of(motion)
+    assert fast is not None
     row = initial_row(motion)
     row[layout.coordinates : 2 * layout.coordinates] = [0.3, -0.2, 0.5, 2.0, -1.0]
     fly: Any = (None,) * 8
@@ -260,7 +300,6 @@ def test_machine_code_of_closed_contacts_and_walks() -> None:
         assert found == pytest.approx(expected, rel=1e-10, abs=1e-9)
         at = layout.moment(np.zeros(2), np.column_stack([row, row]))._replace(onsets=onsets)
         if closed:
-            assert swift.touches(at) is not None
             for here, there in zip(fast.touches(at), slow.touches(at), strict=True):
                 np.testing.assert_allclose(here, there, rtol=1e-10, atol=1e-10)
     one = layout.moment(np.zeros(1), row[:, None])._replace(onsets=fly)
@@ -312,7 +351,7 @@ def test_gaps_and_slips_accelerate_as_their_rates_change(mechanism: Mechanism) -
     """Against central differences of the rates along a motion."""
     run, random = prepare(mechanism), np.random.default_rng(7)
     playing = [name for name, joint in mechanism.effective_joints.items() if joint.contact is not None]
-    motion = ClosedMotion.of(prepare(opened(run).mechanism), contacts_of(run, playing))
+    motion = FreeMotion.of(prepare(opened(run).mechanism), contacts_of(run, playing))
     layout, row = Layout.of(motion), initial_row(motion)
     q, rate, second = (random.normal(size=(len(motion.names), 1)) * size for size in (0.2, 30.0, 500.0))
     q[:, 0] = 0.02 * q[:, 0] + row[: len(q)] + 0.3
@@ -351,12 +390,6 @@ def test_contacts_that_cannot_be(contact: dict[str, Any], where: str) -> None:
 
 
 def test_motions_that_cannot_be() -> None:
-    with pytest.raises(MechanismError) as raised:
-        simulate(pin({"law": "hertz", "stiffness": 1e9}), 1e-4, 1, impact_step=1e-6)
-    assert raised.value.findings[0].where == "impact_step"
-    with pytest.raises(MechanismError) as raised:
-        simulate(pin(RIGID), 1e-4, 1, impact_step=-1.0)
-    assert raised.value.findings[0].where == "impact_step"
     data = {key: part for key, part in guide().data().items() if part and key not in ("trunnion", "space")}
     joints = {name: dict(one) for name, one in data["joints"].items()}
     joints["B"] |= {"pin": {"clearance": 1e-4}, "contact": {"law": "hertz", "stiffness": 1e9}}
@@ -386,15 +419,3 @@ def test_several_joints_in_play_at_once() -> None:
     assert np.all(result["contact_gap"].values > -1e-9 * CLEARANCE)
     assert balanced(result)
     assert not codes(result)
-
-
-def test_a_step_is_stated_on_the_command_line(tmp_path: Path) -> None:
-    model, table = tmp_path / "guide.yaml", tmp_path / "guide.csv"
-    guide().write(model)
-    found = CliRunner().invoke(app, ["simulate", str(model), "--time", "1ms", "--steps", "2", "--impact-step", "100us",
-                                     "--out", str(table)])  # fmt: skip
-    assert found.exit_code == 0, found.output
-    assert table.read_text().count("\n") >= 4
-    found = CliRunner().invoke(app, ["simulate", str(model), "--time", "1ms", "--impact-step", "2s"])
-    assert isinstance(found.exception, MechanismError)
-    assert found.exception.findings[0].where == "impact_step"

@@ -49,14 +49,6 @@ def simulate(
     ] = None,
     steps: Annotated[int, typer.Option("--steps", help="Equal intervals of time in the result.")] = 1000,
     tolerance: Annotated[float, typer.Option("--tolerance", help="Relative tolerance of the integration.")] = 1e-9,
-    impact_step: Annotated[
-        str | None,
-        typer.Option(
-            "--impact-step",
-            help="Step through the impacts of rigid bodies, as 1us, instead of following each.",
-            show_default=False,
-        ),
-    ] = None,
     steady: Annotated[
         bool,
         typer.Option("--steady", help="The cycle that the motion comes to repeat, as `analyse` gives a cycle."),
@@ -87,16 +79,14 @@ def simulate(
 
     of = "cycle" if steady else "motion"
     check_files(out or [], report, of=of, kind=kind if out else None)
-    duration, step = seconds(time, "--time", "2s"), seconds(impact_step, "--impact-step", "1us")
+    duration = seconds(time, "--time", "2s")
     mechanism = stated(file, set_, table, friction)
     if not in_play(mechanism):
         _check_without_play(out or [], of, kind)
     with lines_of(file), bar("%", PERCENT) as progress:
         reached = None if progress is None else lambda share: progress(int(PERCENT * share))
         try:
-            result = simulated(
-                mechanism, duration, steps, tolerance, reached, step, steady, evaluations, pass_change_points
-            )
+            result = simulated(mechanism, duration, steps, tolerance, reached, steady, evaluations, pass_change_points)
         except UnsteadyError as none:
             say(placed(none.findings, file, ["drivers"]))
             raise typer.Exit(exit_status(none.findings)) from None

@@ -12,7 +12,7 @@ from trunnion.dynamics.compiled_rates import Codes
 from trunnion.dynamics.prepared import CYCLES, integration_of, rates_of
 from trunnion.dynamics.start import initial_row, places
 from trunnion.dynamics.started import FIGURES, DriveCourse
-from trunnion.dynamics.sticking import StickingMotion
+from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import MechanismError
 from trunnion.solve.run import Run
 from trunnion.solve.system import Values
@@ -49,7 +49,7 @@ def _alone(
     """The figures of one motion; none where it cannot begin or ends before its time."""
     codes: Codes = run.once("machine code of motions", dict)
     try:
-        motion = StickingMotion.of(Run(run.system, values, run.system.cycle(values), run.chosen))
+        motion = FreeMotion.of(Run(run.system, values, run.system.cycle(values), run.chosen))
         known, row = places(motion), initial_row(motion)
         if not known.limits[0] <= row[0] <= known.limits[1]:
             return {}

@@ -116,10 +116,6 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         return
     yield from _clutches(mechanism, free)
     yield from _contacts(mechanism, playing)
-    if any(joint.contact.of.rigid for joint in mechanism.effective_joints.values() if joint.contact is not None):
-        why = "joints stick one by one, which is not solved beside joints in play between rigid bodies"
-        yield from _sticking(mechanism, free, why, "use another law of contact, or remove it")
-        return
     for where, joint, what in _resisting(mechanism, free):
         if joint in playing:
             yield Finding(
@@ -203,10 +199,3 @@ def _resisting(mechanism: Mechanism, free: list[str]) -> Iterator[tuple[str, str
     for name, load in mechanism.loads.items():
         if load.joint is not None:
             yield f"loads.{name}", load.joint, "the load may hold"
-
-
-def _sticking(mechanism: Mechanism, free: list[str], why: str, remedy: str) -> Iterator[Finding]:
-    """What may hold a joint at rest, where that is not solved."""
-    for where, joint, what in _resisting(mechanism, free):
-        smooth = f"use a law that is smooth at rest: {', '.join(_smooth())}" if where.endswith("friction") else remedy
-        yield Finding(f"{what} joint {joint}, and {why}", where, smooth)

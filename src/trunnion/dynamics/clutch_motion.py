@@ -17,9 +17,9 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from trunnion.dynamics.compiled_rates import CompiledRates
+from trunnion.dynamics.guards import Crossing
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.rates import WORKS, Rates, Walks
@@ -31,8 +31,6 @@ __all__ = ["ClutchMotion"]
 
 Array = NDArray[np.float64]
 
-LOOKED = 8  # parts of a step at whose ends slip and carried effort are looked at
-EXACT = 1e-14  # of the time: to which an event is located
 ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
 
 
@@ -70,14 +68,6 @@ class ClutchRates:
         return rates._replace(slip=spin - drive.ratio * rates.second, integral=error, works=works)
 
 
-class _Changed(Exception):  # noqa: N818 (it is no error)
-    """The clutch slips, or its slip has become 0, at a time within a step."""
-
-    def __init__(self, time: float, row: Array) -> None:
-        super().__init__()
-        self.time, self.row = time, row
-
-
 class ClutchMotion(Integration):
     """One motion, of one free coordinate, whose motor has a clutch."""
 
@@ -86,7 +76,6 @@ class ClutchMotion(Integration):
         self.drive = _drive(self.motion)
         self.rates = ClutchRates(self.drive, cast("CompiledRates | Walks", self.dynamics))
         self.dynamics = self.rates
-        self.resting = False  # whether the rotor alone moves, or it and what prescribed drivers move
         self.meanwhile: Meanwhile | None = None  # what those do
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
         self.known = "holds" if self.drive.engaged(0.0) else "opens"
@@ -133,26 +122,18 @@ class ClutchMotion(Integration):
 
     # ---- where that changes -------------------------------------------------------------------------------------
 
-    def _add(self, stretch: Stretch) -> None:
-        """Add a step, up to where the slip becomes 0 or a clutch that holds carries its capacity."""
-        stretch = stretch._replace(slips=self.slips, resting=stretch.resting or self.resting)
-        times = np.linspace(stretch.begin, stretch.end, LOOKED + 1)
-        left = self._left(stretch, times)
-        over = np.flatnonzero(left[1:] < 0.0)
-        if not len(over):
-            super()._add(stretch)
-            return
-        low, high = float(times[over[0]]), float(times[over[0] + 1])
-        if left[over[0]] > 0.0:
-            low = brentq(lambda t: float(self._left(stretch, np.array([t]))[0]), low, high, xtol=EXACT * high)
-        super()._add(stretch._replace(end=low))
-        row = stretch.state(np.array([low]))[:, 0]
+    def _values(self, stretch: Stretch) -> Callable[[Array], Array]:
+        return lambda times: self._left(stretch, times)[None]
+
+    def _changed(self, crossing: Crossing, row: Array) -> float:
+        """The slip becomes 0, or a clutch that holds carries its capacity."""
         if self.slips:
             row[self.layout.slip] = 0.0
         else:
-            at = self._held(stretch, np.array([high]))
-            self.let_go = float(np.sign(self._carried(at, stretch.resting)[0]))
-        raise _Changed(low, row)
+            last = self.solution.stretches[-1]
+            carried = self._carried(self._holding(last, np.array([crossing.time])), last.resting)
+            self.let_go = float(np.sign(carried[0]))
+        return np.inf
 
     def _left(self, stretch: Stretch, times: Array) -> Array:
         """What is left of the slip, or of the capacity of a clutch that holds; below 0 it has changed."""
@@ -161,38 +142,27 @@ class ClutchMotion(Integration):
             return slip
         if not self.drive.engaged(stretch.now):
             return np.ones_like(times)
-        left: Array = self._capacity - np.abs(self._carried(self._held(stretch, times), stretch.resting))
+        left: Array = self._capacity - np.abs(self._carried(self._holding(stretch, times), stretch.resting))
         return left
 
-    def _held(self, stretch: Stretch, times: Array) -> Moment:
+    def _holding(self, stretch: Stretch, times: Array) -> Moment:
         return self.layout.moment(times, stretch.state(times), stretch.sense, stretch.now)
 
     # ---- the steps ----------------------------------------------------------------------------------------------
 
-    def _move(
-        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
-    ) -> tuple[float, Array, float | None]:
-        try:
-            return super()._move(time, row, until, sense, now, step)
-        except _Changed as changed:
-            self._follow(changed.time, changed.row, sense, now)
-            return changed.time, changed.row, None
-
     def _rest(self, time: float, row: Array, until: float, now: float) -> tuple[float, Array]:
         """Stay; the rotor goes on where the clutch is open or slips."""
         if not self.drive.loose(now, self.slips):
-            try:
-                return super()._rest(time, row, until, now)
-            except _Changed as changed:
-                return changed.time, changed.row
+            return super()._rest(time, row, until, now)
         assert self.rest is not None
         if not self.solution.stretches or not self.solution.stretches[-1].resting:
             self._note(time, "rest")
         end = self.rest.until(time, row, until, now)
         self.resting, self.meanwhile = True, self.rest.meanwhile(time, row, end, now)
-        time, row, _ = self._move(time, row, end, 0.0, now, None)
-        self.resting = False
-        return time, row
+        try:
+            return self._move(time, row, end, 0.0, now, None)[:2]
+        finally:
+            self.resting = False
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Callable[[float, Array], Array]:
         if not self.resting:

@@ -16,7 +16,6 @@ from typing import Any, cast
 import numpy as np
 
 from trunnion.algebra.namespace import Number, namespace
-from trunnion.dynamics.closed import ClosedMotion, Linear
 from trunnion.dynamics.compiled_rates import (
     CompiledRates,
     Figures,
@@ -28,14 +27,14 @@ from trunnion.dynamics.compiled_rates import (
     missing_of,
 )
 from trunnion.dynamics.rates import Seen, works_of
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import FreeMotion, Held, Linear, Moment
 from trunnion.dynamics.touching import ContactState
 from trunnion.solve.forward import Forward
 
 __all__ = ["CompiledClosed", "compiled_closed"]
 
 
-def compiled_closed(motion: ClosedMotion) -> CompiledClosed | None:
+def compiled_closed(motion: FreeMotion) -> CompiledClosed | None:
     """The rates as machine code; None where they cannot be."""
     sure = motion.affine and not motion.sticking
     found = CompiledClosed(motion) if sure and compilable(motion) else None
@@ -50,24 +49,27 @@ class CompiledClosed(CompiledRates):
         if what == "linear":
             return _linear
         if what == "rates" and any(kinds):
-            assert isinstance(self.motion, ClosedMotion)
             return functools.partial(_closed, force=self.motion.force)
         return super().figures(what, kinds)
 
-    def touches(self, at: Moment) -> Seen | None:
-        """The contacts with their forces, in many lanes, some of them closed; None where there is any doubt."""
+    def look(self, at: Moment) -> Seen:
+        """See `rates.Seeing`; without forces."""
+        return super().look(at._replace(onsets=(None,) * len(at.onsets)))
+
+    def touches(self, at: Moment) -> Seen:
+        """See `rates.Rigid`; by walks where there is any doubt."""
         found = self._program("rates", at).run(at)
         if np.any(found[-1]) or not np.all(np.isfinite(found)):
-            return None
+            return self.walks.touches(at)
         return Seen(*found[self.last : -1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
-    def linear(self, at: Moment) -> Linear | None:
-        """See `ClosedMotion.linear`; None where there is any doubt."""
+    def linear(self, at: Moment) -> Linear:
+        """See `rates.Rigid`; by walks where there is any doubt."""
         count, contacts = self.layout.coordinates, len(at.onsets)
         free = at._replace(onsets=(None,) * contacts)
         found = self._program("linear", free).run(free)[:, 0]
         if found[-1] or not np.all(np.isfinite(found)):
-            return None
+            return self.walks.linear(at)
         mass, rest = found[: count * count].reshape(count, count).T, found[count * count : -1]
         ways = rest[: 2 * contacts * count].reshape(count, 2 * contacts).T
         return Linear(mass, ways, *np.split(rest[2 * contacts * count :], [2 * contacts]))
@@ -99,24 +101,24 @@ def _rates(states: Sequence[ContactState]) -> list[Number]:
 
 def _closed(motion: FreeMotion, at: Moment, force: float) -> list[Number]:
     """What the rates are, and of every contact what `rates.Seen` has."""
-    assert isinstance(motion, ClosedMotion)
     nothing: Any = [0.0] * len(motion.names)
     free = at._replace(onsets=(None,) * len(at.onsets))
     still = free._replace(rate=nothing)
-    closed, sticks = motion.closed(at)
+    held = motion.held(at)
+    contacts = len(held.closed) + len(held.walls)
     columns = [column + more for column, more in zip(columns_of(motion, at),
-               _driven(motion, still, closed, sticks), strict=True)]  # fmt: skip
+               _driven(motion, still, held), strict=True)]  # fmt: skip
     zero = missing_of(motion, still, nothing)
-    for k in range(len(closed) + len(sticks)):
-        forces = [force if i == k else 0.0 for i in range(len(closed) + len(sticks))]
-        pushed = missing_of(motion, still._replace(onsets=motion.forced(at.onsets, forces, closed, sticks)), nothing)
+    for k in range(contacts):
+        forces = [force if i == k else 0.0 for i in range(contacts)]
+        pushed = missing_of(motion, still._replace(onsets=motion.forced(at.onsets, forces, held)), nothing)
         own: list[Number] = [(one - rest) / force for one, rest in zip(pushed, zero, strict=True)]
-        columns.append(own + [0.0] * (len(closed) + len(sticks)))
-    right = [*missing_of(motion, free, nothing), *_kept(motion, motion.walk(free, nothing), closed, sticks)]
+        columns.append(own + [0.0] * contacts)
+    right = [*missing_of(motion, free, nothing), *_kept(motion, motion.walk(free, nothing), held)]
     numbers, pivots = eliminated([list(row) for row in zip(*columns, strict=True)], [-one for one in right])
     second: Any = numbers[: len(nothing)]
-    onsets = motion.forced(at.onsets, numbers[len(nothing) :], closed, sticks)
-    done = at._replace(onsets=motion.shared(onsets, sticks))
+    onsets = motion.forced(at.onsets, numbers[len(nothing) :], held)
+    done = at._replace(onsets=motion.shared(onsets, held.walls))
     found = motion.contacts.pushes(motion.walk(at, nothing), done.onsets)
     touches = [(state.gap, state.rate, state.slip, push.normal, push.friction) for state, push in found]
     seen = [one[i] for i in range(len(Seen._fields)) for one in touches]
@@ -127,18 +129,18 @@ def _closed(motion: FreeMotion, at: Moment, force: float) -> list[Number]:
     return [*second, *errors_of(motion, at), *works_of(back, done, motion.contacts), *seen, 0.0]
 
 
-def _driven(motion: ClosedMotion, still: Moment, closed: Sequence[int], sticks: Sequence[int]) -> list[list[Number]]:
+def _driven(motion: FreeMotion, still: Moment, held: Held) -> list[list[Number]]:
     """W: accelerations of gaps and of slips that stay 0, by those of the coordinates; a list for each coordinate."""
     unit, nothing = motion.trial, cast("Any", [0.0] * len(motion.trial))
-    zero, found = _kept(motion, motion.walk(still, nothing), closed, sticks), []
+    zero, found = _kept(motion, motion.walk(still, nothing), held), []
     for k, size in enumerate(unit):
         step: Any = [size if i == k else 0.0 for i in range(len(unit))]
-        moved = _kept(motion, motion.walk(still, step), closed, sticks)
+        moved = _kept(motion, motion.walk(still, step), held)
         found.append([(one - rest) / size for one, rest in zip(moved, zero, strict=True)])
     return found
 
 
-def _kept(motion: ClosedMotion, walk: Forward, closed: Sequence[int], sticks: Sequence[int]) -> list[Number]:
+def _kept(motion: FreeMotion, walk: Forward, held: Held) -> list[Number]:
     """Accelerations that closed contacts keep at 0: of gaps, and of slips of those that stick."""
-    moved = {k: motion.contacts.each[k].accelerations(walk) for k in closed}
-    return [*(moved[k][0] for k in closed), *(moved[k][1] for k in sticks)]
+    moved = {k: motion.contacts.each[k].accelerations(walk) for k in held.closed}
+    return [*(moved[k][0] for k in held.closed), *(moved[k][1] for k in held.walls)]

@@ -13,8 +13,7 @@ from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.opened import Opened
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books
-from trunnion.dynamics.shown import Touches, as_stated
-from trunnion.dynamics.shown_space import JointsInSpace
+from trunnion.dynamics.shown import JointsInSpace, Touches, as_stated
 from trunnion.dynamics.solution import Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Onset

@@ -1,7 +1,9 @@
-"""Where a step ends a motion: at the end of a driver's range, or where two assemblies of the links meet.
+"""Where something changes within a step: located on its dense output.
 
-Both are looked for on the dense output of every step, and located there. Of one driver alone the places are known
-beforehand, and are approached from one side: see `integrate`.
+What ends a step - a gap that closes, a joint that comes to rest or breaks away, a clutch that lets go - is a number
+that becomes negative, see `first_crossing`. A motion ends at the end of a driver's range, or where two assemblies of
+the links meet, see `Guards`; of one driver alone these places are known beforehand, and are approached from one side:
+see `integrate`.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +20,64 @@ from scipy.optimize import brentq
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.solution import Ended, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.errors import Status
 from trunnion.solve.change_points import touched
+from trunnion.solve.status import NEAR_SINGULAR, pose_status, worst_condition
 
-__all__ = ["Guards"]
+__all__ = ["Crossing", "DeadCentre", "Guards", "first_crossing"]
 
 Array = NDArray[np.float64]
 
 LOOKS = 12  # parts of a step at whose ends one looks
 ROUNDING = 1e-9  # of a coordinate: by how much it may seem beyond its range where it begins at the end of it
 NEARLY = 0.1  # of 1/condition: where a straight line from the last two looks leaves less at the next, it may touch zero
-
-
 FORESEEN = 1e-3  # of 1/condition: from there on it is foreseen where it touches zero
+FINE = 40  # halvings towards the beginning of a step, where a number that has just changed its sign is next to nothing
+LARGE = 1e300  # for a number without bound
+SHRUNK = 3  # steps one after the other, each no longer than the last, from which it is looked for
+RUBBING = 20.0  # condition from which it is near where joints rub: their friction grows with it and costs more and more
+BESIDE = 0.25  # of the way that is left: poses there, on both sides, confirm the place
+
+
+class Crossing(NamedTuple):
+    """A number that becomes negative: its row, and the time, s."""
+
+    row: int
+    time: float
+
+
+def first_crossing(values: Callable[[Array], Array], begin: float, times: Array) -> Crossing | None:
+    """The first number that becomes negative within a step, at a time at which it is negative.
+
+    values: (number, time), which are not negative where the step begins but for rounding; times: at which one looks, up
+    to the end of the step.
+    """
+    negative, first = values(times) < 0.0, None
+    for row in np.flatnonzero(negative.any(axis=1)):
+
+        def value(time: float, row: int = int(row)) -> float:
+            return min(float(values(np.array([time]))[row, 0]), LARGE)
+
+        k = int(np.argmax(negative[row]))
+        low, high = float(times[k - 1]) if k else begin, float(times[k])
+        if k == 0:  # it may have changed its sign at the beginning: look for where it is as it should be
+            nearer = begin + (high - begin) * 0.5 ** np.arange(FINE, -1.0, -1.0)
+            near = values(nearer)[row]
+            good = np.flatnonzero(near > 0.0)
+            low, high = (nearer[good[-1]], high) if len(good) else (nearer[np.argmax(near < 0.0)],) * 2
+        place = _far_side(value, low, high)
+        if first is None or place < first.time:
+            first = Crossing(int(row), place)
+    return first
+
+
+def _far_side(value: Callable[[float], float], low: float, high: float) -> float:
+    """Where a number becomes negative, on the side on which it is: a force that begins there has begun."""
+    place = float(brentq(value, low, high, xtol=1e-16, rtol=8.9e-16)) if value(low) > 0.0 else low
+    step = np.spacing(abs(place))
+    while place < high and value(place) >= 0.0:
+        place, step = min(place + step, high), 2.0 * step
+    return place
 
 
 @dataclass
@@ -145,6 +194,45 @@ class Guards:
             return np.asarray(rows)
 
         return stretch._replace(state=state)
+
+
+@dataclass
+class DeadCentre:
+    """Watches the steps of one free coordinate for the dead centre of its joint, to see it before it is reached.
+
+    There the links go on while the driven coordinate q turns round, q* − q ~ (t* − t)²: the inertia reduced to it grows
+    without bound, and the links cannot be assembled beyond. Steps shrink in proportion to t* − t and would never
+    arrive. The place is foreseen from the last step, t* = t − q̇/q̈ and q* = q − q̇²/(2 q̈), and confirmed by poses on
+    both sides.
+    """
+
+    motion: FreeMotion
+    layout: Layout
+    shrunk: int = 0
+    last: float = np.inf
+
+    def reached(self, solver: Any, size: float) -> tuple[float, dict[str, float]] | None:
+        """Time, s, and place of a dead centre that the steps run into, if they are near; size: of the last step, s."""
+        self.shrunk, self.last = (self.shrunk + 1 if size <= self.last else 0), size
+        n = self.layout.coordinates
+        if len(self.motion.names) != 1 or not hasattr(solver, "f"):
+            return None
+        row, speed, second = solver.y, float(solver.y[n]), float(solver.f[n])
+        if self.shrunk < SHRUNK or not speed * second < 0.0:
+            return None
+        left, way = -speed / second, -0.5 * speed * speed / second
+        beside = np.array([float(row[0]), float(row[0]) + (1 - BESIDE) * way, float(row[0]) + (1 + BESIDE) * way])
+        rows = np.repeat(np.asarray(row, float)[:, None], 3, axis=1)
+        rows[0] = beside
+        at = self.layout.moment(np.full(3, float(solver.t)), rows)
+        with np.errstate(all="ignore"):
+            walk = self.motion.walk(at, np.zeros_like(at.q))
+            nearest = NEAR_SINGULAR if self.motion.affine else RUBBING
+            near = np.broadcast_to(worst_condition(walk), (3,))[0] > nearest
+            status = pose_status(walk, (3,))
+        if not near or status[1] == Status.NOT_ASSEMBLED or status[2] != Status.NOT_ASSEMBLED:
+            return None
+        return float(solver.t) + left, {"coordinate": float(row[0]) + way, "rate": 0.0}
 
 
 def _root(stretch: Stretch, number: int, level: float, low: float, high: float) -> float:

@@ -3,25 +3,25 @@
 Impulses Λ at the places change the rates of gaps and slips, γ⁺ = γ⁻ + G Λ with G = W M⁻¹ Wᵀ. At every place either
 nothing is exchanged and γₙ⁺ ≥ −e γₙ⁻, or γₙ⁺ = −e γₙ⁻ with an impulse Λₙ ≥ 0 and one along the tangent, |Λₜ| ≤ f Λₙ,
 that is −f Λₙ times the sign of the slip γₜ⁺: a linear complementarity problem (Ch. Glocker, F. Pfeiffer, Multibody
-Dynamics with Unilateral Contacts, Wiley, 1996; without tangential restitution). There are few places, so that its cases
-are gone through one by one.
+Dynamics with Unilateral Contacts, Wiley, 1996; without tangential restitution). Its cases change by the worst place
+first, see `active.settled`.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.dynamics.active import Mode, Modes, settled
+
 __all__ = ["OPEN", "STICK", "Struck", "strike"]
 
 Array = NDArray[np.float64]
 
-OPEN, STICK, FORWARD, BACKWARD = None, 0, 1, -1
-Case = int | None
+OPEN, STICK = None, 0
 
 CLOSE = 1e-12  # of the largest speed or impulse: differences that are rounding
 HALVINGS = 60
@@ -33,29 +33,27 @@ class Struck(NamedTuple):
 
     impulse: Array
     after: Array
-    cases: tuple[Case, ...]
+    cases: Modes
     loss: float
     kept: float = 1.0
 
 
-def strike(
-    delassus: Array, before: Array, restitution: Array, friction: Array, old: Array | None = None
-) -> Struck | None:
+def strike(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:
     """The impact at some places; None if no case fits.
 
     delassus: G, 1/kg, (2 places, 2 places); before: γ⁻, m/s, (2 places,), normals first; restitution, friction: of each
-    place; old: rates to which the restitution refers, where forces have changed them since.
+    place.
     Newton's law may gain energy where friction turns the slip round (T. R. Kane, D. A. Levinson, Dynamics: Theory and
     Applications, McGraw-Hill, 1985); the restitutions are then lowered together until nothing is gained, for without
     any the law always loses.
     """
-    found = _struck(delassus, before, restitution, friction, old)
+    found = _struck(delassus, before, restitution, friction)
     if found is None or found.loss >= -CLOSE * _energy(found, before):
         return found
     low, high, best = 0.0, 1.0, None
     for _ in range(HALVINGS):
         share = 0.5 * (low + high) if best is not None else 0.0
-        tried = _struck(delassus, before, share * restitution, friction, old)
+        tried = _struck(delassus, before, share * restitution, friction)
         if tried is not None and tried.loss >= 0.0:
             low, best = share, tried._replace(kept=share)
         elif best is None:
@@ -69,32 +67,25 @@ def _energy(found: Struck, before: Array) -> float:
     return float(np.abs(found.impulse) @ (np.abs(before) + np.abs(found.after)))
 
 
-def _struck(delassus: Array, before: Array, restitution: Array, friction: Array, old: Array | None) -> Struck | None:
-    """The first case that fits."""
+def _struck(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:
+    """The case to which no place objects; at first none exchanges anything."""
     places = len(restitution)
-    first = before if old is None else old
-    back = -restitution * np.minimum(first[:places], 0.0)
-    speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
-    for cases in _cases(friction, before):
-        found = _solved(delassus, before, back, friction, cases)
-        if found is not None and _fits(*found, back, friction, cases, speed):
-            impulse, after = found
-            loss = -0.5 * float(impulse @ (first + after))
-            return Struck(impulse, after, cases, loss)
-    return None
+    back = -restitution * np.minimum(before[:places], 0.0)
+
+    def objections(cases: Modes) -> Mapping[int, Mode] | None:
+        impulse, after = _solved(delassus, before, back, friction, cases)
+        return _objections(impulse, after, before, back, friction, cases)
+
+    senses = _senses(before)
+    choices = [(OPEN, s, STICK, -s) if f > 0.0 else (OPEN, s) for f, s in zip(friction, senses, strict=True)]
+    cases = settled([OPEN] * places, objections, choices)
+    if cases is None:
+        return None
+    impulse, after = _solved(delassus, before, back, friction, cases)
+    return Struck(impulse, after, cases, -0.5 * float(impulse @ (before + after)))
 
 
-def _cases(friction: Array, before: Array) -> Iterator[tuple[Case, ...]]:
-    """All that may happen at the places; without friction a place slips as before."""
-    places = len(friction)
-    senses = np.where(before[places:] < 0.0, BACKWARD, FORWARD)
-    own = [(OPEN, int(s), STICK, -int(s)) if f > 0.0 else (OPEN, int(s)) for f, s in zip(friction, senses, strict=True)]
-    return itertools.product(*own)
-
-
-def _solved(
-    delassus: Array, before: Array, back: Array, friction: Array, cases: tuple[Case, ...]
-) -> tuple[Array, Array] | None:
+def _solved(delassus: Array, before: Array, back: Array, friction: Array, cases: Modes) -> tuple[Array, Array]:
     """Impulses and rates after of one case: as many equations as places that exchange something."""
     places = len(cases)
     unknown, wanted, spread = list[int](), list[float](), np.zeros((2 * places, 2 * places))
@@ -116,22 +107,31 @@ def _solved(
     return impulse, before + delassus @ impulse
 
 
-def _fits(
-    impulse: Array, after: Array, back: Array, friction: Array, cases: tuple[Case, ...], speed: float
-) -> bool:  # fmt: skip
-    """Whether a case keeps its inequalities and, where its equations were singular, its equations."""
-    places = len(cases)
+def _senses(before: Array) -> list[int]:
+    """Of the slips before."""
+    return [-1 if slip < 0.0 else 1 for slip in before[len(before) // 2 :]]
+
+
+def _objections(
+    impulse: Array, after: Array, before: Array, back: Array, friction: Array, cases: Modes
+) -> Mapping[int, Mode] | None:
+    """The place that breaks its law most, and what it seems to do instead; None: the equations of a case, which were
+    singular, are not kept."""
+    places, senses = len(cases), _senses(before)
     normal, tangent, size = impulse[:places], impulse[places:], CLOSE * max(float(np.max(np.abs(impulse))), 1e-300)
+    speed = CLOSE * max(float(np.max(np.abs(before))), 1e-300)
+    worst: list[tuple[float, int, Mode]] = [(1.0, -1, OPEN)]
     for k, case in enumerate(cases):
-        gap, slip = after[k] - back[k], after[places + k]
-        if gap < -speed:
-            return False
+        gap, slip = (after[k] - back[k]) / speed, after[places + k] / speed
         if case is OPEN:
+            worst.append((-gap, k, senses[k]))
             continue
-        if abs(gap) > speed or normal[k] < -size or (case == STICK and abs(slip) > speed):
-            return False
-        if friction[k] > 0.0 and case * slip < -speed:
-            return False
-        if case == STICK and abs(tangent[k]) > friction[k] * normal[k] + size:
-            return False
-    return True
+        if abs(gap) > 1.0 or (case == STICK and abs(slip) > 1.0):
+            return None
+        worst.append((-normal[k] / size, k, OPEN))
+        if case == STICK:
+            worst.append(((abs(tangent[k]) - friction[k] * normal[k]) / size, k, -int(np.sign(tangent[k]))))
+        elif friction[k] > 0.0:
+            worst.append((-case * slip, k, STICK))
+    _, k, mode = max(worst, key=lambda miss: miss[0])
+    return {} if k < 0 else {k: mode}

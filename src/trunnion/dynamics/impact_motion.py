@@ -3,26 +3,27 @@
 A step ends where a gap closes, and Newton's law gives the rates after it (`impact_law`). Where the rebounds become
 lower than what the gap is known to, the impacts accumulate: the contact closes, and stays so under a force that keeps
 its gap at 0 (`closed`), until that force becomes 0. A closed contact slips or sticks; a change of that ends a step,
-too. Where there are impacts without end the time is stepped from then on (`impact_steps`).
+too. Where impacts of several places crowd without end, one without restitution ends them.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, OdeSolver
 
 from trunnion.algebra.dual import primal
-from trunnion.dynamics.contact_motion import Crossing, Dense, Impact, OpenContact, step_nodes
-from trunnion.dynamics.impact_law import OPEN, Struck
-from trunnion.dynamics.impact_steps import SteppedMotion
-from trunnion.dynamics.rates import Seen
-from trunnion.dynamics.solution import Stretch
-from trunnion.dynamics.state import Accelerated
+from trunnion.dynamics.active import MEET as SLOW
+from trunnion.dynamics.active_motion import ActiveMotion, Dense, Impact, OpenContact, step_nodes
+from trunnion.dynamics.bordered import nearest
+from trunnion.dynamics.impact_law import OPEN, Struck, strike
+from trunnion.dynamics.rates import Rigid, Seen
+from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.state import Linear, Moment
 from trunnion.dynamics.touching import Closed, Onset
 
 __all__ = ["ImpactMotion"]
@@ -33,53 +34,42 @@ Onsets = tuple[Onset, ...]
 LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
 MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell
 CROWD, CROWDED = 100, 1e-9  # events within so much of the duration: they have no end
-STEPPED = 1e-4  # of a cycle: the step from there on
 FLIGHT = 0.1  # of the time to the next impact: the first step after one
-SMALL = 1e-9  # of the largest force or acceleration: what is 0 but for rounding
 STILL = 1e-12  # of the speeds of an impact: a slip that is 0
 
 
 @dataclass
-class ImpactMotion(SteppedMotion):
+class ImpactMotion(ActiveMotion):
     """An integration that follows the impacts of rigid bodies from event to event."""
 
     recent: list[float] = field(default_factory=list)
+    pauses: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.rows = 2 * self.count
+        self.rigid, each = cast("Rigid", self.dynamics), self.motion.contacts.each
+        self.friction = np.array([one.coefficient for one in each])
+        self.restitution = np.array([one.restitution for one in each])
         size = float(np.ravel(primal(self.motion.system.size(self.motion.values)))[0])
-        self.pull = size * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
         self.meet = MEET * self.motion.contacts.least_clearance
         self.low = np.array([max(LOW * one.clearance, ROUNDED * size) for one in self.motion.contacts.each])
-
-    def _move(
-        self, time: float, row: Array, until: float, sense: float, now: float, step: float | None
-    ) -> tuple[float, Array, float | None]:
-        """Move until something changes at a contact, or the next break; step through where that has no end."""
-        if len(self.recent) == CROWD and self.recent[-1] - self.recent[0] < CROWDED * self.duration:
-            self.impact_step = STEPPED * (self.motion.cycle.duration or self.duration)
-            self.solution.notes["simulate.stepped"] = {"time": time, "step": self.impact_step}
-            self.recent.clear()
-        if self.impact_step is not None:
-            return SteppedMotion._move(self, time, row, until, sense, now, step)
-        return super(SteppedMotion, self)._move(time, row, until, sense, now, step)
 
     # ---- what ends a step -------------------------------------------------------------------------------------
 
     def _touches(self, dense: Dense, times: Array) -> Seen:
         """The contacts with their forces at times of a step."""
-        at = self.layout.moment(times, np.asarray(dense(times)))._replace(onsets=self.onsets)
         with np.errstate(all="ignore"):
-            return self.closed_rates.touches(at)
+            return self.rigid.touches(self._at(dense, times))
 
-    def _gaps(self, dense: Dense, times: Array) -> Array:
-        """What stays above 0 within a step, (2 contacts, time): gap or normal force, and slip or what friction has left
+    def _gaps(self, at: Moment) -> Array:
+        """What stays above 0 within a step, (2 contacts, lane): gap or normal force, and slip or what friction has left
         before it slips."""
-        found = np.ones((2 * self.count, len(times)))
+        found = np.ones((2 * self.count, len(at.time)))
         if not any(self.onsets):
-            found[: self.count] = self._look(dense, times).gap
+            found[: self.count] = self.rigid.look(at).gap
             return found
-        seen = self._touches(dense, times)
+        seen = self.rigid.touches(at)
         for k, onset in enumerate(self.onsets):
             found[k] = seen.normal[k] if onset else seen.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
@@ -88,9 +78,8 @@ class ImpactMotion(SteppedMotion):
         return found
 
     def _measured(self, stretch: Stretch) -> None:
-        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step; where
-        it is stepped they are those of the impulses."""
-        if not self._open or self.solution.stepped:
+        """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step."""
+        if not self._open:
             return
         times, weights = step_nodes(stretch.begin, stretch.end)
         seen = self._touches(stretch.state, times)
@@ -99,24 +88,23 @@ class ImpactMotion(SteppedMotion):
             one.impulse += float(weights @ seen.normal[k])
             one.wear += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
 
-    def _changed(self, crossing: Crossing, row: Array) -> float:
+    def _met(self, k: int, time: float, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
-        k, time = crossing.contact % self.count, crossing.time
+        contact = k % self.count
         self.recent = [*self.recent, time][-CROWD:]
-        onset = self.onsets[k]
+        onset = self.onsets[contact]
         if not isinstance(onset, Closed):
-            return self._impact(k, time, row)
-        if crossing.contact < self.count:
-            self._end(k, time, 0.0)
-            self._set({k: None})
+            return self._impact(contact, time, row)
+        if k < self.count:
+            self._end(contact, time, 0.0)
+            self._set({contact: None})
             return np.inf
-        together = [other for other in self._closed() if self._surface(other) == self._surface(k)]
+        together = [other for other in self._closed() if self._surface(other) == self._surface(contact)]
         if onset.sense:  # the slip ends
             self._set(dict.fromkeys(together, Closed(0)))
             self._project(time, row)
-            self._settle(time, row)
         else:
-            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[k, 0]
+            friction = self._touches(lambda times: row[:, None], np.array([time])).friction[contact, 0]
             self._set(dict.fromkeys(together, Closed(-int(np.sign(friction)))))
         return np.inf
 
@@ -135,26 +123,60 @@ class ImpactMotion(SteppedMotion):
         """An impact at a contact, with those that are closed and those that meet at the same time; how long the first
         step after it may be, s."""
         at = self.moment(time, row, 0.0, 0.0)
-        linear = self.closed_rates.linear(at)
+        linear = self.rigid.linear(at)
         rates = linear.driven + linear.ways @ at.rate[:, 0]
         meet = (linear.gaps <= self.meet) & (rates[: self.count] < 0.0)
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
-        found, pauses = self._law(linear, places, rates, self.restitution), dict[int, float]()
+        crowded = len(self.recent) == CROWD and self.recent[-1] - self.recent[0] < CROWDED * self.duration
+        restitution = np.zeros(self.count) if crowded else self.restitution
+        found, pauses = self._law(linear, places, rates, restitution), dict[int, float]()
         if found is not None:
             flights = self._flights(time, row, places, rates, *found)
             pauses = {i: pause for i, (pause, low) in flights.items() if low}
             if pauses:
-                restitution = np.where([i in pauses for i in range(self.count)], 0.0, self.restitution)
+                restitution = np.where([i in pauses for i in range(self.count)], 0.0, restitution)
                 found = self._law(linear, places, rates, restitution)
         if found is None:
             self._stop("no_contact_force", time, row)
             return np.inf
         struck, change = found
-        if struck.kept < 1.0:
-            self._lowered(time, struck.kept)
+        if crowded:
+            self.recent.clear()
+        if crowded or struck.kept < 1.0:
+            self._lowered(time, 0.0 if crowded else struck.kept)
         self._strike_off(row, change, self._driven(at, change, struck, places, linear.driven), struck.loss)
         self._after(time, row, places, rates, struck, pauses)
         return FLIGHT * min((pause for pause, low in flights.values() if not low), default=np.inf)
+
+    def _law(self, linear: Linear, places: list[int], rates: Array, restitution: Array) -> tuple[Struck, Array] | None:
+        """The law's answer at some places, and the change of the rates of the coordinates. rates: of gaps and slips of
+        all contacts."""
+        rows = [*places, *(self.count + k for k in places)]
+        ways = linear.ways[rows]
+        spread = np.linalg.solve(linear.mass, ways.T)
+        struck = strike(ways @ spread, rates[rows], restitution[places], self.friction[places])
+        return None if struck is None else (struck, spread @ struck.impulse)
+
+    def _driven(self, at: Moment, change: Array, struck: Struck, places: list[int], driven: Array) -> float:
+        """Work that drivers whose motion is stated do in an impact, J."""
+        names = [name for name in self.motion.system.mechanism.drivers if name not in self.motion.names]
+        if not names:
+            return 0.0
+        free = at._replace(onsets=(None,) * self.count)
+        still, struck_so = (self.motion.solve(free, second) for second in (0.0 * at.q, change[:, None]))
+        given = sum(
+            float(np.ravel(primal((struck_so.efforts[name] - still.efforts[name]) * still.walk.rate(name)))[0])
+            for name in names
+        )
+        rows = [*places, *(self.count + k for k in places)]
+        return given - float(struck.impulse @ driven[rows])
+
+    def _strike_off(self, row: Array, change: Array, drive: float, loss: float) -> None:
+        """Let an impact change a row: rates, and the works of drivers and contacts."""
+        n, works = self.layout.coordinates, self.layout.works(row)
+        row[n : 2 * n] += change
+        works[0] += drive
+        works[-1] += loss
 
     def _lowered(self, time: float, kept: float) -> None:
         """Take down that an impact kept less than its restitution."""
@@ -208,66 +230,34 @@ class ImpactMotion(SteppedMotion):
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
         self._project(time, row, places)
-        if closed:
-            self._settle(time, row, pauses)
+        self.pauses = dict(pauses)
+        if self.senses:
+            self._torn(time, row)
+
+    def _torn(self, time: float, row: Array) -> None:
+        """Joints that stuck until an impact slide on with the speeds that it leaves them."""
+        senses = list(self.senses)
+        for k, speed in enumerate(self.motion.ways(self.moment(time, row, 0.0, 0.0))[1]):
+            if abs(speed) > SLOW and np.sign(speed) != senses[k]:
+                if senses[k] == 0:
+                    self.solution.events.append(
+                        Event(time, "break-away", self.motion.resisted[k], float(np.sign(speed)))
+                    )
+                senses[k] = int(np.sign(speed))
+        self.senses = tuple(senses)
 
     # ---- closed -----------------------------------------------------------------------------------------------
 
-    def _settle(self, time: float, row: Array, pauses: Mapping[int, float] | None = None) -> None:
-        """Which of the contacts that could be closed are, and whether those without slip stick: the first case that
-        forces and accelerations allow."""
-        at, may = self.moment(time, row, 0.0, 0.0), dict(enumerate(self.onsets))
-        for onsets in self._cases():
-            found = self.motion.accelerate(at._replace(onsets=onsets))
-            if not self._holds(onsets, found):
-                continue
-            self.onsets = onsets
-            for k, onset in enumerate(onsets):
-                if onset is not None and k not in self._open:
-                    self._open[k] = OpenContact(time + (pauses or {}).get(k, 0.0), 0.0)
-                    self._say(self._open[k].begin, "closes", k, np.nan)
-                elif onset is None and may[k] is not None and k in self._open:
-                    self._end(k, time, 0.0)
-            return
-        self._stop("no_contact_force", time, row)
-
-    def _cases(self) -> Iterator[Onsets]:
-        """What the closed contacts may do: go on slipping, stick, begin to slip either way, or open."""
-        own: list[tuple[Onset, ...]] = []
-        for k, onset in enumerate(self.onsets):
-            if not isinstance(onset, Closed):
-                own.append((None,))
-            elif onset.sense or self.friction[k] == 0.0:
-                own.append((Closed(onset.sense or 1), None))
-            else:
-                own.append((Closed(0), Closed(1), Closed(-1), None))
-        for case in itertools.product(*own):  # what lies on one wall sticks or slips as one
-            senses = [(self._surface(k), one.sense) for k, one in enumerate(case) if isinstance(one, Closed)]
-            if len(set(senses)) == len({surface for surface, _ in senses}):
-                yield case
-
-    def _holds(self, onsets: Onsets, found: Accelerated) -> bool:
-        """Whether the forces of a case push, and nothing sinks in or slips against its friction."""
-        if np.any(found.turned) or not np.all(np.isfinite(found.second)):
-            return False
-        walk, force = found.back.walk, SMALL * self.rigid.force
-        small = SMALL * max(float(np.max(np.abs(found.second / self.motion.unit[:, None]))), 1.0) * self.pull
-        for k, (onset, one) in enumerate(zip(self.onsets, self.motion.contacts.each, strict=True)):
-            if onset is None:
-                continue
-            gap, slip = (float(np.ravel(part)[0]) for part in one.accelerations(walk))
-            now = found.onsets[k]
-            if not isinstance(now, Closed):
-                if gap < -small:
-                    return False
-                continue
-            normal, friction = (float(np.ravel(part)[0]) for part in (now.normal, now.friction))
-            begins = isinstance(onset, Closed) and onset.sense == 0
-            if normal < -force or (begins and now.sense and now.sense * slip < -small):
-                return False
-            if now.sense == 0 and abs(friction) > self.friction[k] * normal + force:
-                return False
-        return True
+    def _let(self, time: float, onsets: tuple[Onset, ...]) -> None:
+        """Tell which of the contacts that could be closed are."""
+        before, self.onsets = self._closed(), onsets
+        for k in before:
+            if onsets[k] is None and k in self._open:
+                self._end(k, time, 0.0)
+            elif onsets[k] is not None and k not in self._open:
+                self._open[k] = OpenContact(time + self.pauses.get(k, 0.0), 0.0)
+                self._say(self._open[k].begin, "closes", k, np.nan)
+        self.pauses = {}
 
     def _project(self, time: float, row: Array, struck: Sequence[int] = ()) -> None:
         """Take the gaps of closed contacts, and their rates, to 0, and the gaps of those just struck that are below it:
@@ -275,21 +265,25 @@ class ImpactMotion(SteppedMotion):
         n, closed = self.layout.coordinates, self._closed()
         at = self.moment(time, row, 0.0, 0.0)
         for _ in range(2):
-            linear = self.closed_rates.linear(at)
+            linear = self.rigid.linear(at)
             shut = [*closed, *(k for k in struck if self.onsets[k] is None and linear.gaps[k] < 0.0)]
             if not shut:
                 return
-            row[:n] -= _nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
+            row[:n] -= nearest(linear.mass, linear.ways[shut], linear.gaps[shut])
             at = self.moment(time, row, 0.0, 0.0)
         if not closed:
             return
-        linear = self.closed_rates.linear(at)
+        if stuck := [k for k, sense in enumerate(self.senses) if sense == 0]:
+            row[n : 2 * n] = self.motion.stopped(at, stuck)
+            return
+        linear = self.rigid.linear(at)
         sticks = [self.count + k for k in closed if self.onsets[k] == Closed(0)]
         ways, rates = linear.ways[[*closed, *sticks]], linear.driven + linear.ways @ row[n : 2 * n]
-        row[n : 2 * n] -= _nearest(linear.mass, ways, rates[[*closed, *sticks]])
+        row[n : 2 * n] -= nearest(linear.mass, ways, rates[[*closed, *sticks]])
 
-    def _held(self, solver: OdeSolver, row: Array) -> None:
+    def _end_step(self, solver: OdeSolver, row: Array) -> None:
         """Nothing drifts: the next step begins from closed gaps."""
+        super()._end_step(solver, row)
         if not any(self.onsets):
             return
         time = float(solver.t)
@@ -302,10 +296,3 @@ class ImpactMotion(SteppedMotion):
         """Why a state has no acceleration; empty if it has one."""
         found = super()._cause(time, row, sense, now)
         return "no_contact_force" if found == "no_acceleration" and any(self.onsets) else found
-
-
-def _nearest(mass: Array, ways: Array, missed: Array) -> Array:
-    """The least change of coordinates, in the sense of the masses, that changes W x by so much."""
-    spread = np.linalg.solve(mass, ways.T)
-    found: Array = spread @ np.linalg.lstsq(ways @ spread, missed, rcond=1e-13)[0]
-    return found

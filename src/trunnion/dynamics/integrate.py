@@ -21,15 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853, LSODA, OdeSolver
 
-from trunnion.dynamics.dead_centre import DeadCentre
 from trunnion.dynamics.energy import kinetic_energy
 from trunnion.dynamics.followed import Snapshot
-from trunnion.dynamics.guards import Guards
+from trunnion.dynamics.guards import Crossing, DeadCentre, Guards, first_crossing
 from trunnion.dynamics.rates import WORKS, Dynamics, Layout, Walks
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.solution import CLOSE, Ended, Event, Solution, Stretch, by_time
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.stiffness import shortest
+from trunnion.dynamics.touching import Onset
 from trunnion.errors import Status
 from trunnion.solve.status import pose_status
 
@@ -44,6 +44,7 @@ CREEPING = ((400, 1e-9), (40, 1e-12))  # steps that get on by less of the durati
 SEVERAL, LOOKED = "simulate.several_accelerations", 32  # steps after which one looks for other accelerations
 AHEAD = 1e-6  # of a typical time: how far ahead of a step that fails one looks for what keeps it
 STUCK = 50  # events at one time
+LOOKS = 12  # times within a step at which one looks for what changes
 RETRIES = 5  # first steps, each 100 times shorter than the last, of an integrator that has asked where nothing is known
 NEAR = 1e-8  # of the coordinate: places that are one
 SLIGHT = 1e-6  # of a typical acceleration: one that may be rounding
@@ -53,6 +54,14 @@ MEETING = 1e-3  # likewise, of a bend at which assemblies meet: the digits of th
 
 class _Over(Exception):  # noqa: N818 (it is no error)
     """The motion ends with the last step; `Solution.ended` says why."""
+
+
+class _Changed(Exception):  # noqa: N818 (it is no error)
+    """A row of the motion has changed within a step, which ends there. stretch: of the step to its end."""
+
+    def __init__(self, crossing: Crossing, stretch: Stretch) -> None:
+        super().__init__()
+        self.crossing, self.stretch = crossing, stretch
 
 
 class Passing(NamedTuple):
@@ -69,7 +78,7 @@ class Integration:
     bends: coordinates within one cycle of one free driver at which a force jumps or bends, and the cycle's length;
     limits: by driver the coordinates between which it may move; progress: told the share of the duration that is
     reached; times: s, at which a load jumps or bends; evaluations: of the forces, at most, a walk counted as WALK;
-    meetings: see `Places`.
+    meetings: see `Places`; onsets, senses: how contacts and joints that may stick are, see `Moment`.
     """
 
     motion: FreeMotion
@@ -83,6 +92,8 @@ class Integration:
     times: Sequence[float] = ()
     evaluations: int = MOST_EVALUATIONS
     meetings: Sequence[tuple[float, int]] = ()
+    onsets: tuple[Onset, ...] = ()
+    senses: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         self.layout = Layout.of(self.motion)
@@ -90,7 +101,7 @@ class Integration:
         known = [time for drive in self.motion.drives.values() for time in drive.times]
         times = {time for time in (*known, *self.times) if 0 < time < self.duration}
         self.pace = np.sqrt(self.motion.unit)  # typical rates
-        self.turned_over, self.asked_for, self.slips = 0.0, 0, 0.0
+        self.turned_over, self.asked_for, self.slips, self.resting = 0.0, 0, 0.0, False
         self._doubts = 0
         self.breaks = [*sorted(times), self.duration]
         self.rest = Rest(self.motion, self.layout) if self.motion.rests else None
@@ -123,21 +134,43 @@ class Integration:
             k = next(k for k, one in enumerate(self.breaks) if one > time + CLOSE * self.duration)
             until, now = self.breaks[k], 0.5 * (self.breaks[k] + (self.breaks[k - 1] if k else 0.0))
             self._couple(time, row, now)
-            if self.rest is not None and row[self.layout.coordinates] == 0.0:
-                sense = self.rest.sense(time, row, now)
-                if sense == 0.0:
-                    time, row = self._rest(time, row, until, now)
-                    continue
-                self._note(time, "break-away", sense)
-            time, row, step = self._move(time, row, until, sense, now, step)
+            if self.solution.ended:
+                return
+            try:
+                if self.rest is not None and row[self.layout.coordinates] == 0.0:
+                    sense = self.rest.sense(time, row, now)
+                    if sense == 0.0:
+                        time, row = self._rest(time, row, until, now)
+                        continue
+                    self._note(time, "break-away", sense)
+                time, row, step = self._move(time, row, until, sense, now, step)
+            except _Changed as change:
+                time, stretch = change.crossing.time, change.stretch
+                row = stretch.state(np.array([time]))[:, 0]
+                self._follow(time, row, stretch.sense, now)
+                step = min(self._changed(change.crossing, row), stretch.end - stretch.begin)
         self.end("events", time, {"count": float(MOST_EVENTS)})
 
     def moment(self, time: float, row: Array, sense: float, now: float) -> Moment:
         """The state of a row."""
-        return self.layout.moment(np.array([time]), row[:, None], sense, now, self.slips)
+        at = self.layout.moment(np.array([time]), row[:, None], sense, now, self.slips)
+        return at._replace(onsets=self.onsets, senses=self.senses)
+
+    # ---- rows that may hold, slip or be open: none of one free coordinate without a clutch --------------------------
 
     def _couple(self, time: float, row: Array, now: float) -> None:
-        """Find what else changes at an event: nothing, without a clutch."""
+        """Find how they are from here on; `row` is what it is after it."""
+
+    def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
+        """By time what stays above 0 within a step until one of them changes, (row, time); None: there are none."""
+        return None
+
+    def _changed(self, crossing: Crossing, row: Array) -> float:
+        """Let one change, and `row` with it; how long the first step after it may be, s."""
+        raise NotImplementedError
+
+    def _end_step(self, solver: OdeSolver, row: Array) -> None:
+        """What they need at the end of a step."""
 
     def _begins(self, row: Array) -> bool:
         """Whether there are accelerations at the start; they also tell what rates are typical."""
@@ -171,8 +204,13 @@ class Integration:
         self.solution.events.append(Event(time, kind, self.motion.names[0], figure, unit))
 
     def _add(self, stretch: Stretch) -> None:
-        """Add a step, up to where the motion ends in it."""
-        stretches = self.solution.stretches
+        """Add a step, up to where a row changes or the motion ends in it."""
+        stretches, full, crossing = self.solution.stretches, stretch, None
+        if values := self._values(stretch):
+            times = np.linspace(stretch.begin, stretch.end, LOOKS + 1)[1:]
+            crossing = first_crossing(values, stretch.begin, times)
+        if crossing is not None:
+            stretch = stretch._replace(end=crossing.time)
         stretch, ended = self.guards.bounded(stretch, stretches[-1] if stretches else None)
         self._measured(stretch)
         stretches.append(stretch)
@@ -186,6 +224,13 @@ class Integration:
         if ended is not None:
             self.solution.ended = ended
             raise _Over
+        if crossing is not None:
+            raise _Changed(crossing, full)
+
+    def _step(self, begin: float, end: float, state: Callable[[Array], Array], sense: float, now: float) -> None:
+        """Add a step that was integrated."""
+        rows = self.onsets, self.senses, self.slips
+        self._add(Stretch(begin, end, state, sense, self.resting, now, self.snapshot, *rows))
 
     def _measured(self, stretch: Stretch) -> None:
         """What contacts come to in a step: nothing, where there are none."""
@@ -222,7 +267,7 @@ class Integration:
                 self.layout.works(rows)[: len(WORKS)] += meanwhile.works(moments)
             return rows
 
-        self._add(Stretch(time, end, held, 0.0, True, now))
+        self._add(Stretch(time, end, held, 0.0, True, now, slips=self.slips))
         return end, held(np.array([end]))[:, 0]
 
     # ---- in motion --------------------------------------------------------------------------------------------
@@ -263,8 +308,9 @@ class Integration:
             if passed is not None:
                 last = float(solver.step_size or 0.0)
                 return (*self._approach(before, row, passed, until, sense, now, rate), last or None)
-            self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
+            self._step(before, float(solver.t), solver.dense_output(), sense, now)
             self._follow(float(solver.t), np.array(solver.y), sense, now)
+            self._end_step(solver, np.array(solver.y))
             self._compare(before, row, sense, now)
             if found := dead_centre.reached(solver, float(solver.t) - before):
                 self._turns_round(*found)
@@ -278,6 +324,8 @@ class Integration:
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
+            if not np.all(np.isfinite(numbers)):  # no more of a step one of whose rates is unknown
+                return np.full(len(numbers), np.nan)
             speeds = numbers[n : 2 * n]
             asked = numbers.copy()
             if not one_way:
@@ -413,7 +461,7 @@ class Integration:
             if solver.y[k] > until:
                 return self._plain(float(held[k]), before, until, sense, now, rate)
             along = by_time(solver.dense_output(), last, float(solver.t), k)
-            self._add(Stretch(float(held[k]), float(solver.y[k]), along, sense, False, now, self.snapshot))
+            self._step(float(held[k]), float(solver.y[k]), along, sense, now)
         found = np.array(solver.y)
         end, found[k] = float(found[k]), to.value
         self._follow(end, found, sense, now)
@@ -447,7 +495,7 @@ class Integration:
             failed = solver.step()
             if solver.status == "failed":
                 return self._failed(before, np.array(solver.y), sense, now, failed)[:2]
-            self._add(Stretch(before, float(solver.t), solver.dense_output(), sense, False, now, self.snapshot))
+            self._step(before, float(solver.t), solver.dense_output(), sense, now)
         return float(solver.t), np.array(solver.y)
 
     def _absolute(self, row: Array) -> Array:

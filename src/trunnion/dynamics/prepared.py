@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
+from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.clutch_motion import ClutchMotion
 from trunnion.dynamics.compiled_rates import Codes, CompiledRates, compiled_rates
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.start import Places, load_times, ranges
 from trunnion.dynamics.state import FreeMotion
-from trunnion.dynamics.stick_motion import StickMotion
 
 __all__ = ["CYCLES", "FINEST", "integration_of", "rates_of"]
 
@@ -31,7 +31,7 @@ def integration_of(
     times = load_times(motion, duration)
     limits = ranges(motion, motion.names, known)
     if motion.resisted:
-        return StickMotion(
+        return ActiveMotion(
             motion, rates, duration, tolerance, limits=limits, progress=progress, times=times, evaluations=evaluations
         )
     kind = ClutchMotion if any(drive.clutched for drive in motion.drives.values()) else Integration

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
-from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Contacts, ContactState, Push
+from trunnion.dynamics.state import FreeMotion, Linear, Moment
+from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
@@ -22,6 +22,7 @@ __all__ = [
     "Dynamics",
     "Layout",
     "Rates",
+    "Rigid",
     "Seeing",
     "Seen",
     "Walks",
@@ -72,9 +73,22 @@ class Seen(NamedTuple):
 
 
 class Seeing(Dynamics, Protocol):
-    """What also tells how the contacts are, in many lanes."""
+    """What also tells, of several coordinates, the derivative of a row and how the contacts are in many lanes."""
+
+    def derivative(
+        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
+    ) -> Array: ...
 
     def look(self, at: Moment) -> Seen: ...
+
+
+class Rigid(Seeing, Protocol):
+    """What also tells the contacts with their forces while some stay closed, in many lanes, and what impulses come
+    to."""
+
+    def touches(self, at: Moment) -> Seen: ...
+
+    def linear(self, at: Moment) -> Linear: ...
 
 
 class Layout(NamedTuple):
@@ -128,7 +142,7 @@ class Walks:
     """The rates by walks through the modules: works for every mechanism, and is what faster ways are held against."""
 
     def __init__(self, motion: FreeMotion) -> None:
-        self.motion = motion
+        self.motion, self.layout = motion, Layout.of(motion)
         self._last: Array | None = None
 
     def __call__(self, at: Moment) -> Rates:
@@ -163,6 +177,25 @@ class Walks:
         motion = self.motion
         found = motion.contacts.pushes(motion.walk(at, np.zeros_like(at.q)), at.onsets)
         return seen_of(found, at.q.shape[1])
+
+    def derivative(
+        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
+    ) -> Array:
+        """The derivative of a row; NaN for no answer."""
+        n = self.layout.coordinates
+        at = self.layout.moment(np.array([time]), row[:, None], now=now)
+        with np.errstate(all="ignore"):
+            rates = self(at._replace(onsets=tuple(onsets), senses=senses))
+        return self.layout.row(row[n : 2 * n], rates) if rates.sound else np.full(len(row), np.nan)
+
+    def touches(self, at: Moment) -> Seen:
+        """See `Rigid`."""
+        solved = self.motion.accelerate(at)
+        return seen_of(self.motion.contacts.pushes(solved.back.walk, solved.onsets), at.q.shape[1])
+
+    def linear(self, at: Moment) -> Linear:
+        """See `Rigid`."""
+        return self.motion.linear(at)
 
 
 def seen_of(found: Sequence[tuple[ContactState, Push]], lanes: int) -> Seen:

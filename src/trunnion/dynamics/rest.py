@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
+from trunnion.dynamics.guards import first_crossing
 from trunnion.dynamics.rates import Layout, powers_of
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.solve.backward import Backward
@@ -18,7 +18,6 @@ __all__ = ["Meanwhile", "Rest"]
 Array = NDArray[np.float64]
 
 SCANNED = 200  # times of a rest at which what drives it is looked at, where that changes
-HALVED = 40  # times that what is left of a stretch is halved, in search of where a drive on the brink breaks away
 SHARES = 40  # bisections of the share of the friction that acts at rest
 PANELS, NODES = 16, 8  # of a rest, and places in each at which powers are asked for
 
@@ -71,23 +70,9 @@ class Rest:
         """The time at which it breaks away, or the end of the stretch."""
         if not self._changes:
             return until
-        times = np.linspace(time, until, SCANNED + 1)
-
-        def most(moments: Array) -> Array:
-            return np.maximum(*self.beyond(moments, row, time, now))
-
-        over = np.flatnonzero(most(times)[1:] > 0)
-        if not len(over):
-            return until
-        low, high = times[over[0]], times[over[0] + 1]
-        if not np.isfinite(at_low := float(most(np.array([low]))[0])):
-            return float(high)
-        if at_low >= 0.0:  # on the brink when it came to rest: the first moment that is beyond it by more than rounding
-            later = low + (high - low) * 0.5 ** np.arange(HALVED, -1.0, -1.0)
-            return float(later[np.argmax(most(later) > 0.0)])
-        found = brentq(lambda t: float(most(np.array([t]))[0]), low, high, xtol=1e-14)
-        # on the far side, so that it does move on
-        return float(min(until, found + 1e-13 * max(1.0, abs(found))))
+        times = np.linspace(time, until, SCANNED + 1)[1:]
+        crossing = first_crossing(lambda moments: -np.maximum(*self.beyond(moments, row, time, now))[None], time, times)
+        return until if crossing is None else crossing.time
 
     @property
     def _changes(self) -> bool:

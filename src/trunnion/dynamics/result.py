@@ -13,7 +13,7 @@ from trunnion.cycle.findings import effort_units
 from trunnion.cycle.scales import largest
 from trunnion.cycle.scene import scene_of
 from trunnion.cycle.summary import inputs, member_units, references
-from trunnion.dynamics.contact_motion import Impact
+from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.motor import switched
 from trunnion.dynamics.opened import is_rigid
 from trunnion.dynamics.rates import CLUTCH, WORKS
@@ -314,7 +314,7 @@ WORST = 1e-6  # of the energy turned over: a difference that is worth a warning
 
 def _unbalanced(found: Found) -> Iterator[Finding]:
     if found.share > WORST:
-        yield finding_for("simulate.energy_stepped" if found.solution.stepped else "simulate.energy", share=found.share)
+        yield finding_for("simulate.energy", share=found.share)
 
 
 def _undefined(books: Books) -> Iterator[Finding]:

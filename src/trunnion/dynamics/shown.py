@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
+from trunnion.algebra.space import NULL, Screw, about, added, moment_at
+from trunnion.algebra.unwrap import unwrap_row
+from trunnion.algebra.vector import Vector3, dot, scaled
 from trunnion.cycle import fill
-from trunnion.dynamics.contact_motion import Impact
+from trunnion.dynamics.active_motion import Impact
+from trunnion.dynamics.opened import Opened, in_play
 from trunnion.dynamics.touching import Contacts, ContactState, Push
+from trunnion.joints.pairs import PAIRS
 from trunnion.results import variables as results
 from trunnion.results.dataset import Variable
 from trunnion.results.figure import Figure
+from trunnion.solve.backward import Backward
+from trunnion.solve.contacts import bearing_middle
+from trunnion.solve.forward import SpatialWalk
 from trunnion.solve.run import Run
 
-__all__ = ["CONTACT", "IMPACT", "Touches", "as_stated", "impact_arrays", "impact_figures"]
+__all__ = ["CONTACT", "IMPACT", "JointsInSpace", "Touches", "as_stated", "impact_arrays", "impact_figures"]
 
 Array = NDArray[np.float64]
+Touched = Sequence[tuple[ContactState, Push]]
 
 CONTACT: dict[str, Variable] = {
     "contact_gap": Variable(("contact", "time"), "m", "gap of the contact, negative where it touches"),
@@ -65,9 +75,7 @@ class Touches(NamedTuple):
         flat, deep = (contacts, times), (contacts, axes, times)
         return cls(*(np.full(flat, np.nan) for _ in range(6)), *(np.full(deep, np.nan) for _ in range(3)))
 
-    def fill(
-        self, lanes: NDArray[np.intp], found: Sequence[tuple[ContactState, Push]], onsets: Sequence[object]
-    ) -> None:
+    def fill(self, lanes: NDArray[np.intp], found: Touched, onsets: Sequence[object]) -> None:
         """Write the rows of one walk."""
         for k, (state, push) in enumerate(found):
             self.gap[k, lanes], self.normal[k, lanes] = state.gap, push.normal
@@ -162,6 +170,71 @@ def _fill_slide(run: Run, joint: str, found: dict[str, Array], labels: Mapping[s
     for suffix, name in (("", "position"), ("_velocity", "velocity"), ("_acceleration", "acceleration")):
         apart = found[f"point_{name}"][other] - found[f"point_{name}"][one]
         found[f"joint_slide{suffix}"][row] = c * apart[0] + s * apart[1]
+
+
+@dataclass
+class JointsInSpace:
+    """Motion and reaction of the joints that the opened mechanism does not have. arrays: of the mechanism as stated,
+    in which their rows alone are filled; times: how many there are."""
+
+    opened: Opened
+    contacts: Contacts
+    times: int
+    arrays: dict[str, Array] = field(init=False)
+
+    def __post_init__(self) -> None:
+        system = self.opened.run.system
+        self.arrays = fill.allocate(system, self.times)
+        self.cut = in_play(system.mechanism)
+        self.rows = {joint: k for k, joint in enumerate(system.joints) if joint in (*self.cut, *self.opened.parts)}
+        for name, array in self.arrays.items():
+            if "joint" in results.variables("spatial")[name].dims:
+                array[list(self.rows.values())] = np.nan
+
+    def fill(self, back: Backward, touched: Touched, window: slice) -> None:
+        """The rows of one walk of the opened mechanism."""
+        run = self.opened.run
+        local = run.system.elements(run.values)
+        own = {key: hole for key, hole in run.system.holes(run.values).items() if key[1] in self.cut}
+        motions = {link: back.walk.motions[link] for link in run.system.mechanism.effective_links}
+        walk = SpatialWalk(run.system, run.values, {**local, **own}, motions, back.walk.time)
+        for joint, row in self.rows.items():
+            fill.fill_joint(self.arrays, walk, row, joint, window)
+            middle, axis = bearing_middle(walk, joint), walk.ends(joint)[1].z
+            whole, rubbing, lost = self._wrenches(back, joint, touched)
+            fill.put(self.arrays["reaction_force"], row, whole.u, window)
+            fill.put(self.arrays["reaction_moment"], row, moment_at(whole, middle), window)
+            fill.put(self.arrays["friction_moment"], row, moment_at(rubbing, middle), window)
+            self.arrays["friction_torque"][row, window] = dot(moment_at(rubbing, middle), axis)
+            self.arrays["friction_force"][row, window] = dot(rubbing.u, axis)
+            self.arrays["friction_power"][row, window] = lost
+
+    def _wrenches(self, back: Backward, joint: str, touched: Touched) -> tuple[Screw, Screw, Array | float]:
+        """What a joint does to its second link, all and by friction, and what is lost to this, W."""
+        if joint in self.opened.parts:
+            return back.reactions[self.opened.parts[joint][-1]], Screw(NULL, NULL), 0.0
+        whole, rubbing, lost = Screw(NULL, NULL), Screw(NULL, NULL), np.zeros(1)
+        for one, (state, push) in zip(self.contacts.each, touched, strict=True):
+            if one.joint != joint:
+                continue
+            tangent, normal, place = _vector(state.tangent), _vector(state.normal), _vector(state.place)
+            along = about(scaled(-push.friction, tangent), NULL, place)
+            rubbing = added(rubbing, along)
+            whole = added(whole, added(about(scaled(push.normal, normal), NULL, place), along))
+            lost = lost - push.friction * state.slip
+        return whole, rubbing, lost
+
+    def unwrap(self, time: Array) -> None:
+        """Rotations without jumps of a whole turn."""
+        step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+        for joint, row in self.rows.items():
+            if PAIRS[self.opened.run.system.joints[joint][0]].angle:
+                unwrap_row(self.arrays["joint_rotation"][row], self.arrays["joint_rotation_velocity"][row], step)
+
+
+def _vector(numbers: Sequence[float | Array]) -> Vector3:
+    x, y, z = numbers
+    return x, y, z
 
 
 def impact_arrays(impacts: Sequence[Impact]) -> dict[str, Array]:

@@ -9,23 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
-from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_closed import compiled_closed
-from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
 from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
-from trunnion.dynamics.rates import Layout
+from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges
 from trunnion.dynamics.state import FreeMotion
 from trunnion.dynamics.stated_contacts import contacts_of
 from trunnion.dynamics.steady import steady as steady_result
-from trunnion.dynamics.stick_motion import StickMotion
-from trunnion.dynamics.sticking import StickingMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
@@ -56,7 +53,6 @@ def simulate(
     steps: int = 1000,
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
-    impact_step: float | None = None,
     steady: bool = False,
     evaluations: int = MOST_EVALUATIONS,
     pass_change_points: bool = False,
@@ -75,8 +71,6 @@ def simulate(
         Relative, of every step of the integration.
     progress
         Called with the share of the duration that is reached, from 0 to 1.
-    impact_step
-        s, of Moreau's time stepping of joints in play between rigid bodies; from event to event if not given.
     steady
         Instead of the motion from its start the cycle that it comes to repeat, see `dynamics.steady_cycle`.
     evaluations
@@ -103,9 +97,7 @@ def simulate(
     The free coordinates accelerate so that the effort the modules demand is what the motors give (`dynamics.state`);
     integrated from event to event (`dynamics.integrate`).
     """
-    return simulated(
-        mechanism, duration, steps, tolerance, progress, impact_step, steady, evaluations, pass_change_points
-    ).dataset
+    return simulated(mechanism, duration, steps, tolerance, progress, steady, evaluations, pass_change_points).dataset
 
 
 @np.errstate(all="ignore")
@@ -115,7 +107,6 @@ def simulated(
     steps: int = 1000,
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
-    impact_step: float | None = None,
     steady: bool = False,
     evaluations: int = MOST_EVALUATIONS,
     pass_change_points: bool = False,
@@ -128,12 +119,11 @@ def simulated(
         refuse_undetermined(run)
     duration = CYCLES * run.cycle.duration if duration is None else duration
     _check_numbers(duration, steps, tolerance, evaluations)
-    _check_step(impact_step, duration, mechanism)
     if steady:
         return steady_result(mechanism, duration, steps, tolerance, progress, evaluations)
     if playing:
-        return _with_play(run, duration, steps, tolerance, progress, impact_step, evaluations, pass_change_points)
-    motion = StickingMotion.of(run, passing=pass_change_points)
+        return _with_play(run, duration, steps, tolerance, progress, evaluations, pass_change_points)
+    motion = FreeMotion.of(run, passing=pass_change_points)
     known = places(motion)
     rates, row, time = rates_of(motion), initial_row(motion), np.linspace(0.0, duration, steps + 1)
     _check_start(motion, row, ranges(motion, motion.names, known))
@@ -151,13 +141,12 @@ def _balanced(find: Callable[[float], Found], tolerance: float) -> Found:
     """A motion whose energy account is right to ACCOUNT, or MISSED times a coarse tolerance, if a finer one has it so.
 
     A step over a bend of a force that is not known beforehand, as where a reaction turns round, may be wrong by more
-    than its estimate says; the account tells. What has used up its evaluations, or is stepped to the first order, is
-    left as it is.
+    than its estimate says; the account tells. What has used up its evaluations is left as it is.
     """
     best, most = find(tolerance), max(ACCOUNT, MISSED * tolerance)
     for _ in range(FINER):
         tolerance = max(0.1 * tolerance, FINEST)
-        if not best.share > most or best.solution.stepped or _exhausted(best):
+        if not best.share > most or _exhausted(best):
             break
         other = find(tolerance)
         if _exhausted(other) or not other.share < best.share:
@@ -174,20 +163,20 @@ def _exhausted(found: Found) -> bool:
 
 def _with_play(
     run: Run, duration: float, steps: int, tolerance: float, progress: Callable[[float], None] | None,
-    impact_step: float | None, evaluations: int, passing: bool,
+    evaluations: int, passing: bool,
 ) -> Result:  # fmt: skip
     """The motion of a mechanism whose joints in play are taken out, as one of the mechanism that was stated."""
     bare = opened(run)
     contacts = contacts_of(run, in_play(run.system.mechanism))
     loose = prepare(bare.mechanism, free=True)
     refuse_undetermined(loose, in_play(run.system.mechanism))
-    motion = (ClosedMotion if is_rigid(run.system.mechanism) else StickingMotion).of(loose, contacts, passing)
+    motion = FreeMotion.of(loose, contacts, passing)
     row, limits = initial_row(motion), ranges(motion, run.system.mechanism.drivers, Places())
     _check_start(motion, row, limits)
     refuse_massless(motion, row)
     fine = tolerance * min(1.0, contacts.least_clearance / float(np.ravel(run.system.size(run.values))[0]))
     times, time = load_times(motion, duration), np.linspace(0.0, duration, steps + 1)
-    integrating = _integrating(motion, impact_step)
+    integrating = _integrating(motion, is_rigid(run.system.mechanism))
 
     def found(tolerance: float) -> Found:
         integration = integrating(
@@ -203,11 +192,11 @@ def _with_play(
     return result_of(motion, _balanced(found, max(fine, FINEST)), duration, run)
 
 
-def _integrating(motion: FreeMotion, impact_step: float | None) -> Callable[..., ContactMotion]:
+def _integrating(motion: FreeMotion, rigid: bool) -> Callable[..., ActiveMotion]:
     """What integrates a motion with joints in play."""
-    if isinstance(motion, ClosedMotion):
-        return partial(ImpactMotion, motion, ClosedRates(motion, compiled_closed(motion)), impact_step=impact_step)
-    return partial(StickMotion if motion.resisted else ContactMotion, motion, rates_of(motion))
+    if rigid:
+        return partial(ImpactMotion, motion, compiled_closed(motion) or Walks(motion))
+    return partial(ActiveMotion, motion, rates_of(motion))
 
 
 def _check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[float, float]]) -> None:
@@ -232,20 +221,6 @@ def _check_start(motion: FreeMotion, row: Array, limits: Mapping[str, tuple[floa
         what = "begins where nothing moves that has a mass, as at a dead centre, so that it has no acceleration there"
         remedy = "state the inertia of the link or the rotor that it turns, or begin elsewhere"
         raise MechanismError(Finding(what, f"drivers.{motion.names[0]}.initial", remedy))
-
-
-def _check_step(step: float | None, duration: float, mechanism: Mechanism) -> None:
-    """MechanismError for a step that makes no sense, or that nothing takes."""
-    if step is None:
-        return
-    if not is_rigid(mechanism):
-        what = "no joint is in play between rigid bodies, so that there is nothing to step through"
-        raise MechanismError(
-            Finding(what, "impact_step", "remove it, or state contact: {law: rigid, restitution: 0.5}")
-        )
-    if not duration / MOST_STEPS <= step <= duration:
-        remedy = f"give a time from {duration / MOST_STEPS:g} s to {duration:g} s"
-        raise MechanismError(Finding(f"a step of {step:g} s", "impact_step", remedy))
 
 
 def _check_numbers(duration: float, steps: int, tolerance: float, evaluations: int) -> None:

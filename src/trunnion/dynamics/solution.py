@@ -62,7 +62,7 @@ class Ended(NamedTuple):
 class Solution:
     """What an integration found: stretches one after the other, events, and why it ended early, if it did.
 
-    notes: figures of findings by their code; stepped: whether some of it is stepped, to the first order.
+    notes: figures of findings by their code.
     """
 
     layout: Layout
@@ -71,7 +71,6 @@ class Solution:
     ended: Ended | None = None
     asked: int = 0
     notes: dict[str, dict[str, Any]] = field(default_factory=dict)
-    stepped: bool = False
 
     @property
     def end(self) -> float:

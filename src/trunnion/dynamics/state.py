@@ -2,8 +2,10 @@
 
 Free coordinates q accelerate so that the effort which the walk demands of every free driver is what its motor gives:
 E(q, q̇, q̈, t) = T(q̇, q̈, t). Without friction E is affine in q̈; with it E is piecewise smooth, and the equations are
-solved by Newton's method on the walks themselves: one lane for q̈ and one more for each coordinate. No mass matrix of
-the whole mechanism is assembled, and nothing is solved that the analysis of a prescribed motion does not solve.
+solved by Newton's method on the walks themselves: one lane for q̈ and one more for each unknown. What holds - joints
+that stick, contacts of rigid bodies that stay closed - adds its forces to the unknowns and its own accelerations, which
+stay 0, to the equations. No mass matrix of the whole mechanism is assembled, and nothing is solved that the analysis of
+a prescribed motion does not solve.
 """
 
 from __future__ import annotations
@@ -18,9 +20,10 @@ from numpy.typing import NDArray
 
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
+from trunnion.dynamics.bordered import RANK, nearest, newton_step
 from trunnion.dynamics.followed import Followed, Snapshot, follows
 from trunnion.dynamics.motor import Drive, drives
-from trunnion.dynamics.touching import Contacts, Onset
+from trunnion.dynamics.touching import Closed, Contacts, ContactState, Onset
 from trunnion.errors import Finding, MechanismError
 from trunnion.solve.backward import Backward, Given, Sense, solve
 from trunnion.solve.forward import Assembly, Forward, forward
@@ -29,13 +32,13 @@ from trunnion.solve.loads import LoadAction
 from trunnion.solve.run import Run
 from trunnion.solve.system import Cycle, System, Values, felt, freed, law_of, rubbing, sticking
 
-__all__ = ["Accelerated", "FreeMotion", "Moment", "ahead", "repeated"]
+__all__ = ["Accelerated", "FreeMotion", "Held", "Linear", "Moment", "rates_of", "repeated"]
 
 Array = NDArray[np.float64]
 
 ROUNDS = 30  # of Newton's method
 SETTLED = 1e-11  # of the largest acceleration: where it ends
-CLOSE = 1e-6  # a step of which the next is below rounding, for it converges to the square
+HELD = 1e-8  # of the largest: what is solved may miss as much
 FAR = 1e3  # times what is typical: an acceleration beyond which the step of the derivative was too short
 BEYOND = 1e6  # times what is typical: an acceleration at which inertia is all there is
 DIFFERENCE = 1e-4  # of the acceleration, by which the derivative is taken where E is not affine
@@ -79,6 +82,26 @@ class Accelerated(NamedTuple):
     converged: NDArray[np.bool_]
     onsets: tuple[Onset, ...] = ()
     shares: Array | None = None
+
+
+class Held(NamedTuple):
+    """The rows that hold at a moment: joints of `FreeMotion.resisted` that stick, contacts that stay closed, and of
+    those contacts that stick the first on every wall, which is given the friction of all."""
+
+    joints: Sequence[int] = ()
+    closed: Sequence[int] = ()
+    walls: Sequence[int] = ()
+
+
+class Linear(NamedTuple):
+    """At one moment: masses M (coordinate, coordinate), how rates of gaps and slips follow from those of the
+    coordinates, W (2 contacts, coordinate), gaps first, what they are without, (2 contacts,), m/s, and the gaps, m,
+    (contact,)."""
+
+    mass: Array
+    ways: Array
+    driven: Array
+    gaps: Array
 
 
 @dataclass(frozen=True)
@@ -164,9 +187,29 @@ class FreeMotion:
     @cached_property
     def unit(self) -> Array:
         """An acceleration typical of each coordinate, rad/s² or m/s²."""
+        return self._typical(self.names)
+
+    @cached_property
+    def typical(self) -> Array:
+        """An acceleration typical of each joint that may stick, rad/s² or m/s²."""
+        return self._typical(self.resisted)
+
+    def _typical(self, joints: Sequence[str]) -> Array:
         pace = max(float(np.ravel(primal(self.system.pace(self.values)))[0]), 1e-300)
         size = float(np.ravel(self.system.size(self.values))[0])
-        return np.array([pace * pace * (1.0 if self.system.turns(name) else size) for name in self.names])
+        return np.array([pace * pace * (1.0 if self.system.turns(name) else size) for name in joints])
+
+    @cached_property
+    def force(self) -> float:
+        """A typical force, N."""
+        size, mass = float(np.ravel(self.system.size(self.values))[0]), 0.0
+        pace = float(np.ravel(primal(self.system.pace(self.values)))[0])
+        for link in self.system.mechanism.effective_links:
+            mass += self._number(f"links.{link}.mass") + self._number(f"links.{link}.inertia") / size**2
+        return max(mass * size * pace * pace, 1e-300)
+
+    def _number(self, path: str) -> float:
+        return float(np.ravel(primal(self.values.get(path, 0.0)))[0])
 
     @cached_property
     def trial(self) -> Array:
@@ -290,52 +333,130 @@ class FreeMotion:
         found = [np.broadcast_to(primal(back.efforts[name]), shape[1:]) for name in self.names]
         return np.array(found, float).reshape(shape)
 
-    def missing(self, at: Moment, second: Array, zero_slip: Mapping[str, Sense]) -> Array:
-        """E − T, (coordinate, lane)."""
-        back = self.solve(at, second, zero_slip, sliding=True)
-        found: Array = self.demanded(back, at.q.shape) - self.given(at, second, zero_slip)
+    def accelerate(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
+        """The accelerations at which every free driver is given what the walk demands, with what holds the rows that
+        hold; NaN where there are none. pulls: relative accelerations that the joints that stick are to have, (joint
+        that sticks, 1), rad/s² or m/s²; none if not given.
+
+        Where the search ends on a side of where a reaction turns round on which there is no answer, or on which more
+        acceleration takes less effort, it is begun from far away on other sides.
+        """
+        found = self.searched(at, guess, pulls)
+        left = found.turned | (~found.converged & (found.shares is None))
+        if self.affine or not np.any(left):
+            return found
+        second = np.nan_to_num(found.second)
+        for start in self.far(second).T:
+            other = self.searched(at, np.where(left, start[:, None], second), pulls)
+            better = left & other.converged & ~other.turned
+            second = np.where(better, other.second, second)
+            left &= ~better
+            if not np.any(left):
+                return self.searched(at, second, pulls)
         return found
 
-    def accelerate(self, at: Moment, guess: Array | None = None) -> Accelerated:
-        """The accelerations at which every free driver is given what the walk demands; NaN where there are none."""
-        count, lanes = at.q.shape
-        second = self.begun(at) if guess is None else np.array(guess, float)
-        turned, step = np.zeros(lanes, bool), np.full((count, lanes), np.inf)
-        largest = np.maximum(np.max(np.abs(second), axis=0), 0.0)
-        senses, before, last = self.beginning(at), second, second
+    def searched(self, at: Moment, guess: Array | None = None, pulls: Array | None = None) -> Accelerated:
+        """See `accelerate`, from one place."""
+        held, senses, (count, lanes) = self.held(at), self.beginning(at), at.q.shape
+        unit, typical = self._units(held)
+        joints = slice(len(unit) - len(held.joints), None)
+        numbers = np.zeros((len(unit), lanes))
+        numbers[:count] = self._begun(at, senses) if guess is None else guess
+        pulls = np.zeros((len(held.joints), 1)) if pulls is None else pulls / typical
+        last = before = numbers
+        exact = self.affine and not held.joints
         for _ in range(ROUNDS):
-            miss, slopes = self._linearised(at, second, senses)
-            turned = _turned(slopes)
-            with np.errstate(all="ignore"):
-                step = -_solved(slopes, miss)
-            before, last, second = last, second, second + step
-            largest = np.maximum(np.max(np.abs(second), axis=0), 1e-6 * np.min(self.unit))
-            close = SETTLED if not self.affine else CLOSE
-            if np.all(~np.isfinite(step) | (np.abs(step) <= close * largest)):
+            missed, slopes = self._linearised(at, numbers, held, senses)
+            slopes = slopes * unit
+            missed[joints], slopes[joints] = missed[joints] / typical - pulls, slopes[joints] / typical[:, None]
+            step, turned = newton_step(slopes, missed, numbers[joints])
+            before, last, numbers = last, numbers, numbers + step * unit
+            largest = np.maximum(np.max(np.abs(numbers / unit), axis=0), 1e-6)
+            missed, back, onsets = self._missed(at, numbers, held, senses)
+            missed[joints] = missed[joints] / typical - pulls
+            rest = newton_step(slopes, missed, numbers[joints])[0]  # most are there after one step, as this walk tells
+            if np.all(~np.isfinite(rest) | (np.abs(rest) <= SETTLED * largest)) and not np.any(turned):
                 break
-            if self.affine and np.all(~np.isfinite(step) | (np.abs(step) <= FAR * self.unit[:, None])):
+            if np.all(~np.isfinite(step) | (np.abs(step) <= (FAR if exact else SETTLED * largest))):
                 break
-            if np.all(~np.isfinite(step) | (np.abs(second - before) <= SETTLED * largest)):
+            if np.all(~np.isfinite(step) | (np.abs(numbers - before) / unit <= SETTLED * largest)):
                 break  # to and fro: there is no solution on either side of where a reaction turns round
-            if np.all(~np.isfinite(step) | (np.abs(step) <= CLOSE * DIFFERENCE * largest)):
-                break
-            back = self.solve(at, second, senses, sliding=True)  # most are there after one step, as this walk tells
-            step = -_solved(slopes, self.demanded(back, at.q.shape) - self.given(at, second, senses))
-            if np.all(np.abs(step) <= SETTLED * largest) and not np.any(turned):
-                return Accelerated(second, back, turned, np.ones(lanes, bool), at.onsets)
-        converged = np.all(np.isfinite(second) & (self.affine | (np.abs(step) <= 1e-8 * largest)), axis=0)
-        second = np.where(turned, np.nan, second)
-        return Accelerated(second, self.solve(at, second, senses, sliding=True), turned, converged, at.onsets)
+        converged = np.all(np.isfinite(numbers) & (exact | (np.abs(rest) <= HELD * largest)), axis=0)
+        able = np.max(np.abs(slopes[:count, joints]), axis=0) > 0.0  # others have nothing to be held by
+        converged &= np.all(np.abs(missed[joints]) <= HELD * np.maximum(np.where(able, 1.0, 1e-6), largest), axis=0)
+        numbers = np.where(turned, np.nan, numbers)
+        if held.closed:
+            onsets = self.shared(self.forced(at.onsets, numbers[count : joints.start], held), held.walls)
+        if held.walls:
+            back = self.solve(at._replace(onsets=onsets), numbers[:count], senses, sliding=True)
+        shares = None
+        if held.joints:
+            shares = np.repeat(np.array(at.senses, float)[:, None], lanes, axis=1)
+            shares[list(held.joints)] = numbers[joints]
+        return Accelerated(numbers[:count], back, turned, converged, onsets, shares)
 
-    def begun(self, at: Moment) -> Array:
+    def held(self, at: Moment) -> Held:
+        """The rows that hold."""
+        closed = [k for k, onset in enumerate(at.onsets) if isinstance(onset, Closed)]
+        walls = {self.contacts.each[k].surface: k for k in reversed(closed) if _sticks(at.onsets[k])}
+        return Held([k for k, sense in enumerate(at.senses) if sense == 0], closed, list(walls.values()))
+
+    def _units(self, held: Held) -> tuple[Array, Array]:
+        """What is typical of the unknowns, and of the accelerations of the joints that stick, (row, 1)."""
+        forces = np.full(len(held.closed) + len(held.walls), self.force)
+        unit = np.concatenate([self.unit, forces, np.ones(len(held.joints))])
+        return unit[:, None], self.typical[list(held.joints)][:, None]
+
+    def _begun(self, at: Moment, senses: Mapping[str, Sense]) -> Array:
         """Where the search for the accelerations begins: at 0, on the side of it to which they are driven."""
+        second = np.zeros_like(at.q)
+        return second if self.affine else np.copysign(0.0, -self._missed(at, second, NONE, senses)[0])
+
+    def _missed(
+        self, at: Moment, numbers: Array, held: Held, senses: Mapping[str, Sense]
+    ) -> tuple[Array, Backward, tuple[Onset, ...]]:
+        """E − T, and the accelerations of gaps, slips and joints that are to be 0, (equation, lane); the walk, and the
+        contacts with their forces."""
+        count, lanes = at.q.shape
+        second, forces, shares = np.split(numbers, [count, len(numbers) - len(held.joints)])
+        onsets = self.forced(at.onsets, forces, held) if held.closed else at.onsets
+        if held.joints:
+            senses = {**senses, **{self.resisted[k]: share for k, share in zip(held.joints, shares, strict=True)}}
+        back = self.solve(at._replace(onsets=onsets), second, senses, sliding=True)
+        moved = {k: self.contacts.each[k].accelerations(back.walk) for k in held.closed}
+        rows = [
+            self.demanded(back, at.q.shape) - self.given(at, second, senses),
+            *(moved[k][0] for k in held.closed),
+            *(moved[k][1] for k in held.walls),
+        ]
+        if held.joints:
+            rows.append(self.pulls(back.walk, lanes)[list(held.joints)])
+        return np.vstack(rows), back, onsets
+
+    def _linearised(self, at: Moment, numbers: Array, held: Held, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
+        """What is missed (equation, lane), and its derivatives by the unknowns (equation, unknown, lane)."""
+        (size, lanes), count = numbers.shape, len(at.q)
         if self.affine:
-            return np.zeros_like(at.q)
-        return np.copysign(0.0, -self.missing(at, np.zeros_like(at.q), self.beginning(at)))
+            steps = np.maximum(self._units(held)[0], np.abs(numbers))
+            steps[:count] = np.maximum(steps[:count], self.trial[:, None])
+        else:  # away from 0, where reactions may turn round
+            least = 1e-2 * self._units(held)[0]
+            least[count:] *= 1e2
+            steps = np.copysign(DIFFERENCE * np.maximum(np.abs(numbers), least), numbers)
+        tried = [numbers, *(numbers + np.where(np.arange(size)[:, None] == i, steps, 0.0) for i in range(size))]
+        wide: dict[str, Sense] = {
+            joint: np.tile(sense, size + 1) if isinstance(sense, np.ndarray) else sense
+            for joint, sense in senses.items()
+        }
+        missed = self._missed(repeated(at, size + 1), np.concatenate(tried, axis=1), held, wide)[0]
+        missed = missed.reshape(size, size + 1, lanes)
+        return missed[:, 0].copy(), (missed[:, 1:] - missed[:, :1]) / steps[None]
+
+    # ---- inertia --------------------------------------------------------------------------------------------------
 
     def inertia(self, at: Moment) -> Array:
         """∂E/∂q̈, the mass matrix where efforts are affine in the accelerations, (equation, coordinate, lane)."""
-        return self._linearised(at, np.zeros_like(at.q), self.beginning(at))[1]
+        return self._linearised(at, np.zeros_like(at.q), NONE, self.beginning(at))[1]
 
     def far(self, second: Array) -> Array:
         """Accelerations far beyond some, one coordinate at a time, (coordinate, lane): along each, then against it."""
@@ -350,66 +471,125 @@ class FreeMotion:
         """
         far = self.far(np.zeros_like(at.q))
         many = repeated(at, far.shape[1])
-        slopes = self._linearised(many, far, self.beginning(many))[1]
+        slopes = self._linearised(many, far, NONE, self.beginning(many))[1]
         still = at._replace(rate=0.0 * at.rate, sense=0.0, senses=(0,) * len(at.senses))
-        none: dict[str, Sense] = dict.fromkeys((*self.resisted, *self.sticking), 0.0)
-        mass = self._linearised(still, np.zeros_like(at.q), none)[1]
-        stacks = [np.moveaxis(one * self.unit[None, :, None], -1, 0) for one in (slopes, mass)]
-        found: Array = np.linalg.det(stacks[0]) / np.linalg.det(stacks[1])
-        return found
+        frictionless: dict[str, Sense] = dict.fromkeys((*self.resisted, *self.sticking), 0.0)
+        mass = self._linearised(still, np.zeros_like(at.q), NONE, frictionless)[1]
+        stacks = [np.moveaxis(matrix * self.unit[None, :, None], -1, 0) for matrix in (slopes, mass)]
+        growth: Array = np.linalg.det(stacks[0]) / np.linalg.det(stacks[1])
+        return growth
 
-    def _linearised(self, at: Moment, second: Array, senses: Mapping[str, Sense]) -> tuple[Array, Array]:
-        """E − T (coordinate, lane) and its derivatives by the accelerations (equation, coordinate, lane)."""
-        count, lanes = at.q.shape
-        steps = self.unit[:, None] + np.zeros((count, lanes))
-        if not self.affine:
-            steps = ahead(second, steps)
-        else:
-            steps = np.maximum(np.maximum(steps, self.trial[:, None]), np.abs(second))
-        tried = [second] + [second + np.where(np.arange(count)[:, None] == i, steps, 0.0) for i in range(count)]
-        many = repeated(at, count + 1)
-        wide: dict[str, Sense] = {
-            joint: np.tile(sense, count + 1) if isinstance(sense, np.ndarray) else sense
-            for joint, sense in senses.items()
-        }
-        found = self.missing(many, np.concatenate(tried, axis=1), wide).reshape(count, count + 1, lanes)
-        slopes = (found[:, 1:] - found[:, :1]) / steps[None]
-        miss: Array = found[:, 0]
-        return miss, slopes
+    def turning(self, at: Moment, second: Array, sticks: Sequence[int], shares: Array) -> NDArray[np.bool_]:
+        """Lanes in which more acceleration takes less effort, under shares of what resists some joints,
+        (joint, lane); one lane of `at`."""
+        count, many = len(self.names), repeated(at, second.shape[1])
+        slopes = self._linearised(many, np.vstack([second, shares]), Held(sticks), self.beginning(many))[1]
+        slopes = slopes[:count, :count] * self.unit[None, :, None]
+        return np.asarray(np.linalg.det(np.moveaxis(slopes, -1, 0)) <= 0.0)
+
+    # ---- joints that may stick ------------------------------------------------------------------------------------
+
+    def speeds(self, walk: Forward, lanes: int) -> Array:
+        """Relative speeds of the joints that may stick, (joint, lane), rad/s or m/s."""
+        return self._of_joints([walk.rates(name) for name in self.resisted], lanes)
+
+    def pulls(self, walk: Forward, lanes: int) -> Array:
+        """Their relative accelerations, (joint, lane), rad/s² or m/s²."""
+        return self._of_joints([walk.second_rates(name) for name in self.resisted], lanes)
+
+    def _of_joints(self, pairs: Sequence[tuple[object, object]], lanes: int) -> Array:
+        numbers = [np.broadcast_to(primal(pair[0 if self.system.turns(name) else 1]), lanes)
+                   for name, pair in zip(self.resisted, pairs, strict=True)]  # fmt: skip
+        return np.array(numbers, float).reshape(len(numbers), lanes)
+
+    def ways(self, at: Moment) -> tuple[Array, Array]:
+        """How relative speeds follow from the rates, (joint, coordinate), and these speeds, (joint,), all by what is
+        typical; one lane."""
+        ways, driven = _differences(self.speeds(self._by_rates(at), len(self.names) + 1))
+        slow = np.sqrt(self.typical)
+        return ways / slow[:, None] * np.sqrt(self.unit), (driven + ways @ at.rate[:, 0]) / slow
+
+    def stopped(self, at: Moment, sticks: Sequence[int]) -> Array:
+        """Rates after joints begin to stick, (coordinate,), beside contacts that stay closed: the momentum of what
+        stays free is kept, and energy only falls; one lane."""
+        (ways, speeds), scale, held = self.ways(at), np.sqrt(self.unit), self.held(at)
+        ways, speeds = ways[list(sticks)], speeds[list(sticks)]
+        if held.closed:
+            linear, rows = self.linear(at), [*held.closed, *(len(at.onsets) + k for k in held.walls)]
+            speed = float(np.ravel(self.system.size(self.values) * primal(self.system.pace(self.values)))[0])
+            ways = np.vstack([ways, linear.ways[rows] * scale / speed])
+            speeds = np.concatenate([speeds, (linear.driven + linear.ways @ at.rate[:, 0])[rows] / speed])
+        mass = self._mass(at) * scale * scale[:, None]
+        rates: Array = at.rate[:, 0] - scale * nearest(mass, ways, speeds, RANK)
+        return rates
+
+    # ---- contacts of rigid bodies -----------------------------------------------------------------------------------
+
+    def forced(self, onsets: Sequence[Onset], forces: Sequence[Any] | Array, held: Held) -> tuple[Onset, ...]:
+        """The contacts with their forces: normal ones, then along the tangent of those that stick."""
+        forced = list(onsets)
+        for row, k in enumerate(held.closed):
+            onset = forced[k]
+            assert isinstance(onset, Closed)
+            if k in held.walls:
+                friction = forces[len(held.closed) + held.walls.index(k)]
+            elif _sticks(onset):  # of those that stick on one wall the first is given all
+                friction = 0.0 * forces[row]
+            else:
+                friction = -self.contacts.each[k].coefficient * forces[row] * onset.sense
+            forced[k] = Closed(onset.sense, forces[row], friction)
+        return tuple(forced)
+
+    def shared(self, onsets: Sequence[Onset], walls: Sequence[int]) -> tuple[Onset, ...]:
+        """What holds on one wall, shared out by the normal forces."""
+        shared = list(onsets)
+        for first in walls:
+            surface = self.contacts.each[first].surface
+            forces = {k: onset for k, onset in enumerate(onsets) if isinstance(onset, Closed) and _sticks(onset)
+                      and self.contacts.each[k].surface == surface}  # fmt: skip
+            normal = sum(onset.normal for onset in forces.values())
+            friction = sum(onset.friction for onset in forces.values())
+            for k, onset in forces.items() if len(forces) > 1 else ():
+                shared[k] = Closed(0, onset.normal, friction * onset.normal / normal)
+        return tuple(shared)
+
+    def linear(self, at: Moment) -> Linear:
+        """What impulses come to, at one moment: friction in other joints takes no impulses."""
+        states = self.contacts.states(self._by_rates(at))
+        gaps = np.array([state.gap[0] for state in states], float)
+        return Linear(self._mass(at), *_differences(rates_of(states)), gaps)
+
+    def _mass(self, at: Moment) -> Array:
+        """∂E/∂q̈ without friction, (equation, coordinate); one lane."""
+        bare = at._replace(rate=0.0 * at.rate, onsets=(None,) * len(at.onsets), senses=(0,) * len(self.resisted))
+        return self.inertia(bare)[:, :, 0]
+
+    def _by_rates(self, at: Moment) -> Forward:
+        """Walks at one moment without rates, then with the unit rate of each coordinate."""
+        count = len(self.names)
+        many = repeated(at, count + 1)._replace(rate=np.eye(count, count + 1, 1))
+        return self.walk(many, np.zeros((count, count + 1)))
 
 
-def ahead(second: Array, unit: Array) -> Array:
-    """By how much accelerations are changed to tell a derivative: away from 0, where reactions may turn round."""
-    return np.copysign(DIFFERENCE * np.maximum(np.abs(second), 1e-2 * unit), second)
+NONE = Held()
+
+
+def _differences(speeds: Array) -> tuple[Array, Array]:
+    """How speeds follow from the rates, (speed, coordinate), and what they are without, (speed,), see `_by_rates`."""
+    return speeds[:, 1:] - speeds[:, :1], speeds[:, 0]
+
+
+def rates_of(states: Sequence[ContactState]) -> Array:
+    """Rates of gaps, then slips, (2 contacts, lane), m/s."""
+    return np.array([state.rate for state in states] + [state.slip for state in states], float)
+
+
+def _sticks(onset: Onset) -> bool:
+    """Whether a closed contact does; a sense that is recorded is that of a slip."""
+    return isinstance(onset, Closed) and isinstance(onset.sense, int) and onset.sense == 0
 
 
 def repeated(at: Moment, times: int) -> Moment:
     """The same state in more lanes."""
     q, rate, integral, bristles = (np.tile(part, (1, times)) for part in (at.q, at.rate, at.integral, at.bristles))
     return at._replace(time=np.tile(at.time, times), q=q, rate=rate, integral=integral, bristles=bristles)
-
-
-def _solved(matrix: Array, right: Array) -> Array:
-    """x of A x = b, (equation, coordinate, lane) and (equation, lane)."""
-    if len(matrix) == 1:
-        quotient: Array = right / matrix[0]
-        return quotient
-    found = np.full(right.shape, np.nan)
-    sound = np.all(np.isfinite(matrix), axis=(0, 1)) & np.all(np.isfinite(right), axis=0)
-    stack = np.moveaxis(matrix[..., sound], -1, 0)
-    sound[sound] = np.abs(np.linalg.det(stack)) > 0
-    stack = np.moveaxis(matrix[..., sound], -1, 0)
-    if len(stack):
-        found[:, sound] = np.linalg.solve(stack, right[:, sound].T[..., None])[..., 0].T
-    return found
-
-
-def _turned(slopes: Array) -> NDArray[np.bool_]:
-    """Lanes in which the determinant of ∂E/∂q̈ is not positive, as it is for any mechanism without friction."""
-    with np.errstate(all="ignore"):
-        if len(slopes) == 1:
-            return np.asarray(slopes[0, 0] <= 0.0)
-        sound = np.all(np.isfinite(slopes), axis=(0, 1))
-        found = np.zeros(slopes.shape[-1], bool)
-        found[sound] = np.linalg.det(np.moveaxis(slopes[..., sound], -1, 0)) <= 0.0
-        return found

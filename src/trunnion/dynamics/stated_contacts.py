@@ -11,8 +11,7 @@ import numpy as np
 from trunnion.algebra.dual import primal
 from trunnion.algebra.nested import each
 from trunnion.algebra.space import slid
-from trunnion.dynamics.touching import Contact, Contacts, EdgeContact, PinContact
-from trunnion.dynamics.touching_space import DiscContact, ShoulderContact
+from trunnion.dynamics.touching import Contact, Contacts, DiscContact, EdgeContact, PinContact, ShoulderContact
 from trunnion.joints.contact import hertz_stiffness
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS

@@ -175,19 +175,8 @@ DYNAMICS: dict[str, Sentence] = {
     ),
     "simulate.restitution_lowered": Sentence(
         NOTE,
-        "in {times:#impact}, the first at {time:~s}, friction and the stated restitution would gain energy: the "
-        "restitution is lowered there, to {share:.3g} of itself at the most",
-    ),
-    "simulate.stepped": Sentence(
-        WARNING,
-        "there are impacts without end at {time:~s}: from there on the motion is stepped by Moreau's scheme, in steps "
-        "of {step:~s}; it is exact to the first order of the step",
-        "compare with half the step: --impact-step",
-    ),
-    "simulate.energy_stepped": Sentence(
-        NOTE,
-        "stepped by Moreau's scheme, works and energies differ by {share:.2g} of the energy turned over",
-        "ask for a smaller --impact-step",
+        "in {times:#impact}, the first at {time:~s}, the stated restitution would gain energy by friction, or the "
+        "impacts have no end: the restitution is lowered there, to {share:.3g} of itself at the most",
     ),
     "simulate.no_contact_force": Sentence(
         ERROR,

@@ -1,0 +1,352 @@
+"""Motion in time of several free coordinates: contacts of joints in play, and joints that stick one by one.
+
+A step ends where a gap closes or opens, where a joint that slides comes to rest, and where one that sticks breaks away,
+so that every step is taken through smooth forces. Between contacts the pin flies; the forces of a contact come with its
+onset, whose speed of approach its law needs. What holds, slips or is open from then on is the answer of a
+complementarity, and so is which joints lock where there is none: see `active`. Contacts of rigid bodies:
+`impact_motion`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import OdeSolver
+from scipy.optimize import brentq
+
+from trunnion.dynamics.active import IDLE, SLACK, ActiveSet, Case, Senses
+from trunnion.dynamics.bordered import RANK
+from trunnion.dynamics.guards import Crossing
+from trunnion.dynamics.integrate import AHEAD, SEVERAL, Integration
+from trunnion.dynamics.rates import Seeing, Seen
+from trunnion.dynamics.solution import Event, Stretch
+from trunnion.dynamics.state import Moment
+from trunnion.dynamics.touching import FIRST, SLOWEST, Closed, Onset
+from trunnion.joints.contact import elastic_force
+
+__all__ = ["ActiveMotion", "Impact", "OpenContact", "step_nodes"]
+
+Array = NDArray[np.float64]
+Rate = Callable[[float, Array], Array]
+Dense = Callable[[Array], Array]  # the state by time, (time,) -> (number, time)
+
+CLOSELY = 33  # times about a largest force
+GAUSS = np.array(np.polynomial.legendre.leggauss(10))  # nodes in −1 … 1, and weights
+NEARLY = 1e-3  # of the largest force so far: a step that comes as near may hold a larger one
+FEW = 8  # steps after which one looks for other accelerations
+
+
+class Impact(NamedTuple):
+    """One contact from onset to lift-off: its label, begin and end, s (NaN while it lasts), speed of approach and of
+    separation, m/s, largest normal force, N, and penetration, m, wear index ∫ |F| |slip| dt, J, impulse ∫ F dt, N s,
+    and what the contact law has lost, J."""
+
+    label: str
+    begin: float
+    end: float
+    approach: float
+    separation: float
+    force: float
+    depth: float
+    wear: float
+    impulse: float
+    loss: float = 0.0
+
+
+@dataclass
+class OpenContact:
+    """A contact that lasts: its onset, and what it has come to so far."""
+
+    begin: float
+    approach: float
+    force: float = 0.0
+    depth: float = 0.0
+    wear: float = 0.0
+    impulse: float = 0.0
+    separation: float = 0.0
+    loss: float = 0.0
+
+
+@dataclass
+class ActiveMotion(Integration):
+    """An integration that follows contacts and what sticks. impacts: contacts that are over."""
+
+    impacts: list[Impact] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.seeing = cast("Seeing", self.dynamics)
+        self.count = self.rows = len(self.motion.contacts.each)  # rows of `_gaps`
+        self.onsets = (None,) * self.count
+        self.now = 0.5 * self.breaks[0]
+        self._open: dict[int, OpenContact] = {}
+        self._crossed: int | None = None
+        self._steps = 0
+
+    def _begins(self, row: Array) -> bool:
+        return self._decided(0.0, row) and super()._begins(row)
+
+    def _couple(self, time: float, row: Array, now: float) -> None:
+        self.now = now
+        self._decided(time, row)
+
+    def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
+        """The derivative of a row by time."""
+
+        def rate(moment: float, numbers: Array) -> Array:
+            self.solution.asked += 1
+            if not np.all(np.isfinite(numbers)):
+                return np.full(len(numbers), np.nan)
+            inside = numbers.copy()
+            inside[: len(self.motion.names)] = self._in_range(numbers[: len(self.motion.names)])
+            return self.seeing.derivative(moment, inside, self.onsets, now, self.senses)
+
+        return rate
+
+    # ---- what ends a step -------------------------------------------------------------------------------------
+
+    def _at(self, dense: Dense, times: Array) -> Moment:
+        """The moments of times of a step."""
+        at = self.layout.moment(times, np.asarray(dense(times)), 0.0, self.now)
+        return at._replace(onsets=self.onsets, senses=self.senses)
+
+    def _look(self, dense: Dense, times: Array) -> Seen:
+        """The contacts at times of a step."""
+        with np.errstate(all="ignore"):
+            return self.seeing.look(self._at(dense, times))
+
+    def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
+        """Those of contacts, then those of joints."""
+
+        def values(times: Array) -> Array:
+            at = self._at(stretch.state, times)
+            with np.errstate(all="ignore"):
+                return np.vstack([self._gaps(at), self._of_joints(at)])
+
+        return values
+
+    def _gaps(self, at: Moment) -> Array:
+        """Gaps, m, (contact, lane), negative where a contact that touches is open or another has closed."""
+        sign = np.array([1.0 if onset is None else -1.0 for onset in self.onsets])
+        gaps: Array = sign[:, None] * self.seeing.look(at).gap if self.count else np.empty((0, len(at.time)))
+        return gaps
+
+    def _of_joints(self, at: Moment) -> Array:
+        """Speeds in their sense of the joints that slide, and what is left to those that stick before they break away,
+        (joint, lane)."""
+        senses = np.array(self.senses)[:, None]
+        if not self.senses:
+            return np.empty((0, len(at.time)))
+        if np.all(senses != 0):
+            walk, left = self.motion.walk(at, np.zeros_like(at.q)), 0.0 * senses
+        else:
+            found = self.motion.accelerate(at)
+            shares = np.asarray(found.shares, float)
+            walk, left = found.back.walk, 1.0 + SLACK - np.abs(np.nan_to_num(shares, nan=np.inf))
+        slow = np.sqrt(self.motion.typical)[:, None]
+        return np.where(senses == 0, left, senses * self.motion.speeds(walk, len(at.time)) / slow + SLACK)
+
+    def _changed(self, crossing: Crossing, row: Array) -> float:
+        """Let a contact begin or end; of a joint that is decided before the next step."""
+        joint = crossing.row - self.rows
+        if joint >= 0:
+            self._crossed = joint
+            return np.inf
+        return self._met(crossing.row, crossing.time, row)
+
+    def _met(self, k: int, time: float, row: Array) -> float:
+        """Let a contact begin or end; how long the first step after it may be, s."""
+        rate = float(self._look(lambda times: row[:, None], np.array([time])).rate[k, 0])
+        onsets: list[Onset] = list(self.onsets)
+        if onsets[k] is None:
+            onsets[k] = max(-rate, SLOWEST)
+            self._open[k] = OpenContact(time, max(-rate, 0.0))
+            self._say(time, "impact", k, -rate)
+        else:
+            onsets[k] = None
+            self._end(k, time, rate)
+        self.onsets = tuple(onsets)
+        return FIRST * self.motion.contacts.least_clearance / max(abs(rate), SLOWEST)
+
+    def _say(self, time: float, kind: str, k: int, figure: float) -> None:
+        self.solution.events.append(Event(time, kind, self.motion.contacts.labels[k], figure, "m/s"))
+
+    def _end(self, k: int, time: float, rate: float) -> None:
+        """A contact lifts off."""
+        self.impacts.append(self._impact_of(k, self._open.pop(k), time, rate))
+        self._say(time, "lift-off", k, rate)
+
+    def _impact_of(self, k: int, contact: OpenContact, end: float, rate: float) -> Impact:
+        label, figures = self.motion.contacts.labels[k], (contact.force, contact.depth, contact.wear, contact.impulse)
+        return Impact(label, contact.begin, end, contact.approach, rate, *figures, contact.loss)
+
+    # ---- what holds, slips and is open ------------------------------------------------------------------------
+
+    @property
+    def _active(self) -> ActiveSet:
+        return ActiveSet(self.motion, float(np.max(self.pace)))
+
+    def _decided(self, time: float, row: Array) -> bool:
+        """Find what sticks, slides, is open and locks from here; `row` is what it is after it."""
+        before, crossed, n = self.senses, self._crossed, self.layout.coordinates
+        at, self._crossed = self.moment(time, row, 0.0, self.now), None
+        closed = any(isinstance(onset, Closed) for onset in self.onsets)
+        if not (self.motion.resisted or closed):
+            return True
+        with np.errstate(all="ignore"):
+            case = self._active.of(at, before, crossed)
+            if case.senses is None:
+                if self._jammed(time, row, case.base):
+                    return self._decided(time, row)
+                self._stop("no_contact_force" if closed else "no_acceleration", time, row)
+                return False
+            sticks = [k for k in case.may if case.senses[k] == 0]
+            self.senses = case.senses
+            self._let(time, case.onsets)
+            if sticks and (not before or any(before[k] for k in sticks)):
+                row[n : 2 * n] = self.motion.stopped(self.moment(time, row, 0.0, self.now), sticks)
+            for k in case.may:
+                was, joint = before[k] if before else None, self.motion.resisted[k]
+                if case.senses[k] == 0 and was != 0:
+                    self.solution.events.append(Event(time, "stick", joint))
+                elif case.senses[k] != 0 and not was:
+                    self.solution.events.append(Event(time, "break-away", joint, float(case.senses[k])))
+            self._rests(time, row, sticks)
+            self._others(time, row, case)
+        return True
+
+    def _let(self, time: float, onsets: tuple[Onset, ...]) -> None:
+        """Let contacts be as they are from here on."""
+        self.onsets = onsets
+
+    def _jammed(self, time: float, row: Array, senses: Senses) -> bool:
+        """Let joints lock, if they can: they stop at once."""
+        found = self._active.lock(self.moment(time, row, 0.0, self.now), senses)
+        if found is None:
+            return False
+        energy = self._stopped(time, row, found.rate, 0.0, self.now)
+        for k in found.joints:  # the whole loss is told once
+            figure = energy if k == found.joints[0] else np.nan
+            self.solution.events.append(Event(time, "lock", self.motion.resisted[k], figure, "J"))
+        self.senses = found.senses
+        return True
+
+    def _failed(
+        self, time: float, row: Array, sense: float, now: float, message: str | None
+    ) -> tuple[float, Array, None]:
+        """As of any motion; where there are no accelerations ahead, joints lock."""
+        if not self.motion.resisted:
+            return super()._failed(time, row, sense, now, message)
+        with np.errstate(all="ignore"):
+            ahead = row.copy()
+            soon, at = AHEAD / float(np.max(self.pace)), self.moment(time, row, sense, now)
+            n, second = self.layout.coordinates, np.nan_to_num(self.motion.accelerate(at).second[:, 0])
+            ahead[:n] += soon * row[n : 2 * n]
+            ahead[n : 2 * n] += soon * second
+            causes = {self._cause(when, one, sense, now) for when, one in ((time, row), (time + soon, ahead))}
+            if causes & {"locked", "no_acceleration"} and self._jammed(time, row, self.senses):
+                return time, row, None
+        return super()._failed(time, row, sense, now, message)
+
+    def _rests(self, time: float, row: Array, sticks: Sequence[int]) -> None:
+        """Whether all free coordinates rest from here on, in what resists the joints."""
+        n, before, self.resting = self.layout.coordinates, self.resting, False
+        at = self.moment(time, row, 0.0, self.now)
+        if set(self.motion.names) != set(self.motion.system.mechanism.drivers) or not sticks:
+            return
+        ways = self.motion.ways(at)[0][sticks]
+        if np.linalg.matrix_rank(ways, tol=RANK) < n or np.any(np.abs(row[n : 2 * n]) > IDLE * self.pace):
+            return
+        row[n : 2 * n], self.resting = 0.0, True
+        if not before:
+            self._note(time, "rest")
+
+    # ---- other accelerations ----------------------------------------------------------------------------------
+
+    def _others(self, time: float, row: Array, case: Case) -> None:
+        """Tell where there are several accelerations."""
+        if not self.motion.resisted or SEVERAL in self.solution.notes:
+            return
+        if self._active.several(self.moment(time, row, 0.0, self.now), case.may):
+            self.solution.notes[SEVERAL] = {"time": time}
+
+    def _end_step(self, solver: OdeSolver, row: Array) -> None:
+        """Look for other accelerations at the end of every few steps."""
+        self._steps += 1
+        if self._steps % FEW == 0:
+            with np.errstate(all="ignore"):
+                self._others(float(solver.t), row, Case(self.senses, self.onsets, (), self.senses))
+
+    # ---- what a contact comes to ------------------------------------------------------------------------------
+
+    def _measured(self, stretch: Stretch) -> None:
+        """Peaks, impulse, wear and loss of the contacts that last, of a step: by Gauss and Legendre's rule on its dense
+        output, between places where a slip turns round."""
+        if not self._open:
+            return
+        dense, begin, end = stretch.state, stretch.begin, stretch.end
+        times, weights = step_nodes(begin, end)
+        seen = self._look(dense, times)
+        for k, one in self._open.items():
+            contact = self.motion.contacts.each[k]
+            normal, slip = seen.normal[k], seen.slip[k]
+            elastic = elastic_force(-seen.gap[k], contact.stiffness, contact.exponent)
+            one.impulse += float(weights @ normal)
+            one.loss += float(weights @ ((elastic - normal) * seen.rate[k]))
+            turns = np.flatnonzero(slip[1:] * slip[:-1] < 0.0)
+            if len(turns):
+                places = [self._turn(dense, k, times[i], times[i + 1]) for i in turns]
+                one.wear += self._rubbed(dense, k, [begin, *places, end])
+            else:
+                one.wear += float(weights @ np.abs(normal * slip))
+            one.force = self._largest(dense, times, seen.normal[k], k, 1, one.force)
+            one.depth = self._largest(dense, times, -seen.gap[k], k, -1, one.depth)
+
+    def _turn(self, dense: Dense, k: int, low: float, high: float) -> float:
+        """When the slip of a contact turns round."""
+        return float(brentq(lambda time: float(self._look(dense, np.array([time])).slip[k, 0]), low, high))
+
+    def _rubbed(self, dense: Dense, k: int, ends: list[float]) -> float:
+        """Wear index of a contact, J, over parts of a step."""
+        found = 0.0
+        for begin, end in pairwise(ends):
+            times, weights = step_nodes(begin, end)
+            seen = self._look(dense, times)
+            found += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
+        return found
+
+    def _largest(self, dense: Dense, times: Array, seen: Array, k: int, what: int, known: float) -> float:
+        """The largest normal force (what: 1) or penetration (−1) of a contact, from before and within a step: looked at
+        closely where it may be the largest."""
+        top = int(np.argmax(seen))
+        if seen[top] > (1.0 - NEARLY) * known:
+            low, high = times[max(top - 1, 0)], times[min(top + 1, len(times) - 1)]
+            close = self._look(dense, np.linspace(low, high, CLOSELY))
+            known = max(known, _peak(close.normal[k] if what > 0 else -close.gap[k]))
+        return known
+
+    def finished(self) -> list[Impact]:
+        """All contacts, those that last at the end with an end that is not known."""
+        last = [self._impact_of(k, contact, np.nan, np.nan) for k, contact in self._open.items()]
+        return sorted([*self.impacts, *last], key=lambda one: one.begin)
+
+
+def step_nodes(begin: float, end: float) -> tuple[Array, Array]:
+    """Times of a step, its ends and the nodes of Gauss and Legendre's rule, s, and their weights, 0 at the ends."""
+    nodes, weights = 0.5 * (end - begin) * GAUSS
+    return np.concatenate([[begin], 0.5 * (begin + end) + nodes, [end]]), np.concatenate([[0.0], weights, [0.0]])
+
+
+def _peak(values: Array) -> float:
+    """The largest of equally spaced numbers, of the parabola through it and its neighbours."""
+    k = int(np.argmax(values))
+    if not 0 < k < len(values) - 1:
+        return float(values[k])
+    before, top, after = (float(one) for one in values[k - 1 : k + 2])
+    bend = before - 2.0 * top + after
+    return top if bend >= 0.0 else top - 0.125 * (after - before) ** 2 / bend

@@ -99,7 +99,7 @@ def allocations_table() -> str:
 
 def comparisons_table() -> str:
     """Every variable of a comparison with a measurement."""
-    from trunnion.rig.comparison.result import VARIABLES
+    from trunnion.rig.comparison import VARIABLES
 
     told = {"": "of the channel", "set": "of what is set", "drive": "rad, m or s"}
     rows = [

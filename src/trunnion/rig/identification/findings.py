@@ -9,7 +9,7 @@ import numpy as np
 
 from trunnion.errors import Finding, Severity, counted
 from trunnion.results.sentences import finding_for
-from trunnion.rig.comparison.findings import other_speed
+from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.blocks import shared_zero
 from trunnion.rig.identification.fit import FAR
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns

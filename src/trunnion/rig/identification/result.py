@@ -12,7 +12,7 @@ from trunnion.cycle.summary import inputs, references
 from trunnion.results.attributes import finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.tables.identification import CURVES
-from trunnion.rig.comparison.result import data_findings, hashed_files
+from trunnion.rig.comparison import data_findings, hashed_files
 from trunnion.rig.identification.findings import findings_of
 from trunnion.rig.identification.identified import Identified
 from trunnion.rig.identification.uncertainty import CONFIDENCE

@@ -114,8 +114,8 @@ _RIG = (
     Fault(
         "lack-of-fit-of-a-population",
         "rig/identification/uncertainty.py",
-        "float(np.var(each, ddof=1))",
-        "float(np.var(each))",
+        "float(np.var(sums[most], ddof=1))",
+        "float(np.var(sums[most]))",
         ("tests/rig/test_identify_uncertainty.py",),
     ),
     Fault(

@@ -173,8 +173,6 @@ def test_results_are_not_written_over_what_is_read(  # type: ignore[no-untyped-d
         (["--parameter", FRICTION, "--channel", "torque-out"], "the measurement has torque-in"),
         (["--parameter", FRICTION, "--hold-out", "run-7"], "there is no condition 'run-7'"),
         (["--parameter", FRICTION, "--kind", "histogram"], "use one of intervals, correlation, residuals"),
-        (["--parameter", FRICTION, "--delay", "3mm"], "time"),
-        (["--parameter", FRICTION, "--delay", "tau"], "is no time"),
         (["--parameter", FRICTION, "--write", MODEL], "is the model itself"),
         (["--parameter", FRICTION, "--write", "x.toml"], "write .yaml or .json"),
         (["--parameter", FRICTION, "--report", "x.pdf"], "a report is HTML"),

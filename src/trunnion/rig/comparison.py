@@ -28,7 +28,6 @@ from trunnion.model.units import unit as unit_of
 from trunnion.results.attributes import cited, codes, finding_rows, origin
 from trunnion.results.dataset import Variable, dataset_of, described
 from trunnion.results.quantities import readable
-from trunnion.results.sentences import finding_for
 from trunnion.rig.judge import Judgement, Verdict, difference, expanded, going_on, judge, probability, uncertainty_of
 from trunnion.rig.modelled import Modelled, apart, check_settings, modelled
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
@@ -502,11 +501,19 @@ def _findings(mechanism: Mechanism, channels: Iterable[str], rows: Sequence[Cond
     for row in rows:
         for name, one in row.channels.items():
             counts[name] += int(np.count_nonzero(np.isfinite(one.model) & ~one.comparable))
-    if any(counts.values()):
-        findings.append(finding_for("compare.left_out", counts={name: n for name, n in counts.items() if n}))
+    left_out = {name: n for name, n in counts.items() if n}
+    if left_out:
+        what = f"positions left out of the statistics: {', '.join(f'{name} {n:,}' for name, n in left_out.items())}"
+        what += "; a joint is momentarily at rest there, or a dead centre is close"
+        remedy = "the model gives an interval there, not a single value"
+        findings.append(Finding(what, "", remedy, Severity.NOTE, code="compare.left_out", figures={"counts": left_out}))
     bare = [name for name, own in signals.items() if not any(one.accuracy.zero or one.accuracy.gain for one in own)]
     if bare:
-        findings.append(finding_for("compare.no_accuracy", "channels", channels=bare))
+        what = (
+            f"no accuracy of zero and gain is stated for {', '.join(bare)}: U includes only the scatter between turns"
+        )
+        remedy, figures = "state accuracy: {gain: …, zero: …} in the mapping", {"channels": bare}
+        findings.append(Finding(what, "channels", remedy, Severity.NOTE, code="compare.no_accuracy", figures=figures))
     return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
 
 
@@ -525,34 +532,46 @@ def _of_channel(name: str, rows: Sequence[ConditionComparison]) -> Iterator[Find
 
     def having(*verdicts: Verdict) -> tuple[list[ChannelComparison], str]:
         those = [(condition, one) for condition, one in cases if one.judgement.verdict in verdicts]
-        cited_cases = _in_which([condition for condition, _ in those], len(cases)) if those else ""
-        return [one for _, one in those], cited_cases
+        return [one for _, one in those], _in_which([one for one, _ in those], len(cases)) if those else ""
 
-    off, where_off = having(Verdict.NOT, Verdict.OFFSET)
+    off, cases_off = having(Verdict.NOT, Verdict.OFFSET)
     if off:
-        rms = max(one.judgement.rms for one in off)
+        rms, within = max(one.judgement.rms for one in off), min(one.judgement.within for one in off)
         unit, size = off[0].signal.shown
         rms_text = f"{rms / size:.3g} {unit}" if unit not in ("rad", "1") else readable(rms, unit, 3)
-        not_offset = any(one.judgement.verdict is Verdict.NOT for one in off)
-        phrases = {
-            "cases": where_off, "rms_told": rms_text, "apart": "" if not_offset else " apart from a constant offset",
-        }  # fmt: skip
-        percent = 100 * min(one.judgement.within for one in off)
-        yield finding_for(
-            "compare.not_within", where, phrases=phrases, within_percent=percent, rms=rms, several=len(off) > 1
-        )
-    unknown, where_unknown = having(Verdict.UNKNOWN)
+        only_offset = all(one.judgement.verdict is Verdict.OFFSET for one in off)
+        down, up = ("down to ", "up to ") if len(off) > 1 else ("", "")
+        yield Finding(
+            f"does not agree within U {cases_off}{' apart from a constant offset' * only_offset}: {down}"
+            f"{100 * within:.0f} % of the positions agree, RMS of the residual {up}{rms_text}",
+            where, "see what would explain it; `trunnion identify` fits friction and other numbers of the model",
+            code="compare.not_within", figures={"within_percent": 100 * within, "rms": rms},
+        )  # fmt: skip
+    unknown, cases_unknown = having(Verdict.UNKNOWN)
     if unknown:
         turns = max(len(one.signal.turns) for one in unknown)
-        yield finding_for("compare.turns_few", where, phrases={"cases": where_unknown}, turns=turns)
-    nothing, where_nothing = having(Verdict.NOTHING)
-    if nothing:
-        yield finding_for("compare.nothing", where, phrases={"cases": where_nothing})
+        what, remedy = "measured in one turn only", "measure more turns"
+        if turns > 1:
+            what = f"has values from only one turn at a position, although up to {turns} turns were measured"
+            remedy = "see the gaps reported by `trunnion data`"
+        yield Finding(
+            f"{what}: its uncertainty cannot be estimated without scatter, {cases_unknown}", where, remedy,
+            Severity.WARNING, code="compare.turns_few", figures={"turns": turns},
+        )  # fmt: skip
+    _, cases_nothing = having(Verdict.NOTHING)
+    if cases_nothing:
+        what = f"not compared, for lack of measured values or of a solution of the model, {cases_nothing}"
+        yield Finding(what, where, "", Severity.WARNING, code="compare.nothing")
     correlations = [(value, turns) for value, turns in (going_on(one.signal) for _, one in cases) if turns]
     count = sum(turns for _, turns in correlations)
     mean = sum(value * turns for value, turns in correlations) / max(count, 1)
     if mean * math.sqrt(count) > SIGNIFICANT:
-        yield finding_for("compare.turns_alike", where, correlation=mean)
+        yield Finding(
+            f"the errors of successive turns are correlated, {mean:+.2f}: U assumes independent turns and is too "
+            "small, also for the efficiency", where,
+            "measure many more turns, or turns further apart; state the drift of the zero in accuracy:",
+            Severity.WARNING, code="compare.turns_alike", figures={"correlation": mean},
+        )  # fmt: skip
 
 
 def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
@@ -560,21 +579,25 @@ def _of_efficiency(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
     off = [(condition, one) for condition, one in cases if one.within == 0]
     if off:
         worst, most = max(off, key=lambda case: abs(case[1].measured - case[1].model))
-        phrases = {
-            "cases": _in_which([condition for condition, _ in off], len(cases)),
-            "most": f"; the most in {worst.name}" if len(off) > 1 else "",
-        }
-        yield finding_for(
-            "compare.efficiency", "efficiency", phrases=phrases, measured=most.measured, expanded=most.expanded,
-            model=most.model,
+        where = _in_which([condition for condition, _ in off], len(cases))
+        where += f"; the most in {worst.name}" if len(off) > 1 else ""
+        yield Finding(
+            f"does not agree within U {where}: measured {most.measured:.4f} ± {most.expanded:.2g}, model "
+            f"{most.model:.4f}", "efficiency",
+            "check the channels; `trunnion identify` fits the friction of the model to them", code="compare.efficiency",
+            figures={"measured": most.measured, "expanded": most.expanded, "model": most.model},
         )  # fmt: skip
     for missing in dict.fromkeys(row.unmeasured for row in rows if row.unmeasured):
-        phrases = {"cases": _in_which([row.condition for row in rows if row.unmeasured == missing], len(rows))}
-        yield finding_for("compare.efficiency_unmeasured", "efficiency", phrases=phrases, missing=list(missing))
-    for reason in dict.fromkeys(one.reason for _, one in cases if one.reason[0]):
-        where = _in_which([condition for condition, one in cases if one.reason == reason], len(cases))
-        phrases = {"cases": where, "reason": reason[0], "remedy": reason[1]}
-        yield finding_for("compare.efficiency_unknown", "efficiency", phrases=phrases)
+        where = _in_which([row.condition for row in rows if row.unmeasured == missing], len(rows))
+        yield Finding(
+            f"not compared {where}: the power of {', '.join(missing)} is not measured", "efficiency",
+            "measure effort: of every driver and load: of every useful load, each with its rate:", Severity.WARNING,
+            code="compare.efficiency_unmeasured", figures={"missing": list(missing)},
+        )  # fmt: skip
+    for what, remedy in dict.fromkeys(one.reason for _, one in cases if one.reason[0]):
+        where = _in_which([condition for condition, one in cases if one.reason == (what, remedy)], len(cases))
+        what = f"not known {where}: {what}"
+        yield Finding(what, "efficiency", remedy, Severity.WARNING, code="compare.efficiency_unknown")
 
 
 def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterator[Finding]:
@@ -586,14 +609,16 @@ def other_speed(driver: str, rows: Sequence[tuple[Condition, float]]) -> Iterato
     unit, size = sensor.shown if sensor is not None and sensor.read_in[0] else ("rpm", np.pi / 30)
     speeds = [f"{one.name}: {one.speed / size:.4g} {unit} measured, {speed / size:.4g} {unit} in the model"
               for one, speed in off]  # fmt: skip
-    phrases = {
-        "cases": _in_which([one for one, _ in off], len(rows)).partition(" (")[0], "key": as_key(f"{driver}.speed"),
-        "told": "; ".join(speeds[:MOST_NAMED]) + "; …" * (len(speeds) > MOST_NAMED),
-        "mean": sensor.channel if sensor is not None else "angle",
-    }  # fmt: skip
-    severity = Severity.ERROR if any(apart(one.speed, speed) for one, speed in off) else None
-    figures = {"measured": off[0][0].speed, "model": off[0][1], "driver": driver}
-    yield finding_for("compare.speed", f"drivers.{driver}", severity=severity, phrases=phrases, **figures)
+    where = _in_which([one for one, _ in off], len(rows)).partition(" (")[0]
+    first = "; ".join(speeds[:MOST_NAMED]) + "; …" * (len(speeds) > MOST_NAMED)
+    mean = f"{{mean: {sensor.channel if sensor is not None else 'angle'}}}"
+    severe = any(apart(one.speed, speed) for one, speed in off)
+    yield Finding(
+        f"the measured speed of the driver differs from that of the model {where}: {first}", f"drivers.{driver}",
+        f"state set: {{{as_key(f'{driver}.speed')}: {mean}}} in the mapping: the model then runs at the measured speed",
+        Severity.ERROR if severe else Severity.WARNING, code="compare.speed",
+        figures={"measured": off[0][0].speed, "model": off[0][1], "driver": driver},
+    )  # fmt: skip
 
 
 def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
@@ -602,13 +627,14 @@ def _no_answer(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:
         cases = [row for row in rows if not code.solved and np.any(row.model.status == code)]
         if cases:
             first = cases[0]
-            values = " ".join(f"--set {name}={value:.6g}" for name, value in first.condition.values.items())
-            phrases = {
-                "cases": _in_which([row.condition for row in cases], len(rows)),
-                "analyse": f"run analyse {values}".rstrip(),
-            }
             count, positions = int(np.count_nonzero(first.model.status == code)), len(first.condition.phase)
-            yield finding_for("compare.no_answer", phrases=phrases, count=count, positions=positions, status=code.text)
+            values = "".join(f" --set {name}={value:.6g}" for name, value in first.condition.values.items())
+            yield Finding(
+                f"the model has no solution {_in_which([row.condition for row in cases], len(rows))}, the first at "
+                f"{count:,} of {counted(positions, 'position')}: {code.text}",
+                "", f"run analyse{values} to see where in the cycle, and why", code="compare.no_answer",
+                figures={"count": count, "positions": positions, "status": code.text},
+            )  # fmt: skip
 
 
 def _of_model(rows: Sequence[ConditionComparison]) -> Iterator[Finding]:

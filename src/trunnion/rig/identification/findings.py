@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from trunnion.errors import Finding, Severity, counted
-from trunnion.results.sentences import finding_for
+from trunnion.errors import Finding, Severity, agreeing, counted
 from trunnion.rig.comparison import other_speed
 from trunnion.rig.identification.fit import FAR, shared_zero
 from trunnion.rig.identification.identifiability import Combination, InseparableUnknowns
@@ -45,44 +44,62 @@ def _speeds(identified: Identified) -> Iterator[Finding]:
 
 def _search(identified: Identified) -> Iterator[Finding]:
     """How the search went."""
-    unknowns = identified.fit.model.unknowns
-    if not identified.solution.converged:
-        yield finding_for("search.not_ended", "search", evaluations=identified.solution.evaluations)
-    elif not identified.solution.settled:
-        yield finding_for("search.unsettled", "search")
+    unknowns, solution = identified.fit.model.unknowns, identified.solution
+    if not solution.converged:
+        what = f"the search did not converge within {solution.evaluations} evaluations"
+        remedy = "give start values closer to the solution, or fewer parameters"
+        yield Finding(what, "search", remedy, code="search.not_ended", figures={"evaluations": solution.evaluations})
+    elif not solution.settled:
+        what = "the search did not converge: the set of usable positions changes with the estimates"
+        yield Finding(what, "search", "use a guard of 2 or more", Severity.WARNING, code="search.unsettled")
     if identified.other is not None and not np.any(identified.lost[: len(unknowns)]):
         values = {one.name: float(value) for one, value in zip(unknowns, identified.other, strict=False)}
         text = ", ".join(f"{one.name} = {amount(values[one.name], None, one.unit)}" for one in unknowns)
-        yield finding_for("search.other", "search", phrases={"told": text}, values=values)
+        yield Finding(
+            f"other values fit equally well: {text}", "search", "hold out a condition, or measure more conditions",
+            Severity.WARNING, code="search.other", figures={"values": values},
+        )  # fmt: skip
 
 
 def _fit(identified: Identified) -> Iterator[Finding]:
     """Whether the model fits, what would explain a misfit, and whether turns and conditions repeat."""
     fit, spread, test = identified.fit, identified.spread, identified.spread.test
     if test.misfit:
-        phrases = {
-            "chance_told": "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %",
-            "reduced_told": _digits(test.reduced),
-            "worth": "the estimates mean nothing" if identified.refuted else "the intervals are widened accordingly",
-        }
-        severity = Severity.ERROR if identified.refuted else None
-        figures = {"reduced": test.reduced, "chance": test.chance}
-        yield finding_for("fit.misfit", "fit", severity=severity, phrases=phrases, **figures)
+        worth = "the estimates mean nothing" if identified.refuted else "the intervals are widened accordingly"
+        chance = "less than 0.01 %" if test.chance < 1e-4 else f"{100 * test.chance:.2g} %"
+        yield Finding(
+            f"the model does not fit: reduced χ² {_digits(test.reduced)} (1 is expected from the scatter between "
+            f"turns), p-value {chance}; {worth}", "fit",
+            "see the residuals; identify another parameter as well, or use another friction law",
+            Severity.ERROR if identified.refuted else Severity.WARNING, code="fit.misfit",
+            figures={"reduced": test.reduced, "chance": test.chance},
+        )  # fmt: skip
     if identified.causes:
         yield _cause(identified)
-    else:
-        for p in np.flatnonzero((spread.apart > 1) & ~identified.lost[: fit.count]):
-            where, times = f"parameter {fit.model.unknowns[p].name}", np.sqrt(spread.apart[p])
-            severity = Severity.WARNING if times > MUCH else None
-            phrases = {"times_told": _digits(times)}
-            yield finding_for("fit.conditions_disagree", where, severity=severity, phrases=phrases, times=times)
+    for p in np.flatnonzero((spread.apart > 1) & ~identified.lost[: fit.count]) if not identified.causes else ():
+        times = float(np.sqrt(spread.apart[p]))
+        yield Finding(
+            f"the conditions disagree: the estimates from single conditions vary {_digits(times)} times as much as "
+            "expected from the scatter between turns; the interval is widened accordingly",
+            f"parameter {fit.model.unknowns[p].name}",
+            "look for differences between conditions: settings, speed, temperature, the zero of each file",
+            Severity.WARNING if times > MUCH else Severity.NOTE, code="fit.conditions_disagree",
+            figures={"times": times},
+        )  # fmt: skip
     fitted = [fit.blocks[k] for k in fit.fitted()]
     if not any(block.repeats for block in fitted):
-        yield finding_for("fit.not_repeated", "data")
+        yield Finding(
+            "no turn is repeated: the scatter is estimated from the residuals, the model cannot be tested, and the "
+            "intervals are too narrow if the data are filtered",
+            "data", "record several turns", Severity.WARNING, code="fit.not_repeated",
+        )  # fmt: skip
     if spread.follows > 2 / np.sqrt(max(sum(len(block.turns) - 1 for block in fitted), 1)):
-        yield finding_for("fit.turns_alike", "data", correlation=spread.follows)
+        what = f"successive turns are correlated ({spread.follows:.2f}): the intervals are widened accordingly"
+        remedy, figures = "look for a drift; warm the rig up", {"correlation": spread.follows}
+        yield Finding(what, "data", remedy, Severity.WARNING, code="fit.turns_alike", figures=figures)
     if identified.unused:
-        yield finding_for("fit.unused", "channels", channels=list(identified.unused))
+        what = f"no parameter acts on {', '.join(identified.unused)}: not used in the fit"
+        yield Finding(what, "channels", "", Severity.NOTE, code="fit.unused")
 
 
 def _cause(identified: Identified) -> Finding:
@@ -91,19 +108,25 @@ def _cause(identified: Identified) -> Finding:
     unknowns = identified.fit.model.unknowns
     rows = zip(unknowns, first.estimates, first.halves, strict=True)
     estimates = [f"{one.name} = {amount(value, half, one.unit)}" for one, value, half in rows if np.isfinite(half)]
-    times = f", {few_digits(identified.times_stated)} times its stated standard uncertainty,"
-    phrases = {
-        "story": _story(identified, first),
-        "also": f"; {' or '.join(_story(identified, one) for one in others)} would explain as much" if others else "",
-        "estimates": joined(estimates),
-        "times": times if identified.times_stated > FAR else "",
-        "left": f", reduced χ² {_digits(first.left.reduced)} remains" if first.left.misfit else "",
-        "size_told": f"{np.degrees(first.size):+.3g} deg",
-    }
-    values = {one.name: float(value) for one, value in zip(unknowns, first.estimates, strict=True)}
-    return finding_for(
-        "fit.cause", "fit", phrases=phrases, kind=first.kind, channel=first.channel, size=first.size,
-        expanded=first.expanded, explains_percent=100 * first.explains, values=values,
+    beyond = identified.times_stated > FAR
+    times = f", {few_digits(identified.times_stated)} times its stated standard uncertainty," if beyond else ""
+    left = f", reduced χ² {_digits(first.left.reduced)} remains" if first.left.misfit else ""
+    also = f"; {' or '.join(_story(identified, one) for one in others)} would explain as much" if others else ""
+    stated = "" if beyond else f"; with accuracy: {{{first.kind}: …}} in the mapping it is estimated too"
+    degrees, loads = f"{np.degrees(first.size):+.3g} deg", "and lengths and loads of the model, which may act alike"
+    remedy = {
+        "angle": f"check the zero of the angle; if it is off, add {degrees} to angle: zero: in the mapping",
+        "zero": f"check the zero of {first.channel}{stated}",
+        "gain": f"check unit and gain of {first.channel}, {loads}{stated}",
+    }[first.kind]
+    return Finding(
+        f"{_story(identified, first)}{times} would explain {100 * first.explains:.0f} % of the misfit{left}{also}; the "
+        f"estimates would then be {joined(estimates)}", "fit", remedy, Severity.WARNING, code="fit.cause",
+        figures={
+            "kind": first.kind, "channel": first.channel, "size": first.size, "expanded": first.expanded,
+            "explains_percent": 100 * first.explains,
+            "values": {one.name: float(value) for one, value in zip(unknowns, first.estimates, strict=True)},
+        },
     )  # fmt: skip
 
 
@@ -126,24 +149,31 @@ def _sensors(identified: Identified) -> Iterator[Finding]:
         accuracy = block.signal.accuracy
         has_any = bool(block.effects or shared_zero(accuracy) or accuracy.gain)
         stated[block.channel] = stated.get(block.channel, False) or has_any
-    for of_motion, severity, narrow in (
-        (False, Severity.WARNING, ", and the intervals are too narrow"), (True, Severity.NOTE, ""),
-    ):  # fmt: skip
+    for of_motion in (False, True):
         bare = [name for name, has in stated.items() if not has and fit.model.measures[name].of_motion == of_motion]
         if bare:
-            phrases = {"channels": joined(bare), "too_narrow": narrow}
-            yield finding_for("sensor.no_accuracy", "sensors", severity=severity, phrases=phrases)
-    if identified.causes or spread.test.gross:
-        return
-    for s, sensor in enumerate(fit.sensors):
-        value, beyond = spread.beyond.get(s, float(identified.x[fit.count + s])), s in spread.beyond
-        if sensor.stated and abs(value) > OFF:
-            where = "angle.zero" if sensor.angle else sensor.name
-            phrases = {"times_told": few_digits(abs(value))}
-            figures = {"times": abs(value), "beyond": beyond, "of_angle": bool(sensor.angle)}
-            yield finding_for(
-                "sensor.off", where, severity=Severity.ERROR if beyond else None, phrases=phrases, **figures
-            )
+            narrow = "" if of_motion else ", and the intervals are too narrow"
+            yield Finding(
+                f"no accuracy is stated for {joined(bare)}: zero and gain count as exact{narrow}", "sensors",
+                "state accuracy: {zero: …, gain: …} in the mapping", Severity.NOTE if of_motion else Severity.WARNING,
+                code="sensor.no_accuracy",
+            )  # fmt: skip
+    for s, sensor in enumerate(fit.sensors) if not (identified.causes or spread.test.gross) else ():
+        beyond = s in spread.beyond
+        times = abs(spread.beyond.get(s, float(identified.x[fit.count + s])))
+        if sensor.stated and times > OFF:
+            what = f"differs from its stated value by {times:.1f} standard uncertainties"
+            if beyond:
+                stated_size = f"{few_digits(times)} stated standard uncertainties"
+                what = f"would have to be off by {stated_size}: the estimates mean nothing"
+            remedy = "check the sensor, its unit, its stated accuracy, and the loads of the model"
+            if sensor.angle:
+                remedy = "check the zero of the angle, and the lengths and loads of the model"
+            yield Finding(
+                what, "angle.zero" if sensor.angle else sensor.name, remedy,
+                Severity.ERROR if beyond else Severity.WARNING, code="sensor.off",
+                figures={"times": times, "beyond": beyond},
+            )  # fmt: skip
 
 
 # ---- what is not identifiable ---------------------------------------------------------------------------------
@@ -152,12 +182,17 @@ def _sensors(identified: Identified) -> Iterator[Finding]:
 def _groups(identified: Identified) -> Iterator[Finding]:
     """Fewer data than unknowns, unknowns without an effect, and those that are not told apart."""
     fit = identified.fit
-    used, out = (sum(getattr(one, key) for one in identified.misses.values()) for key in ("used", "out"))
+    used, out = identified.positions
     unknowns = fit.count + sum(not one.stated for one in fit.sensors)
     courses = any(fit.blocks[k].turns.shape[1] > 1 for k in fit.fitted())  # not one figure of each turn
     if courses and used < unknowns:
-        phrases = {"unknowns": counted(unknowns, "unknown"), "out_told": f" ({out} more are left out)" if out else ""}
-        yield finding_for("fit.few_positions", "data", phrases=phrases, positions=used, unknowns=unknowns)
+        left_out = f" ({out} more are left out)" if out else ""
+        yield Finding(
+            f"{counted(used, 'position')} with data for {counted(unknowns, 'unknown')}{left_out}: they are not "
+            "separately identifiable", "data",
+            "state more positions: in the mapping, add channels, or identify fewer parameters",
+            code="fit.few_positions", figures={"positions": used, "unknowns": unknowns},
+        )  # fmt: skip
         return
     channels = joined(list(dict.fromkeys(fit.blocks[k].channel for k in fit.fitted())))
     every = [*(one.name for one in fit.model.unknowns), *(f"the {one.name}" for one in fit.sensors)]
@@ -165,14 +200,16 @@ def _groups(identified: Identified) -> Iterator[Finding]:
         names = [every[i] for i in group.members]
         where = f"parameter {names[0]}"
         if len(names) == 1:
-            yield finding_for("parameter.no_effect", where, name=names[0], phrases={"channels": channels})
+            what = f"{names[0]} is not identifiable: it has no effect on {channels}"
+            remedy = "fix it, or measure a quantity that depends on it"
+            yield Finding(what, where, remedy, Severity.WARNING, code="parameter.no_effect")
             continue
-        same = "the same" if group.exact else "nearly the same"
-        phrases = {
-            "alike": f"{joined(names)} are not separately identifiable: they have {same} effect on {channels}",
-            "known": _determined(identified, group, names),
-        }
-        yield finding_for("parameter.not_told_apart", where, phrases=phrases, names=names)
+        yield Finding(
+            f"{joined(names)} are not separately identifiable: they have {'' if group.exact else 'nearly '}the same "
+            f"effect on {channels}; {_determined(identified, group, names)}", where,
+            "fix one or more of them, or measure a quantity that separates them", Severity.WARNING,
+            code="parameter.not_told_apart", figures={"names": names},
+        )  # fmt: skip
 
 
 def _determined(identified: Identified, group: InseparableUnknowns, names: Sequence[str]) -> str:
@@ -208,19 +245,28 @@ def _limits(identified: Identified) -> Iterator[Finding]:
     for p, unknown in enumerate(identified.fit.model.unknowns):
         if identified.limit[p]:
             far, side = (high[p], "at most") if identified.limit[p] < 0 else (low[p], "at least")
-            ends = [amount(end, None, unknown.unit) for end in (identified.estimate[p], far)]
-            phrases = {"limit_told": ends[0], "side": side, "far_told": ends[1]}
+            limit, end = (amount(value, None, unknown.unit) for value in (identified.estimate[p], far))
+            what = f"is at its bound {limit}: {side} {end} (95 %, one-sided)"
             figures = {"limit": identified.estimate[p], "far": far}
-            yield finding_for("parameter.limit", f"parameter {unknown.name}", phrases=phrases, **figures)
+            yield Finding(what, f"parameter {unknown.name}", "", Severity.NOTE, code="parameter.limit", figures=figures)
 
 
 def _data(identified: Identified) -> Iterator[Finding]:
     """How many positions are left out, and held-out data that are not predicted."""
-    used, out = (sum(getattr(one, key) for one in identified.misses.values()) for key in ("used", "out"))
+    used, out = identified.positions
     if out:
-        yield finding_for("data.left_out", "data", count=out, positions=used + out)
+        yield Finding(
+            f"{out:,} of {counted(used + out, 'position')} {agreeing(out, 'is', 'are')} left out: friction reverses, a "
+            "joint is at rest, a load has a corner or a jump, the position is close to singular, or the model has no "
+            "solution", "data", "", Severity.NOTE, code="data.left_out",
+            figures={"count": out, "positions": used + out},
+        )  # fmt: skip
     ratio = identified.hold_out_ratio
     if ratio > POOR:
         conditions = identified.measurement.conditions
-        names = dict.fromkeys(conditions[identified.fit.blocks[k].condition].name for k in identified.held_out)
-        yield finding_for("held_out.missed", "hold_out", phrases={"names": "; ".join(names)}, times=ratio)
+        names = dict.fromkeys(conditions[one.condition].name for one in identified.fit.blocks if len(one.held))
+        yield Finding(
+            f"the held-out data ({'; '.join(names)}) differ from the prediction by {ratio:.1f} times its standard "
+            "uncertainty (scatter and estimates)", "hold_out", "the model lacks an effect that differs there",
+            Severity.WARNING, code="held_out.missed", figures={"times": ratio},
+        )  # fmt: skip

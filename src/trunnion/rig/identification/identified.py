@@ -5,44 +5,80 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
+from trunnion.results.dataset import Variable
+from trunnion.results.tables.identification import CURVES
 from trunnion.rig.identification.fit import FAR, Fit, Solution, rms
 from trunnion.rig.identification.identifiability import InseparableUnknowns
 from trunnion.rig.identification.misfit import MisfitCause
 from trunnion.rig.identification.uncertainty import Covariances, quantile
 from trunnion.rig.reading.measurement import Measurement
 
-__all__ = ["HeldOut", "Identified", "Misses"]
+__all__ = ["VARIABLES", "Identified"]
 
 Array = NDArray[np.float64]
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
 
 
-@dataclass(frozen=True)
-class Misses:
-    """How far the model is from the data of a block, (position,): before and after, and what the scatter explains.
-
-    used, out: positions.
-    """
-
-    before: Array
-    after: Array
-    expected: Array
-    used: int
-    out: int
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """How well data that were not fitted are predicted, rms; expected: by their scatter and the estimates'."""
-
-    before: float
-    after: float
-    expected: float
+PARAMETER, SENSOR, BLOCK = ("parameter",), ("sensor",), ("channel", "condition")
+COURSE = (*BLOCK, "position")
+VARIABLES = {
+    "start": Variable(PARAMETER, "of the parameter", "start of the search"),
+    "estimate": Variable(PARAMETER, "of the parameter", "estimate; NaN if not identifiable"),
+    "standard_uncertainty": Variable(PARAMETER, "of the parameter", "standard uncertainty of the estimate"),
+    "lower": Variable(PARAMETER, "of the parameter", "lower end of the 95 % interval"),
+    "upper": Variable(PARAMETER, "of the parameter", "upper end of the 95 % interval"),
+    "degrees_of_freedom": Variable(PARAMETER, "1", "effective degrees of freedom of the standard uncertainty"),
+    "limit": Variable(PARAMETER, "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
+    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not"),
+    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
+    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
+    "singular_value": Variable(
+        PARAMETER, "1", "singular value of the derivatives with columns scaled to 1, the largest first"
+    ),
+    "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_size": Variable(
+        SENSOR, "of the sensor", "its standard uncertainty as stated, of the angle rad; NaN if it differs"
+    ),
+    "sensor_uncertainty": Variable(SENSOR, "1", "standard uncertainty of that, in those stated"),
+    "rms_before": Variable(BLOCK, "of the channel", "root mean square of the residual at the start"),
+    "rms_after": Variable(BLOCK, "of the channel", "root mean square of the residual with the estimates"),
+    "rms_expected": Variable(BLOCK, "of the channel", "its expected value from the scatter between turns"),
+    "used": Variable(BLOCK, "1", "positions used", np.int32),
+    "left_out": Variable(BLOCK, "1", "positions with data that are not used", np.int32),
+    "turns": Variable(BLOCK, "1", "turns used", np.int32),
+    "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
+    "held_out_before": Variable(
+        BLOCK,
+        "of the channel",
+        "root mean square of the residual of the held-out data, at the start values",
+    ),
+    "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
+    "held_out_expected": Variable(
+        BLOCK,
+        "of the channel",
+        "its expected value from the scatter and the uncertainty of the prediction",
+    ),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of the contributions of successive turns"),
+    "hold_out_ratio": Variable((), "1", "residuals of the held-out data over their expected value"),
+    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
+    "measured": Variable(COURSE, "of the channel", "mean over the turns"),
+    "residual_before": Variable(COURSE, "of the channel", "measured minus model, at the start"),
+    "residual_after": Variable(
+        COURSE,
+        "of the channel",
+        "measured value minus predicted reading of the sensor",
+    ),
+    "residual_uncertainty": Variable(COURSE, "of the channel", "standard uncertainty of the mean over the turns"),
+}
 
 
 @dataclass(frozen=True)
@@ -139,36 +175,40 @@ class Identified:
     # ---- residuals --------------------------------------------------------------------------------------------
 
     @cached_property
-    def misses(self) -> dict[int, Misses]:
-        """Of every block that was fitted."""
-        misses = {}
-        for k in self.fit.fitted():
-            block, mask = self.fit.blocks[k], self.fit.masks[k]
-            before, after = (np.where(mask, self.fit.gap(x, k), np.nan) for x in (self.fit.start, self.x))
-            # beside jumps turns scatter more
-            scatter = np.sqrt(block.pooled(mask) / np.maximum(block.count, 1) + block.unresolved**2)
-            expected = np.where(mask & block.repeats, scatter, np.nan)
-            out = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
-            misses[k] = Misses(before, after, expected, int(np.count_nonzero(mask)), out)
-        return misses
-
-    @cached_property
-    def held_out(self) -> dict[int, HeldOut]:
-        """Of every block of which turns were held out."""
-        held, allowed = {}, self.fit.allowed(self.x)
-        for k, block in enumerate(self.fit.blocks):
-            if not len(block.held):
-                continue
-            where = allowed[k] & np.isfinite(block.held_mean)
-            before, after = (
-                rms(np.where(where, self.fit.gap(x, k, block.held_mean), np.nan)) for x in (self.fit.start, self.x)
-            )
-            columns = np.nan_to_num(self.fit.reading(self.x, k)[1])
-            predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
-            count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)
-            expected = np.where(where, np.sqrt(self._scatter(k) / count + predicted), np.nan)
-            held[k] = HeldOut(before, after, rms(expected))
-        return held
+    def by_block(self) -> dict[str, NDArray[Any]]:
+        """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
+        fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
+        longest = max(len(one.phase) for one in conditions)
+        sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
+        arrays = {name: one.blank(sizes) for name, one in VARIABLES.items() if one.dims and set(one.dims) <= set(sizes)}
+        for k, condition in enumerate(conditions):
+            arrays["phase"][k, : len(condition.phase)] = condition.phase
+        allowed = fit.allowed(self.x)
+        for k, block in enumerate(fit.blocks):
+            at, mask = (channels.index(block.channel), block.condition), fit.masks[k]
+            figures: dict[str, float] = {"turns": len(block.turns), "held_out_turns": len(block.held)}
+            if len(block.turns):
+                before, after = (np.where(mask, fit.gap(x, k), np.nan) for x in (fit.start, self.x))
+                # of the positions that are used: beside jumps turns scatter more
+                scatter = np.sqrt(block.pooled(mask) / np.maximum(block.count, 1) + block.unresolved**2)
+                expected = np.where(mask & block.repeats, scatter, np.nan)
+                for name, row in zip(CURVES, (block.mean, before, after, expected), strict=True):
+                    arrays[name][at][: len(row)] = row
+                figures |= {"rms_before": rms(before), "rms_after": rms(after), "rms_expected": rms(expected)}
+                figures["used"] = int(np.count_nonzero(mask))
+                figures["left_out"] = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
+            if len(block.held):
+                where = allowed[k] & np.isfinite(block.held_mean)
+                before, after = (fit.gap(x, k, block.held_mean)[where] for x in (fit.start, self.x))
+                columns = np.nan_to_num(fit.reading(self.x, k)[1][:, where])
+                predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
+                count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)[where]
+                expected = np.sqrt(self._scatter(k) / count + predicted)
+                figures |= {"held_out_before": rms(before), "held_out_after": rms(after)}
+                figures["held_out_expected"] = rms(expected)
+            for name, figure in figures.items():
+                arrays[name][at] = figure
+        return arrays
 
     def _scatter(self, k: int) -> float:
         """Variance of one turn of a block of which turns are held out."""
@@ -181,8 +221,11 @@ class Identified:
         return float(np.mean([self.fit.variances[one] for one in alike])) if alike else float("nan")
 
     @property
+    def positions(self) -> tuple[int, int]:
+        """How many are used, and how many with data are left out."""
+        return int(self.by_block["used"].sum()), int(self.by_block["left_out"].sum())
+
+    @property
     def hold_out_ratio(self) -> float:
         """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
-        held = self.held_out.values()
-        rows = [(one.after / one.expected) ** 2 for one in held if one.expected > 0 and np.isfinite(one.after)]
-        return float(np.sqrt(np.mean(rows))) if rows else float("nan")
+        return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])

@@ -13,19 +13,17 @@ from trunnion.model.expression import LITERAL, normalise
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.units import UnitError, unit
 from trunnion.results.attributes import attribute, finding_rows, origin
-from trunnion.results.dataset import Variable, dataset_of, described
-from trunnion.results.tables.identification import CURVES
+from trunnion.results.dataset import dataset_of, described
 from trunnion.rig.comparison import data_findings, hashed_files
 from trunnion.rig.identification.findings import findings_of
-from trunnion.rig.identification.fit import rms
-from trunnion.rig.identification.identified import Identified
+from trunnion.rig.identification.identified import VARIABLES, Identified
 from trunnion.rig.identification.number_text import decimals
 from trunnion.rig.identification.uncertainty import CONFIDENCE
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "dataset", "with_estimates"]
+__all__ = ["dataset", "with_estimates"]
 
 Array = NDArray[Any]
 USUAL = {"rad": "deg", "m": "mm"}  # units of numbers that the model states without one
@@ -33,66 +31,6 @@ SOURCES = (
     "G. A. F. Seber, C. J. Wild, Nonlinear Regression, Wiley, 1989, doi:10.1002/0471725315",
     "JCGM 100:2008, Evaluation of measurement data: Guide to the expression of uncertainty in measurement",
 )
-VARIABLES = {
-    "start": Variable(("parameter",), "of the parameter", "start of the search"),
-    "estimate": Variable(("parameter",), "of the parameter", "estimate; NaN if not identifiable"),
-    "standard_uncertainty": Variable(("parameter",), "of the parameter", "standard uncertainty of the estimate"),
-    "lower": Variable(("parameter",), "of the parameter", "lower end of the 95 % interval"),
-    "upper": Variable(("parameter",), "of the parameter", "upper end of the 95 % interval"),
-    "degrees_of_freedom": Variable(("parameter",), "1", "effective degrees of freedom of the standard uncertainty"),
-    "limit": Variable(("parameter",), "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
-    "told": Variable(("parameter",), "1", "1 if identifiable, 0 if not"),
-    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
-    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
-    "singular_value": Variable(
-        ("parameter",), "1", "singular value of the derivatives with columns scaled to 1, the largest first"
-    ),
-    "sensor_error": Variable(("sensor",), "1", "estimated error of a sensor, in its standard uncertainties"),
-    "sensor_size": Variable(
-        ("sensor",), "of the sensor", "its standard uncertainty as stated, of the angle rad; NaN if it differs"
-    ),
-    "sensor_uncertainty": Variable(("sensor",), "1", "standard uncertainty of that, in those stated"),
-    "rms_before": Variable(("channel", "condition"), "of the channel", "root mean square of the residual at the start"),
-    "rms_after": Variable(
-        ("channel", "condition"), "of the channel", "root mean square of the residual with the estimates"
-    ),
-    "rms_expected": Variable(
-        ("channel", "condition"), "of the channel", "its expected value from the scatter between turns"
-    ),
-    "used": Variable(("channel", "condition"), "1", "positions used", np.int32),
-    "left_out": Variable(("channel", "condition"), "1", "positions with data that are not used", np.int32),
-    "turns": Variable(("channel", "condition"), "1", "turns used", np.int32),
-    "held_out_turns": Variable(("channel", "condition"), "1", "held-out turns", np.int32),
-    "held_out_before": Variable(
-        ("channel", "condition"),
-        "of the channel",
-        "root mean square of the residual of the held-out data, at the start values",
-    ),
-    "held_out_after": Variable(("channel", "condition"), "of the channel", "the same with the estimates"),
-    "held_out_expected": Variable(
-        ("channel", "condition"),
-        "of the channel",
-        "its expected value from the scatter and the uncertainty of the prediction",
-    ),
-    "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
-    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
-    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
-    "turn_correlation": Variable((), "1", "correlation of the contributions of successive turns"),
-    "hold_out_ratio": Variable((), "1", "residuals of the held-out data over their expected value"),
-    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
-    "measured": Variable(("channel", "condition", "position"), "of the channel", "mean over the turns"),
-    "residual_before": Variable(
-        ("channel", "condition", "position"), "of the channel", "measured minus model, at the start"
-    ),
-    "residual_after": Variable(
-        ("channel", "condition", "position"),
-        "of the channel",
-        "measured value minus predicted reading of the sensor",
-    ),
-    "residual_uncertainty": Variable(
-        ("channel", "condition", "position"), "of the channel", "standard uncertainty of the mean over the turns"
-    ),
-}
 
 
 def dataset(identified: Identified) -> xr.Dataset:
@@ -100,7 +38,7 @@ def dataset(identified: Identified) -> xr.Dataset:
     fit, measurement, mechanism = identified.fit, identified.measurement, identified.mechanism
     model, conditions = fit.model, measurement.conditions
     names, system = [one.name for one in model.unknowns], model.run.system
-    arrays = _parameters(identified) | _blocks(identified)
+    arrays = _parameters(identified) | identified.by_block
     labels = {
         "parameter": names,
         "parameter_2": names,
@@ -170,33 +108,6 @@ def _parameters(identified: Identified) -> dict[str, Array]:
         "turn_correlation": np.asarray(spread.follows),
         "hold_out_ratio": np.asarray(identified.hold_out_ratio),
     }
-
-
-def _blocks(identified: Identified) -> dict[str, Array]:
-    """What belongs to a channel in a condition."""
-    fit, conditions = identified.fit, identified.measurement.conditions
-    channels, longest = list(fit.model.measures), max(len(one.phase) for one in conditions)
-    sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
-    arrays = {name: one.blank(sizes) for name, one in VARIABLES.items() if set(one.dims) <= set(sizes) and one.dims}
-    for i, condition in enumerate(conditions):
-        arrays["phase"][i, : len(condition.phase)] = condition.phase
-    for k, block in enumerate(fit.blocks):
-        at = channels.index(block.channel), block.condition
-        figures: dict[str, float] = {}
-        if k in identified.misses:
-            one = identified.misses[k]
-            curves = (block.mean, one.before, one.after, one.expected)
-            for name, row in zip(CURVES, curves, strict=True):
-                arrays[name][at][: len(row)] = row
-            figures = {"rms_before": rms(one.before), "rms_after": rms(one.after), "rms_expected": rms(one.expected),
-                       "used": one.used, "left_out": one.out, "turns": len(block.turns)}  # fmt: skip
-        if k in identified.held_out:
-            held = identified.held_out[k]
-            figures |= {"held_out_before": held.before, "held_out_after": held.after,
-                        "held_out_expected": held.expected, "held_out_turns": len(block.held)}  # fmt: skip
-        for name, figure in figures.items():
-            arrays[name][at] = figure
-    return arrays
 
 
 # ---- estimates in the model -----------------------------------------------------------------------------------

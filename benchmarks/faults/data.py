@@ -121,8 +121,8 @@ _RIG = (
     Fault(
         "lack-of-fit-of-a-population",
         "rig/identification/uncertainty.py",
-        "float(np.var(each, ddof=1))",
-        "float(np.var(each))",
+        "float(np.var(sums[most], ddof=1))",
+        "float(np.var(sums[most]))",
         ("tests/rig/test_identify_uncertainty.py",),
     ),
     Fault(
@@ -141,28 +141,28 @@ _RIG = (
     ),
     Fault(
         "bias-scatter-of-a-population",
-        "rig/comparison/uncertainty.py",
+        "rig/judge.py",
         "np.std(means, ddof=1)",
         "np.std(means)",
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),
     ),
     Fault(
         "bias-without-its-local-part",
-        "rig/comparison/uncertainty.py",
+        "rig/judge.py",
         "local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])",
         "local = np.zeros(1)",
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "gum or bias"),
     ),
     Fault(
         "correlation-of-turns-biased",
-        "rig/comparison/assessment.py",
+        "rig/judge.py",
         "/ square + 1 / len(means), len(means)",
         "/ square, len(means)",
         ("tests/rig/test_compare.py", "tests/rig/test_judge.py", "-k", "go_on or follow"),
     ),
     Fault(
         "residual-is-model-less-measured",
-        "rig/comparison/assessment.py",
+        "rig/judge.py",
         "residual = measured - model\n",
         "residual = model - measured\n",
         ("tests/rig/test_compare.py", "-k", "offset"),

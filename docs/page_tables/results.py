@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+import trunnion
 from page_tables.cells import code, rows_of, unit
 
 UNITS = {
@@ -85,7 +88,7 @@ def tolerances_table() -> str:
 
 def identification_table() -> str:
     """Every variable of an identification."""
-    from trunnion.rig.identification.result import VARIABLES
+    from trunnion.rig.identification.identified import VARIABLES
 
     return _described("dimension", VARIABLES)
 
@@ -99,7 +102,7 @@ def allocations_table() -> str:
 
 def comparisons_table() -> str:
     """Every variable of a comparison with a measurement."""
-    from trunnion.rig.comparison.result import VARIABLES
+    from trunnion.rig.comparison import VARIABLES
 
     told = {"": "of the channel", "set": "of what is set", "drive": "rad, m or s"}
     rows = [
@@ -160,6 +163,22 @@ def codes_table() -> str:
     """The codes of findings about results, with the sentence where it is a plain text."""
     from trunnion.results.sentences.codes import SENTENCES
 
-    rows = [(code(name), str(one.severity), one.what if isinstance(one.what, str) else "")
-            for name, one in sorted(SENTENCES.items())]  # fmt: skip
-    return rows_of(("code", "is", "says"), rows)
+    rows = {name: (str(one.severity), one.what if isinstance(one.what, str) else "") for name, one in SENTENCES.items()}
+    for module in ("comparison", "identification/findings"):
+        rows |= _codes_in(Path(trunnion.__file__).parent / f"rig/{module}.py")
+    return rows_of(("code", "is", "says"), [(code(name), *row) for name, row in sorted(rows.items())])
+
+
+def _codes_in(file: Path) -> dict[str, tuple[str, str]]:
+    """Severity and sentence, `…` for what is filled in, of the findings that a module makes, by their code."""
+    rows = {}
+    for call in ast.walk(ast.parse(file.read_text("utf-8"))):
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Finding":
+            named = {one.arg: one.value for one in call.keywords}
+            if isinstance(name := named.get("code"), ast.Constant):
+                weights = [one.attr.lower() for one in ast.walk(call) if isinstance(one, ast.Attribute)
+                           and isinstance(one.value, ast.Name) and one.value.id == "Severity"]  # fmt: skip
+                parts = call.args[0].values if isinstance(call.args[0], ast.JoinedStr) else [call.args[0]]
+                texts = [str(one.value) if isinstance(one, ast.Constant) else "…" for one in parts]
+                rows[str(name.value)] = (" or ".join(weights) or "error", "".join(texts) if len(texts) > 1 else "")
+    return rows

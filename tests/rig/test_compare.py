@@ -15,10 +15,8 @@ from trunnion import MechanismError, Status
 from trunnion.cycle.findings import model_notes
 from trunnion.errors import Finding, Severity
 from trunnion.model.units import KINDS
-from trunnion.rig.comparison.assessment import Verdict, expanded, independent, judge, uncertainty_of
-from trunnion.rig.comparison.causes import KINDS as ERRORS
-from trunnion.rig.comparison.causes import causes
-from trunnion.rig.comparison.result import VARIABLES
+from trunnion.rig.comparison import CAUSES, VARIABLES, causes
+from trunnion.rig.judge import Verdict, expanded, independent, judge, uncertainty_of
 from trunnion.rig.modelled import prepared
 from trunnion.rig.reading.log import gathered
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
@@ -121,7 +119,7 @@ def wrong_in(name, change):
 def causes_of(result, channel):
     """Size and share of each cause of a channel in the first condition."""
     one = result.sel(channel=channel).isel(condition=0)
-    return {kind: (float(one[f"{kind}_error"]), float(one[f"{kind}_explains"])) for kind in ERRORS}
+    return {kind: (float(one[f"{kind}_error"]), float(one[f"{kind}_explains"])) for kind in CAUSES}
 
 
 def test_a_wrong_sign_is_a_gain_of_minus_one():

@@ -10,7 +10,7 @@ import pytest
 
 import trunnion
 from measured_data.recording import mapping, recorded, text_of
-from trunnion.rig.comparison.assessment import Verdict
+from trunnion.rig.judge import Verdict
 from trunnion.rig.reading.read import read_measured
 from trunnion.views.compare.tables import sensors
 

@@ -20,8 +20,8 @@ from trunnion.measures.measures import named
 from trunnion.model.mechanism import read_mechanism
 from trunnion.rig.identification import identify, with_estimates
 from trunnion.rig.identification.findings import _formula
-from trunnion.rig.identification.holdout import held_out
 from trunnion.rig.identification.identifiability import Combination
+from trunnion.rig.identification.run import held_out
 from trunnion.rig.identification.signals import Model
 from trunnion.rig.identification.unknowns import described, limits, unknowns
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
@@ -282,25 +282,6 @@ def test_a_zero_that_each_file_has_is_an_unknown_of_each(four_bar: trunnion.Mech
     assert found["source"].values.tolist() == ["scatter", "zero of each file of torque"]
 
 
-def test_a_sensor_that_lags_is_allowed_for(cardan: trunnion.Mechanism, shaft: True_) -> None:
-    late = 2e-4
-    data = shaft.measured(1, sensors=Sensors(noise=0.002, zero=0.0, gain=0.0))
-    conditions = []
-    for one in data.conditions:
-        turns = one.courses["torque-in"].turns
-        ahead = (one.phase - late * one.values["input.speed"] / (2 * np.pi)) % 1.0
-        noise = turns - turns.mean(axis=0)
-        read = np.interp(ahead, np.append(one.phase, 1.0), np.append(turns.mean(axis=0), turns.mean(axis=0)[0]))
-        conditions.append(replace(one, courses={"torque-in": replace(one.courses["torque-in"], turns=read + noise)}))
-    lagging = replace(data, conditions=tuple(conditions))
-    plain = identify(cardan, lagging, [FRICTION], guard=2)
-    found = identify(cardan, lagging, [FRICTION], guard=2, delay=5e-4)
-    assert "does not fit" in said(plain)
-    assert float(found["sensor_error"].sel(sensor="delay of torque-in")) * 5e-4 == pytest.approx(late, rel=0.1)
-    assert float(found["reduced_chi_squared"]) < 0.5 * float(plain["reduced_chi_squared"])
-    assert found["standard_uncertainty"].values[0] < plain["standard_uncertainty"].values[0]
-
-
 def test_one_turn_alone_takes_its_scatter_from_the_residuals(four_bar: trunnion.Mechanism, torque: True_) -> None:
     found = identify(four_bar, torque.measured(1, turns=1, sensors=Sensors(noise=0.0005)), [FRICTION])
     assert "no turn is repeated" in said(found)
@@ -481,9 +462,8 @@ def test_a_value_names_all_conditions_that_have_it(four_bar: trunnion.Mechanism,
 
 
 def test_a_combination_has_the_units_of_its_factors() -> None:
-    mixed = Combination("sum", (1.0, 17.0, 0.0, -0.5), 0.2, 0.1)
-    text = _formula(mixed, ["mu", "radius", "off", "torque"], ["1", "m", "1", "N m"])
-    assert text == "mu + 17 1/m radius − 0.5 1/(N m) torque"
+    for factor, unit, text in ((17.0, "m", "+ 17 1/m b"), (-0.5, "N m", "− 0.5 1/(N m) b"), (-2.0, "1", "− 2 b")):
+        assert _formula(Combination("sum", (1.0, factor), 0.2, 0.1), ["a", "b"], ["1", unit]) == f"a {text}"
 
 
 def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, torque: True_) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import trunnion
-from trunnion.rig.identification.corners import corners
+from trunnion.rig.identification.fit import corners
 from trunnion.rig.reading.rig_file import Rig
 
 GUIDE = "S.friction.coefficient"

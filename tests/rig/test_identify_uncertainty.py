@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from trunnion.rig.identification.blocks import Block
-from trunnion.rig.identification.fit import FitProblem
+from trunnion.rig.identification.fit import Block, Evaluations, Fit
 from trunnion.rig.identification.uncertainty import spread_of
 from trunnion.rig.reading.measurement import Signal
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 FAR = 1e3  # of the constant: the same figures wherever it lies
 
 
-def constant(conditions: Sequence[Array]) -> FitProblem:
+def constant(conditions: Sequence[Array]) -> Fit:
     """The mean of one channel in all conditions as the only unknown; turns: (turn, position) by condition."""
 
     def courses(x: Array) -> Any:
@@ -40,9 +40,8 @@ def constant(conditions: Sequence[Array]) -> FitProblem:
         Block(k, "torque", Signal("torque", "effort:A", "N m", turns), turns, turns[:0])
         for k, turns in enumerate(conditions)
     ]
-    problem = FitProblem(model, blocks, [], masks=[np.ones(one.shape[1], bool) for one in conditions])
-    problem.start_scatter()
-    return problem
+    fit = Fit(Evaluations(model), blocks, [])
+    return replace(fit, masks=[np.ones(one.shape[1], bool) for one in conditions], variances=fit.first_scatter())
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from rig_measurements import course
-from trunnion.rig.comparison.assessment import going_on, judge
+from trunnion.rig.judge import going_on, judge
 from trunnion.rig.reading.measurement import Accuracy
 
 COVERED = stats.norm.cdf(2) - stats.norm.cdf(-2)  # of k = 2

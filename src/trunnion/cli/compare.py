@@ -59,7 +59,7 @@ def compare(
     Every channel, and the efficiency as a test rig determines it. Exit status 0 if all agree within the expanded
     uncertainty, 1 if not or if that is undecided.
     """
-    from trunnion.rig.comparison.study import compare as run
+    from trunnion.rig.comparison import compare as run
     from trunnion.rig.reading.log import gathered
     from trunnion.rig.reading.read import read_measured
 

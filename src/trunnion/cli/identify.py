@@ -22,7 +22,6 @@ from trunnion.cli.options import (
     TableFile,
     UnitsRow,
     Write,
-    seconds,
     setting,
 )
 from trunnion.cli.result import Shown, check_files, check_model, show_tables
@@ -72,24 +71,11 @@ Sensors = Annotated[
     str,
     typer.Option("--sensors", help="Zero and gain errors are common to a channel, or to each condition."),
 ]
-Delay = Annotated[
-    str | None,
-    typer.Option(
-        "--delay",
-        help="Standard uncertainty of the delay between channels and angle: 0.2ms.",
-        show_default=False,
-    ),
-]
 Guard = Annotated[
     int | None,
     typer.Option("--guard", help="Positions left out on each side of a friction reversal.", show_default=False),
 ]
-Starts = Annotated[
-    int | None,
-    typer.Option(
-        "--starts", help="Number of start points; default: several if the model does not fit.", show_default=False
-    ),
-]
+Starts = Annotated[int, typer.Option("--starts", help="Number of start points.")]
 Kind = Annotated[
     str | None,
     typer.Option("--kind", help="Which figure: intervals, correlation or residuals.", show_default=False),
@@ -105,9 +91,8 @@ def identify(
     start: Starting = None,
     hold_out: HeldOut = None,
     sensors: Sensors = "channel",
-    delay: Delay = None,
     guard: Guard = None,
-    starts: Starts = None,
+    starts: Starts = 1,
     set_: Set = None,
     table: TableFile = None,
     friction: FrictionLaw = None,
@@ -132,10 +117,10 @@ def identify(
     mechanism = stated(file, set_, table, friction, seat)
     with lines_of(file):
         wanted, begin = parameters(parameter or []), dict(setting(text) for text in start or ())
-        held, late = held_out(hold_out or []), seconds(delay, "--delay", "0.2ms")
+        held = held_out(hold_out or [])
         measurement = read_measured(mapping, [str(path) for path in data] if data else None)
         with bar("models evaluated", None) as progress:
-            result = run(mechanism, measurement, wanted, channel, begin, held, sensors, late, guard, starts,  # type: ignore[arg-type]
+            result = run(mechanism, measurement, wanted, channel, begin, held, sensors, guard, starts,  # type: ignore[arg-type]
                          progress=progress)  # fmt: skip
     found = gathered(  # of the notes those that tell what was set, and why intervals may be too narrow
         one

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from enum import IntEnum
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
 from trunnion.errors import Finding, MechanismError, Severity, Status
@@ -66,7 +67,17 @@ def codes(what: str, of: type[IntEnum]) -> dict[str, str]:
 def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Findings for JSON."""
     keys = ("severity", "where", "what", "remedy", "code")
-    return [{key: str(getattr(one, key)) for key in keys} | {"figures": dict(one.figures)} for one in findings]
+    return [{key: str(getattr(one, key)) for key in keys} | {"figures": _written(one.figures)} for one in findings]
+
+
+def _written(value: Any) -> Any:
+    """A figure as JSON can hold it: no number of NumPy, and none that is not finite."""
+    if isinstance(value, Mapping):
+        return {key: _written(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_written(one) for one in value]
+    value = value.item() if hasattr(value, "item") else value
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def whole(result: Described, what: str) -> None:

@@ -11,7 +11,7 @@ TYPE_CHECKING = False  # as in `trunnion`
 if TYPE_CHECKING:
     from typing import Any
 
-    from trunnion.rig.comparison.study import compare as compare
+    from trunnion.rig.comparison import compare as compare
     from trunnion.rig.identification.run import identify as identify
     from trunnion.rig.reading.measurement import Measurement as Measurement
     from trunnion.rig.reading.read import read_measured as read
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _PLACES = {
     "Measurement": ("trunnion.rig.reading.measurement", "Measurement"),
     "Observation": ("trunnion.rig.virtual.observe", "Observation"),
-    "compare": ("trunnion.rig.comparison.study", "compare"),
+    "compare": ("trunnion.rig.comparison", "compare"),
     "identify": ("trunnion.rig.identification.run", "identify"),
     "observe": ("trunnion.rig.virtual.observe", "observe"),
     "read": ("trunnion.rig.reading.read", "read_measured"),

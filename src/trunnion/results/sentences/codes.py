@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from typing import Any
 
 from trunnion.errors import Finding, Severity
@@ -34,22 +33,11 @@ def finding_for(
     """
     sentence, figures = SENTENCES[code], {name: _plain(value) for name, value in figures.items()}
     every = {**figures, **(phrases or {})}
-    kept = {name: _written(value) for name, value in figures.items()}
     severity = sentence.severity if severity is None else severity
     what, remedy = filled(sentence.what, every), filled(sentence.remedy, every)
-    return Finding(what, where, remedy, severity, code=code, figures=kept)
+    return Finding(what, where, remedy, severity, code=code, figures=figures)
 
 
 def _plain(value: Any) -> Any:
     """Numbers of NumPy as Python's."""
     return value.item() if hasattr(value, "item") else value
-
-
-def _written(value: Any) -> Any:
-    """A figure as JSON can hold it: no number that is not finite."""
-    if isinstance(value, Mapping):
-        return {key: _written(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_written(one) for one in value]
-    value = _plain(value)
-    return None if isinstance(value, float) and not isfinite(value) else value

@@ -1,57 +1,154 @@
-"""Least squares with exact derivatives: residuals of all blocks, and of the errors that are stated of the sensors.
+"""Least squares with exact derivatives: data, errors that are stated of the sensors, residuals and their search.
 
 A sensor reads (1 + g) f + z of what there is: f of the model, counted from the datum of the sensor, g and z its errors,
 the same at every position. They are unknowns too, in units of their standard uncertainties, each with the observation
-0 ± 1: what is stated of it, and within ± `most`: what is further off is no error that was stated. So is a delay τ of
-the sensor behind the angle, of which f − τ df/dt is there to be read.
+0 ± 1 and within ± `most`: what is further off is no error that was stated. So is an error a of the crank angle, in
+shares of the cycle, by which the model is read at φ − a. The turns of a condition are its independent repetitions;
+within a turn neighbours may be correlated as they like.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.optimize import least_squares
 
 from trunnion.errors import Status
-from trunnion.rig.identification.blocks import OWN, Block, shared_zero
-from trunnion.rig.identification.corners import corners
-from trunnion.rig.identification.signals import Courses, Model
+from trunnion.rig.identification.signals import Courses, Model, Said
+from trunnion.rig.reading.measurement import Accuracy, Condition, Signal
 
-__all__ = ["FitProblem", "LeastSquaresFit", "SensorError", "fit", "sensors_of"]
+__all__ = [
+    "EFFICIENCY", "FAR", "FILE_ZERO", "Block", "Evaluations", "Fit", "SensorError", "Solution", "corners", "refined",
+    "rms", "sensor_errors", "shared_zero", "sizes_of", "solved",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+EFFICIENCY = "efficiency"  # the channel that is computed from torques and speeds, one figure a turn
+FILE_ZERO = "zero of each file"
+FILE_ANGLE = "angle of each condition"  # by the sampling of pulses
+ROUNDING = 1e-9  # of a course, by interpolation and sums
+FAR_ABOVE = 100.0  # times the rounding: scatter beside which it is nothing
 MOST_EVALUATIONS = 100
 TOLERANCE = 1e-10  # of cost and step: far below what data of any scatter tell
 PER_GUARD = 90  # positions of a cycle for each that is left out beside a jump, which resampling smears
-ANGLE = "angle of each condition"  # by the sampling of pulses
 FAR = 5.0  # standard uncertainties: what a stated error may come to at most
 HALF_STEP = 3**0.5  # standard uncertainties of an error that may be anything up to half a step
-LEAST_GAIN = 0.1  # of the model: what a sensor reads at least, 0 would do away with the model
+LEAST = 1e-6  # of the model, that a sensor reads at least: N mm for kN m; 0 would do away with the model
 GUESS = 0.01  # of a course: the scatter of one without repetitions, until its residuals are known
+ROUNDS = 4  # of what is used and how much it weighs
+SETTLED = 0.05  # of a variance: changes below it do not call for another round
+INSIDE = 0.05  # of the size of an unknown: how far from its limit a search begins
+EFFECT = 0.1  # of a course: what an unknown whose own size says nothing is to change to be counted as large
+
+
+@dataclass(frozen=True)
+class Block:
+    """One channel in one condition.
+
+    condition: its index; turns, held: (turn, position), those to fit and those held out; effects: of a course that is
+    computed from others, what a standard uncertainty of each of their errors does to it, by the name of the error;
+    files: where it comes from.
+    """
+
+    condition: int
+    channel: str
+    signal: Signal
+    turns: Array
+    held: Array
+    effects: Mapping[str, float] = field(default_factory=dict)
+    files: tuple[str, ...] = ()
+
+    @cached_property
+    def mean(self) -> Array:
+        """Mean of the turns that are fitted, (position,); NaN where there is nothing."""
+        return _mean(self.turns)
+
+    @cached_property
+    def held_mean(self) -> Array:
+        """Mean of those held out."""
+        return _mean(self.held)
+
+    @cached_property
+    def count(self) -> NDArray[np.intp]:
+        """Turns that have a value, (position,)."""
+        return np.asarray(np.count_nonzero(np.isfinite(self.turns), axis=0))
+
+    @cached_property
+    def spread(self) -> Array:
+        """Turns from their mean, (turn, position), larger by √((turns − 1)/(m − 1)) where only m turns have a value.
+
+        The sum of their squares is then (turns − 1) variances of one turn, wherever values are missing.
+        """
+        missing = np.sqrt((len(self.turns) - 1) / np.maximum(self.count - 1, 1))
+        return np.asarray(np.nan_to_num(self.turns - self.mean) * missing)
+
+    @cached_property
+    def repeats(self) -> bool:
+        """Whether it shows how much turns scatter."""
+        return bool(len(self.turns) > 1 and np.any(self.spread != 0))
+
+    @cached_property
+    def variance(self) -> float:
+        """Variance of one turn, pooled over the positions; NaN if it does not repeat.
+
+        Weights that follow the scatter from place to place would trust most where it happens to be small, and the
+        covariance, which is made of the same scatter, would come out too small.
+        """
+        return self.pooled(np.isfinite(self.mean)) if self.repeats else float("nan")
+
+    def pooled(self, mask: Mask) -> float:
+        """Variance of one turn, pooled over some positions, (position,); NaN where none of them repeats."""
+        freedom = int(np.sum(np.maximum(self.count - 1, 0)[mask]))
+        return float(np.sum(np.nan_to_num(self.turns - self.mean)[:, mask] ** 2) / freedom) if freedom else float("nan")
+
+    @cached_property
+    def unresolved(self) -> float:
+        """Standard uncertainty that more turns do not lessen: by steps between readings, or by rounding of numbers."""
+        rounding = ROUNDING * float(np.nanmax(np.abs(self.turns), initial=0.0))
+        far_above = self.repeats and self.variance > (FAR_ABOVE * rounding) ** 2
+        return max(float(self.signal.unresolved), 0.0 if far_above else rounding)
+
+
+def _mean(turns: Array) -> Array:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of positions without a value
+        return np.asarray(np.nanmean(turns, axis=0)) if len(turns) else np.full(turns.shape[1], np.nan)
+
+
+def rms(values: Array) -> float:
+    """Root mean square of what is there; NaN of nothing."""
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
+
+
+# ---- errors of the sensors ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class SensorError:
-    """One error of a sensor: its zero, its gain, or by how much it lags behind.
+    """One error of a sensor: its zero, its gain, or that of the crank angle.
 
-    sizes: its standard uncertainty in each block, in the unit of the course or relative, 0 in blocks of other sensors;
-    of a sensor behind a course that is computed, what it does to that, with its sign.
+    sizes: its standard uncertainty in each block, in the unit of the course, relative, or in shares of the cycle; 0 in
+    blocks of other sensors; of a course that is computed, what it does to that, with its sign.
     stated: whether anything is known of it; one that is not is free. group: of one of many, what they are together.
-    least: of a gain, the least factor that a sensor may read of the model. most: what one that is stated may come to,
-    in its standard uncertainties. angle: of an error of the crank angle, its standard uncertainty as such, rad.
+    most: what one that is stated may come to, in its standard uncertainties. angle: of an error of the crank angle that
+    has one size in all conditions, that, rad.
     """
 
     name: str
     channel: str
     kind: str
-    sizes: tuple[float, ...]
-    stated: bool
+    sizes: tuple[float, ...] = ()
+    stated: bool = True
     group: str = ""
-    least: float = LEAST_GAIN
     most: float = FAR
     angle: float = 0.0
 
@@ -60,332 +157,353 @@ class SensorError:
         """What it counts as in the variance of an estimate."""
         return self.group or self.name
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """In its standard uncertainties."""
+        most, largest = self.most if self.stated else inf, max(self.sizes)
+        return (max((LEAST - 1) / largest, -most) if self.kind == "gain" and largest > 0 else -most), most
 
-def sensors_of(
-    blocks: Sequence[Block],
-    own: Sequence[str] | None = None,
-    delay: float | None = None,
-    lags: Mapping[str, float] | None = None,
-    cuts: Sequence[tuple[float, float]] = (),
+
+def shared_zero(accuracy: Accuracy) -> float:
+    """Standard uncertainty of the zero that all files share: without what each has by itself."""
+    return inf if np.isinf(accuracy.zero) else float(np.sqrt(max(accuracy.zero**2 - accuracy.own**2, 0.0)))
+
+
+def sensor_errors(
+    model: Model, conditions: Sequence[Condition], blocks: Sequence[Block], by_condition: bool
 ) -> list[SensorError]:
-    """Errors of the sensors of all blocks: one for each channel, or of each condition if these have names.
+    """All that is stated of the sensors; an infinite standard uncertainty says that nothing is known.
 
-    An infinite standard uncertainty says that nothing is known of it. delay: by which a channel may lag behind the
-    angle, standard uncertainty, s; none if not given. lags: the same of all channels of each condition together, by
-    its name in the order of the conditions. cuts: of each condition that of its angle by readings that may be cut off,
-    rad, and its speed, rad/s; those of one resolution are off alike.
+    by_condition: whether zero and gain of a channel are off in each condition by their own, else in all by the same.
     """
-    found: list[SensorError] = []
-    for kind in ("zero", "gain"):
-        groups: dict[tuple[str, str], list[int]] = {}
-        for k, block in enumerate(blocks):
-            if _stated(block, kind) > 0:
-                place = own[block.condition] if own else ""
-                groups.setdefault((block.channel, place), []).append(k)
-        for (channel, place), members in groups.items():
-            stated = [_stated(blocks[k], kind) for k in members]
-            free = any(np.isinf(stated))
-            if free:
-                turns = [np.vstack([blocks[k].turns, blocks[k].held]) for k in members]
-                size = float(np.sqrt(np.nanmean(np.concatenate(turns, axis=None) ** 2))) or 1.0
-                stated = [size if kind == "zero" else 1.0] * len(members)
-            sizes = [0.0] * len(blocks)
-            for k, size in zip(members, stated, strict=True):
-                sizes[k] = float(size)
-            name = f"{kind} of {channel}" + (f" in {place}" if place else "")
-            found.append(SensorError(name, channel, kind, tuple(sizes), not free))
-    return [
-        *found,
-        *_of_files(blocks),
-        *_late(blocks, delay),
-        *_sampled(blocks, lags or {}),
-        *_cut(blocks, cuts),
-        *_behind(blocks, own),
-    ]
+    errors: dict[str, SensorError] = {}
+    usual: dict[str, float] = {}
+    for name in dict.fromkeys(block.channel for block in blocks):
+        every = np.concatenate([np.ravel(block.signal.turns) for block in blocks if block.channel == name])
+        usual[name] = rms(every) or 1.0
 
+    def add(k: int, size: float, error: SensorError) -> None:
+        error = errors.get(error.name, replace(error, sizes=(0.0,) * len(blocks)))
+        free = bool(np.isinf(size))
+        size = (usual.get(error.channel, 1.0) if error.kind == "zero" else 1.0) if free else float(size)
+        sizes = (*error.sizes[:k], size, *error.sizes[k + 1 :])
+        errors[error.name] = replace(error, sizes=sizes, stated=error.stated and not free)
 
-def _of_files(blocks: Sequence[Block]) -> list[SensorError]:
-    """The zero that each file has by itself."""
-    single: dict[tuple[str, tuple[str, ...]], list[float]] = {}
     for k, block in enumerate(blocks):
-        if block.course.accuracy.own > 0:
-            key = block.channel, block.files or (str(block.condition),)
-            single.setdefault(key, [0.0] * len(blocks))[k] = float(block.course.accuracy.own)
-    return [
-        SensorError(
-            f"{OWN} of {channel}: {' '.join(files)}", channel, "zero", tuple(sizes), True, f"{OWN} of {channel}"
-        )
-        for (channel, files), sizes in single.items()
-    ]
+        condition, accuracy, channel = conditions[block.condition], block.signal.accuracy, block.channel
+        place, file = f" in {condition.name}" * by_condition, " ".join(block.files or (str(block.condition),))
+        for kind, size in (("zero", float(np.hypot(shared_zero(accuracy), accuracy.cut))), ("gain", accuracy.gain)):
+            if size > 0:
+                add(k, size, SensorError(f"{kind} of {channel}{place}", channel, kind))
+        for name, size in {f"{FILE_ZERO} of {channel}": accuracy.own, **block.effects}.items():
+            if size and name.startswith(FILE_ZERO):
+                add(k, size, SensorError(f"{name}: {file}", channel, "zero", group=name))
+            elif size:
+                add(k, size, SensorError(f"{name}{place}", name.partition(" of ")[2], name.partition(" ")[0]))
+        turn, duration = model.turns[block.condition], model.durations[block.condition]
+        if block.turns.shape[1] > 2 and condition.lag and duration:
+            error = SensorError(f"{FILE_ANGLE}: {condition.name}", "", "angle", group=FILE_ANGLE)
+            add(k, condition.lag / duration, error)
+        if block.turns.shape[1] > 2 and condition.cut and np.isfinite(turn):
+            size = abs(condition.cut)
+            name = f"angle in steps of {np.degrees(size * 12**0.5):.4g} deg"
+            add(k, condition.cut / turn, SensorError(name, "", "angle", most=HALF_STEP, angle=size))
+    order = ("zero", "gain", "angle")
+    return sorted(errors.values(), key=lambda one: (bool(one.group), order.index(one.kind)))
 
 
-def _late(blocks: Sequence[Block], delay: float | None) -> list[SensorError]:
-    """By how much each channel with a course lags behind the angle."""
-    if not delay:
-        return []
-    size = float(delay) if np.isfinite(delay) else 1e-3
-    rows = {
-        channel: tuple(size * (one.channel == channel and one.turns.shape[1] > 2) for one in blocks)
-        for channel in dict.fromkeys(one.channel for one in blocks)
-    }
-    return [
-        SensorError(f"delay of {channel}", channel, "delay", sizes, bool(np.isfinite(delay)))
-        for channel, sizes in rows.items()
-        if any(sizes)
-    ]
+# ---- the problem ----------------------------------------------------------------------------------------------
 
 
-def _sampled(blocks: Sequence[Block], lags: Mapping[str, float]) -> list[SensorError]:
-    """By how much all channels of a condition lag together, since its angle is known to the sampling only."""
-    found = []
-    for index, (name, lag) in enumerate(lags.items()):
-        sizes = tuple(lag * (one.condition == index and one.turns.shape[1] > 2) for one in blocks)
-        if any(sizes):
-            found.append(SensorError(f"{ANGLE}: {name}", "", "delay", sizes, True, ANGLE))
-    return found
+class Evaluations:
+    """The model at values of the unknowns; the last few are kept. progress: called with the number of evaluations."""
+
+    def __init__(self, model: Model, progress: Callable[[int], None] | None = None) -> None:
+        self.model, self.progress, self.count = model, progress, 0
+        self._last: dict[bytes, Courses] = {}
+
+    def __call__(self, at: Array) -> Courses:
+        key = at.tobytes()
+        if key not in self._last:
+            while len(self._last) > 3:
+                self._last.pop(next(iter(self._last)))
+            self._last[key] = self.model.courses(at)
+            self.count += 1
+            if self.progress:
+                self.progress(self.count)
+        return self._last[key]
 
 
-def _cut(blocks: Sequence[Block], cuts: Sequence[tuple[float, float]]) -> list[SensorError]:
-    """By how much all channels lag since readings of the angle may be cut off: half a step in all files alike."""
-    found = []
-    for size in dict.fromkeys(abs(cut) for cut, _ in cuts if cut):
-        late = [cut / speed if abs(cut) == size and speed else 0.0 for cut, speed in cuts]
-        sizes = tuple(late[one.condition] * (one.turns.shape[1] > 2) for one in blocks)
-        step = np.degrees(size * np.sqrt(12.0))
-        name = f"angle in steps of {step:.4g} deg"
-        found.append(SensorError(name, "", "delay", sizes, stated=True, most=HALF_STEP, angle=size))
-    return [one for one in found if any(one.sizes)]
+@dataclass(frozen=True)
+class Fit:
+    """What is fitted: the model to the blocks, with errors of the sensors.
 
-
-def _behind(blocks: Sequence[Block], own: Sequence[str] | None) -> list[SensorError]:
-    """Errors of the sensors behind courses that are computed."""
-    effects: dict[tuple[str, str, str], list[float]] = {}
-    for k, block in enumerate(blocks):
-        for name, size in block.effects.items():
-            group = name if name.startswith(OWN) else ""
-            if group:
-                name = f"{name}: {' '.join(block.files or (str(block.condition),))}"
-            elif own:
-                name = f"{name} in {own[block.condition]}"
-            effects.setdefault((name, block.channel, group), [0.0] * len(blocks))[k] = size
-    return [SensorError(name, one, "zero", tuple(sizes), True, group) for (name, one, group), sizes in effects.items()]
-
-
-def _stated(block: Block, kind: str) -> float:
-    """What is stated of an error that a channel has in all conditions."""
-    accuracy = block.course.accuracy
-    return float(np.hypot(shared_zero(accuracy), accuracy.cut)) if kind == "zero" else float(accuracy.gain)
-
-
-@dataclass
-class FitProblem:
-    """What is fitted: the model to the blocks.
-
-    masks: positions used, by block; variances: of one turn, by block; factors: by channel, for the correlation within a
-    turn; left_over: for a misfit, so that it does not outweigh what is stated of the sensors; progress: called with the
-    number of models evaluated.
+    x stands for unknowns and sensors, (unknown and sensor,). masks: positions used, by block; variances: of one turn,
+    by block, as it is weighed; inflation: of these for a misfit, so that it does not outweigh what is stated of the
+    sensors. Another choice of these is another Fit, see `refined`.
     """
 
-    model: Model
+    courses_at: Evaluations
     blocks: Sequence[Block]
     sensors: Sequence[SensorError]
     guard: int | None = None
-    masks: list[Mask] = field(default_factory=list)
-    variances: list[Array] = field(default_factory=list)
-    factors: dict[str, float] = field(default_factory=dict)
-    left_over: float = 1.0
-    evaluations: int = 0
-    progress: Callable[[int], None] | None = None
+    masks: Sequence[Mask] = ()
+    variances: Sequence[float] = ()
+    inflation: float = 1.0
 
-    def __post_init__(self) -> None:
-        self._known: dict[bytes, Courses] = {}
+    @property
+    def model(self) -> Model:
+        return self.courses_at.model
 
     @property
     def count(self) -> int:
         """Unknowns of the model."""
         return len(self.model.unknowns)
 
-    @property
+    @cached_property
+    def start(self) -> Array:
+        """Unknowns as stated, sensors without errors."""
+        return np.array([one.start for one in self.model.unknowns] + [0.0] * len(self.sensors))
+
+    @cached_property
     def prior(self) -> Array:
         """Weight of what was stated, (unknown and sensor,): 1 of sensors, 0 of what nothing is stated of."""
         return np.array([0.0] * self.count + [float(one.stated) for one in self.sensors])
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Limits of unknowns and sensors."""
-        low = [one.lower for one in self.model.unknowns]
-        high = [one.upper for one in self.model.unknowns]
-        most = [one.most if one.stated else inf for one in self.sensors]
-        pairs = zip(self.sensors, most, strict=True)
-        least = [max((one.least - 1) / max(one.sizes), -far) if one.kind == "gain" else -far for one, far in pairs]
-        return np.array([*low, *least]), np.array([*high, *most])
+        ends = [(one.lower, one.upper) for one in self.model.unknowns] + [one.limits for one in self.sensors]
+        low, high = np.array(ends).T
+        return low, high
 
     def courses(self, x: Array) -> Courses:
-        """What the model says; of the last few places it is kept."""
-        at = np.asarray(x[: self.count], float)
-        key = at.tobytes()
-        if key not in self._known:
-            while len(self._known) > 3:
-                self._known.pop(next(iter(self._known)))
-            self._known[key] = self.model.courses(at)
-            self.evaluations += 1
-            if self.progress:
-                self.progress(self.evaluations)
-        return self._known[key]
+        """The model at the unknowns of x."""
+        return self.courses_at(np.asarray(x[: self.count], float))
 
-    def said(self, x: Array, k: int) -> tuple[Array, Array]:
-        """What the sensor of a block would read, (position,), and its derivatives by all of x."""
+    def fitted(self) -> list[int]:
+        """The blocks of which anything is used."""
+        return [k for k, block in enumerate(self.blocks) if len(block.turns)]
+
+    def reading(self, x: Array, k: int) -> tuple[Array, Array]:
+        """What the sensor of a block would read, (position,), and its derivatives, (unknown and sensor, position)."""
         block = self.blocks[k]
-        one = self.courses(x).said[block.condition][block.channel]
-        size = block.turns.shape[1]
-        value, slope = one.value[:size], one.slope[:, :size]
-        errors = [(s, one.kind, one.sizes[k]) for s, one in enumerate(self.sensors, self.count) if one.sizes[k]]
-        gain, late, zero = (
-            float(sum(u * x[s] for s, kind, u in errors if kind == own)) for own in ("gain", "delay", "zero")
+        course, size, datum = self._course(x, k), block.turns.shape[1], block.signal.accuracy.datum
+        value, slope = course.value[:size], course.slope[:, :size]
+        # the errors behind a course that is computed are added to it
+        acting = [(s, "zero" if block.effects else error.kind, error.sizes[k])
+                  for s, error in enumerate(self.sensors, self.count) if error.sizes[k]]  # fmt: skip
+        zero, gain, angle = (
+            float(sum(size * x[s] for s, kind, size in acting if kind == of)) for of in ("zero", "gain", "angle")
         )
-        gain += 1.0
-        rate = self.model.rate(block.condition, value) if any(kind == "delay" for _, kind, _ in errors) else 0.0
-        if late:
-            slope = slope - late * self.model.rate(block.condition, slope)
-        seen = value - late * rate
-        datum = block.course.accuracy.datum
+        by_share = self.model.by_share(block.condition, value) if any(kind == "angle" for _, kind, _ in acting) else 0.0
+        if angle:
+            slope = slope - angle * self.model.by_share(block.condition, slope)
+            value = value - angle * by_share
         columns = np.zeros((len(x), size))
-        columns[: self.count] = gain * slope
-        for s, kind, u in errors:
-            columns[s] = {"delay": -gain * u * rate, "gain": u * (seen - datum)}.get(kind, u)
-        return gain * (seen - datum) + datum + zero, columns
+        columns[: self.count] = (1 + gain) * slope
+        for s, kind, error in acting:
+            shapes: dict[str, Array | float] = {"zero": 1.0, "gain": value - datum, "angle": -(1 + gain) * by_share}
+            columns[s] = error * shapes[kind]
+        return (1 + gain) * (value - datum) + datum + zero, columns
 
-    def misses(self, x: Array, k: int, data: Array) -> Array:
-        """Data less what the sensor would read, (…, position); angles by the nearest turn."""
-        gap = data - self.said(x, k)[0]
-        measure = self.model.measures[self.blocks[k].channel]
-        if measure.turning(self.model.run.system):
+    def _course(self, x: Array, k: int) -> Said:
+        return self.courses(x).said[self.blocks[k].condition][self.blocks[k].channel]
+
+    def gap(self, x: Array, k: int, data: Array | None = None) -> Array:
+        """Data, the mean if not given, less what the sensor would read, (position,); angles by the nearest turn."""
+        gap = (self.blocks[k].mean if data is None else data) - self.reading(x, k)[0]
+        if self.model.measures[self.blocks[k].channel].turning(self.model.run.system):
             return np.asarray((gap + np.pi) % (2 * np.pi) - np.pi)
         return np.asarray(gap)
 
     def weight(self, k: int) -> Array:
         """1/variance of the mean at each position of a block, 0 where it is not used."""
         block = self.blocks[k]
-        factor = self.factors.get(block.channel, 1.0) * self.left_over
-        scale = self.variances[k] * factor / np.maximum(block.count, 1)
-        return np.where(self.masks[k], 1 / (scale + block.unresolved**2), 0.0)
-
-    # ---- what is used -----------------------------------------------------------------------------------------
-
-    def allowed(self, x: Array) -> list[Mask]:
-        """Positions of each block where the model has a sound answer and the data have a value."""
-        found, courses = [], self.courses(x)
-        for k, block in enumerate(self.blocks):
-            status, turned = courses.status[block.condition], courses.turned[block.condition]
-            measure = self.model.measures[block.channel]
-            size = block.turns.shape[1]
-            if size == 1 < len(status):  # a figure of the whole cycle
-                good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
-            elif measure.of_motion:  # whatever forces do
-                good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
-            else:
-                guard = -(-size // PER_GUARD) if self.guard is None else self.guard
-                value = courses.said[block.condition][block.channel].value
-                rounded = turned | self._corners(k, value, turned, guard)
-                good = (status == Status.SOLVED) & ~_widened(rounded, guard)
-            value = courses.said[block.condition][block.channel].value[:size]
-            there = np.isfinite(block.mean) if block.fitted else np.isfinite(block.held_mean)
-            found.append(good & there & np.isfinite(value))
-        return found
-
-    def _corners(self, k: int, value: Array, taken: Mask, guard: int) -> Mask:
-        """Positions of a block beside corners of the model's signal that resampling rounds off visibly."""
-        block, model = self.blocks[k], self.model
-        uncertainty = np.sqrt(self.variances[k] / np.maximum(block.count, 1) + block.unresolved**2)
-        if len(value) != len(model.phases[block.condition]) or len(uncertainty) != len(value):
-            return np.zeros(len(value), bool)
-        phase, shares = model.phases[block.condition], model.bends[block.condition]
-        return corners(value, phase, shares, uncertainty, taken, closed=model.run.cycle.periodic, guard=guard)
-
-    def unanswered(self, x: Array) -> int:
-        """Positions with data that friction or the assembly leaves without an answer."""
-        count = 0
-        for status in self.courses(x).status:
-            count += int(np.count_nonzero(status >= Status.NOT_CONVERGED))
-        return count
-
-    def start_scatter(self) -> None:
-        """Variances by the scatter of the turns; a guess where there is none."""
-        self.variances = []
-        for block in self.blocks:
-            if block.repeats:
-                self.variances.append(block.variance)
-            else:
-                data = block.mean if block.fitted else block.held_mean
-                size = float(np.sqrt(np.nanmean(data**2))) if np.any(np.isfinite(data)) else 0.0
-                self.variances.append(np.full(len(data), (GUESS * (size or 1.0)) ** 2))
-
-    def learn_scatter(self, x: Array) -> bool:
-        """Variances of blocks without repetitions by the residuals of their channel; whether there are such."""
-        single = [k for k, block in enumerate(self.blocks) if block.fitted and not block.repeats]
-        for channel in dict.fromkeys(self.blocks[k].channel for k in single):
-            own = [k for k in single if self.blocks[k].channel == channel]
-            gaps = [self.misses(x, k, self.blocks[k].mean)[self.masks[k]] for k in own]
-            gap = np.concatenate(gaps)
-            if not gap.size:
-                continue
-            freedom = max(gap.size - len(x), 1)
-            size = max(float(np.nanmax(np.abs(self.blocks[k].mean), initial=0.0)) for k in own)
-            value = max(float(np.sum(gap**2)) / freedom, (1e-9 * (size or 1.0)) ** 2)
-            for k in own:
-                self.variances[k] = np.full(len(self.masks[k]), value)
-        return bool(single)
-
-    # ---- residuals --------------------------------------------------------------------------------------------
+        scatter = self.variances[k] * self.inflation / np.maximum(block.count, 1)
+        return np.where(self.masks[k], 1 / (scatter + block.unresolved**2), 0.0)
 
     def residuals(self, x: Array) -> Array:
         """Weighted residuals of all used positions, then those of the sensors."""
-        rows = []
-        for k, block in enumerate(self.blocks):
-            if block.fitted:
-                mask = self.masks[k]
-                rows.append((np.sqrt(self.weight(k)) * self.misses(x, k, block.mean))[mask])
+        rows = [(np.sqrt(self.weight(k)) * self.gap(x, k))[self.masks[k]] for k in self.fitted()]
         return np.concatenate([*rows, (x * self.prior)[self.count :]])
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (residual, unknown and sensor)."""
-        rows = []
+        rows = [-(np.sqrt(self.weight(k)) * self.reading(x, k)[1]).T[self.masks[k]] for k in self.fitted()]
+        rows.append(np.diag(self.prior)[self.count :])
+        return np.nan_to_num(np.concatenate(rows), nan=0.0, posinf=0.0, neginf=0.0)
+
+    # ---- what is used, and how much it weighs -----------------------------------------------------------------
+
+    def allowed(self, x: Array) -> list[Mask]:
+        """Positions of each block where the model has a sound answer and the data have a value."""
+        masks, courses = [], self.courses(x)
         for k, block in enumerate(self.blocks):
-            if block.fitted:
-                mask = self.masks[k]
-                rows.append(-(np.sqrt(self.weight(k)) * self.said(x, k)[1]).T[mask])
-        found = np.concatenate([*rows, np.diag(self.prior)[self.count :]])
-        return np.where(np.isfinite(found), found, 0.0)
+            status, turned = courses.status[block.condition], courses.turned[block.condition]
+            value, size = self._course(x, k).value, block.turns.shape[1]
+            if size == 1 < len(status):  # a figure of the cycle
+                good = np.array([bool(np.all(status < Status.NOT_CONVERGED))])
+            elif self.model.measures[block.channel].of_motion:  # whatever forces do
+                good = (status < Status.SINGULAR) & (status != Status.NEAR_SINGULAR)
+            else:
+                guard = -(-size // PER_GUARD) if self.guard is None else self.guard
+                u = np.sqrt(self.variances[k] / np.maximum(block.count, 1) + block.unresolved**2)
+                phase, bends = self.model.phases[block.condition], self.model.bends[block.condition]
+                closed = self.model.run.cycle.periodic
+                rounded = turned | corners(value, phase, bends, u, turned, closed=closed, guard=guard)
+                good = (status == Status.SOLVED) & ~_widened(rounded, guard)
+            data = block.mean if len(block.turns) else block.held_mean
+            masks.append(good & np.isfinite(data) & np.isfinite(value[:size]))
+        return masks
+
+    def first_scatter(self) -> list[float]:
+        """Variances by the scatter of the turns; a guess where there is none."""
+        variances = []
+        for block in self.blocks:
+            data = block.mean if len(block.turns) else block.held_mean
+            variances.append(block.variance if block.repeats else (GUESS * (rms(data) or 1.0)) ** 2)
+        return variances
+
+    def learnt_scatter(self, x: Array) -> list[float]:
+        """Variances by channel: of blocks without repetitions by their residuals, of others by how far neighbours of a
+        turn vary together.
+
+        There it is the variance of the scores between turns over what independent positions would give, in all
+        directions that the unknowns move the course in; 1 for white noise.
+        """
+        variances = self.first_scatter()
+        for channel in dict.fromkeys(block.channel for block in self.blocks):
+            every = [k for k in self.fitted() if self.blocks[k].channel == channel and np.any(self.masks[k])]
+            single = [k for k in every if not self.blocks[k].repeats]
+            if single:
+                gap = np.concatenate([self.gap(x, k)[self.masks[k]] for k in single])
+                least = (ROUNDING * max(float(np.nanmax(np.abs(self.blocks[k].mean))) for k in single)) ** 2
+                learnt = max(float(np.sum(gap**2)) / max(gap.size - len(x), 1), least, 1e-300)
+                for k in single:
+                    variances[k] = learnt
+            scores, white = 0.0, 0.0
+            for k in [k for k in every if self.blocks[k].repeats]:
+                mask, block = self.masks[k], self.blocks[k]
+                basis = _basis(np.nan_to_num(self.reading(x, k)[1][:, mask]))
+                scores += float(np.sum((block.spread[:, mask] @ basis) ** 2)) / block.variance
+                white += basis.shape[1] * (len(block.turns) - 1)
+            for k, block in enumerate(self.blocks):
+                if block.channel == channel and block.repeats and white:
+                    variances[k] *= max(scores / white, 0.05)
+        return variances
+
+
+def _basis(rows: Array) -> Array:
+    """Orthonormal directions that rows span, (position, direction)."""
+    size = np.linalg.norm(rows, axis=1)
+    rows = rows[size > 1e-12 * np.max(size, initial=0.0)]
+    rows = rows / np.linalg.norm(rows, axis=1)[:, None]
+    _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(directions[sizes > 1e-6 * np.max(sizes, initial=0.0)].T)
 
 
 def _widened(turned: Mask, guard: int) -> Mask:
     """The two positions beside each change of sense, and as many more on both sides as the guard is above 1."""
     if guard < 1:
         return np.zeros_like(turned)
-    found = turned.copy()
     for _ in range(guard - 1):
-        found = found | np.roll(found, 1) | np.roll(found, -1)
-    return found
+        turned = turned | np.roll(turned, 1) | np.roll(turned, -1)
+    return turned
+
+
+NEARBY = 15  # positions about a corner, whose second differences tell it from a curve
+STANDS_OUT = 1.5  # times the second differences nearby, by which a corner differs from a curve
+ROUNDED = 1 / 8  # of a change of slope per position: the mean of |x|/2 over a position, at its corner
+TOO_MUCH = 0.25  # of the standard uncertainty of the mean: what is rounded off by more is left out
+MOST = 1 / 3  # of the positions, that are left out at corners: of a table of very many points the largest only
+CLOSE = 1e-9  # of the cycle: a bend at a position
+
+
+def corners(
+    value: Array, phase: Array, bends: Array, uncertainty: Array, taken: Mask, *, closed: bool, guard: int
+) -> Mask:
+    """The positions before and after each corner or jump that resampling rounds off by more than the data hide.
+
+    A value at a position is the mean of the samples about it, or lies on a cubic through four of them: a change of
+    slope by d per position is rounded off by up to d/8, in every turn alike.
+
+    Parameters
+    ----------
+    value, phase, uncertainty : (position,), the course of the model, the share of the cycle, the standard uncertainty
+        of the measured mean.
+    bends : shares of the cycle at which the model may bend or jump.
+    taken : (position,), where it is known to jump already.
+    closed : whether the cycle repeats.
+    guard : positions that will be left out on each side.
+    """
+    size, marked = len(value), np.zeros(len(value), bool)
+    if size < NEARBY or not bends.size:
+        return marked
+    bend = np.nan_to_num(np.abs(np.roll(value, -1) - 2 * value + np.roll(value, 1)))
+    if not closed:
+        bend[[0, -1]] = 0.0
+    usual = median_filter(bend, NEARBY, mode="wrap" if closed else "nearest")
+    order = np.argsort(phase)
+    before = np.unique(np.searchsorted(phase[order], bends + CLOSE, side="right") - 1)
+    if not closed:
+        before = before[(before >= 0) & (before < size - 1)]
+    pairs = order[np.stack([before, before + 1]) % size]
+    level, peak = np.min(usual[pairs], axis=0), np.max(bend[pairs], axis=0)
+    off = ROUNDED * (peak - level) / np.maximum(np.min(uncertainty[pairs], axis=0), 1e-300)
+    off[(peak <= STANDS_OUT * level) | (off <= TOO_MUCH) | np.any(taken[pairs], axis=0)] = 0.0
+    largest = np.argsort(-off)[: max(1, int(MOST * size / (2 * max(guard, 1))))]
+    marked[pairs[:, largest[off[largest] > 0]]] = True
+    return marked
+
+
+# ---- the search -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class LeastSquaresFit:
-    """Where a least-squares search ended. cost: sum of squares."""
+class Solution:
+    """Where a search ended. cost: sum of squares; settled: whether what is used and how much it weighs came to rest."""
 
     x: Array
     cost: float
-    evaluations: int
-    converged: bool
+    evaluations: int = 0
+    converged: bool = False
+    settled: bool = False
 
 
-def fit(problem: FitProblem, start: Array) -> LeastSquaresFit:
+def solved(fit: Fit, start: Array) -> Solution:
     """The trust-region search of SciPy within the limits; steps to where there is no answer are taken back."""
-    from scipy.optimize import least_squares
-
-    low, high = problem.bounds
-    inside = np.clip(start, low, high)
+    low, high = fit.bounds
     found = least_squares(
-        problem.residuals, inside, problem.jacobian, (low, high), "trf", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE,
-        x_scale="jac", max_nfev=MOST_EVALUATIONS,
+        fit.residuals, np.clip(start, low, high), fit.jacobian, (low, high), "trf", ftol=TOLERANCE, xtol=TOLERANCE,
+        gtol=TOLERANCE, x_scale="jac", max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    return LeastSquaresFit(np.asarray(found.x), 2 * float(found.cost), int(found.nfev), bool(found.status > 0))
+    return Solution(np.asarray(found.x), 2 * float(found.cost), int(found.nfev), bool(found.status > 0))
+
+
+def refined(fit: Fit, start: Array) -> tuple[Fit, Solution]:
+    """The fit whose weights and used positions are those of where it ends, from a start that is moved off the limits.
+
+    On a limit a search would not get off.
+    """
+    fit = replace(fit, variances=fit.first_scatter())
+    fit = replace(fit, masks=fit.allowed(start))
+    low, high = fit.bounds
+    room = np.minimum(INSIDE * sizes_of(fit, start), 0.25 * (high - low))
+    best = solved(fit, np.clip(start, low + room, high - room))
+    for _ in range(ROUNDS):
+        other = replace(fit, variances=fit.learnt_scatter(best.x), masks=fit.allowed(best.x))
+        same = all(np.array_equal(a, b) for a, b in zip(other.masks, fit.masks, strict=True))
+        if same and np.allclose(other.variances, fit.variances, rtol=SETTLED, atol=0.0, equal_nan=True):
+            return fit, replace(best, settled=True)
+        fit, best = other, solved(other, best.x)
+    return fit, best
+
+
+def sizes_of(fit: Fit, x: Array) -> Array:
+    """How large each unknown is: by the model or the estimate; of one that is 0, what would change the data visibly."""
+    sizes = [max(one.size, abs(value)) for one, value in zip(fit.model.unknowns, x[: fit.count], strict=True)]
+    pulled = np.linalg.norm(fit.jacobian(x), axis=0)
+    data = float(np.sqrt(sum(np.sum(np.nan_to_num(fit.blocks[k].mean) ** 2 * fit.weight(k)) for k in fit.fitted())))
+    every = [size or (EFFECT * data / by if by else 1.0) for size, by in zip(sizes, pulled[: fit.count], strict=True)]
+    return np.array(every + [1.0] * len(fit.sensors))

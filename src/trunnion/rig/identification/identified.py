@@ -1,250 +1,231 @@
-"""What the estimates are worth: intervals, limits, sensors, residuals before and after, and what was held out."""
+"""What the estimates are worth: intervals, limits, residuals before and after, and what was held out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.model.mechanism import Mechanism
-from trunnion.rig.identification.fit import FAR, FitProblem
+from trunnion.results.dataset import Variable
+from trunnion.results.tables.identification import CURVES
+from trunnion.rig.identification.fit import FAR, Fit, Solution, rms
 from trunnion.rig.identification.identifiability import InseparableUnknowns
 from trunnion.rig.identification.misfit import MisfitCause
-from trunnion.rig.identification.search import Search
 from trunnion.rig.identification.uncertainty import Covariances, quantile
 from trunnion.rig.reading.measurement import Measurement
 
-__all__ = ["HeldOut", "Identified", "Misses"]
+__all__ = ["VARIABLES", "Identified"]
 
 Array = NDArray[np.float64]
 AT_LIMIT = 0.05  # of the standard uncertainty: nearer than this to a limit is on it
 
 
-@dataclass(frozen=True)
-class Misses:
-    """How far the model is from the data of one block, rms: before and after, and what the scatter explains.
-
-    used, out: positions; curves: (position,) of the residual before, after and the uncertainty of the mean.
-    """
-
-    block: int
-    before: float
-    after: float
-    expected: float
-    used: int
-    out: int
-    curves: tuple[Array, Array, Array]
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """How well data that were not fitted are predicted, rms; expected: by their scatter and the estimates'."""
-
-    block: int
-    before: float
-    after: float
-    expected: float
-    turns: int
+PARAMETER, SENSOR, BLOCK = ("parameter",), ("sensor",), ("channel", "condition")
+COURSE = (*BLOCK, "position")
+VARIABLES = {
+    "start": Variable(PARAMETER, "of the parameter", "start of the search"),
+    "estimate": Variable(PARAMETER, "of the parameter", "estimate; NaN if not identifiable"),
+    "standard_uncertainty": Variable(PARAMETER, "of the parameter", "standard uncertainty of the estimate"),
+    "lower": Variable(PARAMETER, "of the parameter", "lower end of the 95 % interval"),
+    "upper": Variable(PARAMETER, "of the parameter", "upper end of the 95 % interval"),
+    "degrees_of_freedom": Variable(PARAMETER, "1", "effective degrees of freedom of the standard uncertainty"),
+    "limit": Variable(PARAMETER, "1", "−1 on the lower limit, 1 on the upper: the interval is one-sided"),
+    "told": Variable(PARAMETER, "1", "1 if identifiable, 0 if not"),
+    "correlation": Variable(("parameter", "parameter_2"), "1", "correlation of the estimates"),
+    "share": Variable(("parameter", "source"), "1", "share of a source in the variance of an estimate"),
+    "singular_value": Variable(
+        PARAMETER, "1", "singular value of the derivatives with columns scaled to 1, the largest first"
+    ),
+    "sensor_error": Variable(SENSOR, "1", "estimated error of a sensor, in its standard uncertainties"),
+    "sensor_size": Variable(
+        SENSOR, "of the sensor", "its standard uncertainty as stated, of the angle rad; NaN if it differs"
+    ),
+    "sensor_uncertainty": Variable(SENSOR, "1", "standard uncertainty of that, in those stated"),
+    "rms_before": Variable(BLOCK, "of the channel", "root mean square of the residual at the start"),
+    "rms_after": Variable(BLOCK, "of the channel", "root mean square of the residual with the estimates"),
+    "rms_expected": Variable(BLOCK, "of the channel", "its expected value from the scatter between turns"),
+    "used": Variable(BLOCK, "1", "positions used", np.int32),
+    "left_out": Variable(BLOCK, "1", "positions with data that are not used", np.int32),
+    "turns": Variable(BLOCK, "1", "turns used", np.int32),
+    "held_out_turns": Variable(BLOCK, "1", "held-out turns", np.int32),
+    "held_out_before": Variable(
+        BLOCK,
+        "of the channel",
+        "root mean square of the residual of the held-out data, at the start values",
+    ),
+    "held_out_after": Variable(BLOCK, "of the channel", "the same with the estimates"),
+    "held_out_expected": Variable(
+        BLOCK,
+        "of the channel",
+        "its expected value from the scatter and the uncertainty of the prediction",
+    ),
+    "reduced_chi_squared": Variable((), "1", "χ² of the residuals relative to the scatter between turns"),
+    "chi_squared_freedom": Variable((), "1", "degrees of freedom of that χ²"),
+    "chi_squared_chance": Variable((), "1", "chance of a larger one if the model is right"),
+    "turn_correlation": Variable((), "1", "correlation of the contributions of successive turns"),
+    "hold_out_ratio": Variable((), "1", "residuals of the held-out data over their expected value"),
+    "phase": Variable(("condition", "position"), "1", "share of the cycle"),
+    "measured": Variable(COURSE, "of the channel", "mean over the turns"),
+    "residual_before": Variable(COURSE, "of the channel", "measured minus model, at the start"),
+    "residual_after": Variable(
+        COURSE,
+        "of the channel",
+        "measured value minus predicted reading of the sensor",
+    ),
+    "residual_uncertainty": Variable(COURSE, "of the channel", "standard uncertainty of the mean over the turns"),
+}
 
 
 @dataclass(frozen=True)
 class Identified:
-    """An identification: the model, the data, what was found, and the figures of it, (unknown,) unless said.
+    """An identification, with the figures of it, (unknown,) unless said.
 
+    starts: places that the search began at; other: another that fits as well; groups: what the data do not tell apart;
     causes: what would explain a misfit, best first; unused: channels that no unknown acts on.
     """
 
     mechanism: Mechanism
     measurement: Measurement
-    problem: FitProblem
-    search: Search
+    fit: Fit
+    solution: Solution
+    starts: int
+    other: Array | None
     spread: Covariances
     groups: Sequence[InseparableUnknowns]
-    causes: Sequence[MisfitCause] = ()
-    unused: Sequence[str] = ()
+    causes: Sequence[MisfitCause]
+    unused: Sequence[str]
 
     @property
     def x(self) -> Array:
         """Estimates of the unknowns, then of the sensors' errors."""
-        return self.search.fit.x
-
-    @cached_property
-    def refuted(self) -> bool:
-        """Whether the estimates stand for something else: by the residuals, or since an error of a sensor that explains
-        them is beyond what is stated of it."""
-        return self.spread.test.gross or bool(self.spread.beyond) or self.times_stated > FAR
+        return self.solution.x
 
     @cached_property
     def times_stated(self) -> float:
         """Size of the first cause of a misfit in standard uncertainties that are stated of it; 0 where none is."""
-        first = next(iter(self.causes), None)
-        if first is None:
+        if not self.causes:
             return 0.0
-        sensors = [one for one in self.problem.sensors if one.stated]
+        first, sensors = self.causes[0], [one for one in self.fit.sensors if one.stated]
         alike = [max(map(abs, one.sizes)) for one in sensors if (one.kind, one.channel) == (first.kind, first.channel)]
         stated = max([one.angle for one in sensors] if first.kind == "angle" else alike, default=0.0)
         return abs(first.size) / stated if stated else 0.0
 
+    @property
+    def refuted(self) -> bool:
+        """Whether the estimates stand for something else: a gross misfit, or an error beyond what is stated of it."""
+        return self.spread.test.gross or bool(self.spread.beyond) or self.times_stated > FAR
+
     @cached_property
     def lost(self) -> NDArray[np.bool_]:
         """Unknowns that the data do not tell, (unknown and sensor,)."""
-        lost = np.zeros(len(self.x), bool)
-        for group in self.groups:
-            lost[list(group.members)] = True
-        return lost
+        members = [one for group in self.groups for one in group.members]
+        return np.isin(np.arange(len(self.x)), members)
 
     @property
-    def told(self) -> Array:
-        """Values of the unknowns: estimates, of what the data do not tell the start, (unknown,)."""
-        return np.asarray(np.where(self.lost, self.start, self.x)[: self.problem.count])
+    def values(self) -> Array:
+        """Estimates, of what the data do not tell the start."""
+        return np.asarray(np.where(self.lost, self.fit.start, self.x)[: self.fit.count])
 
     @cached_property
     def deviation(self) -> Array:
-        """Standard uncertainty, (unknown and sensor,)."""
-        found = np.sqrt(np.maximum(np.diagonal(self.spread.covariance), 0.0))
-        return np.asarray(np.where(self.lost, np.nan, found))
+        """Standard uncertainty, (unknown and sensor,); NaN of what the data do not tell."""
+        return np.asarray(np.where(self.lost, np.nan, self.spread.deviation))
+
+    @cached_property
+    def _step(self) -> Array:
+        """Where the next step would go without limits, (unknown and sensor,)."""
+        return np.asarray(-self.spread.inverse @ (self.fit.jacobian(self.x).T @ self.fit.residuals(self.x)))
 
     @cached_property
     def limit(self) -> NDArray[np.int8]:
         """−1 of an unknown on its lower limit, 1 on its upper, 0 of others."""
-        low, high = self.problem.bounds
-        n = self.problem.count
-        x, u = self.x[:n], np.nan_to_num(self.deviation[:n])
-        near = AT_LIMIT * u + 1e-9 * np.abs(x)
-        found = np.where((x - low[:n] <= near) & (self._pull[:n] <= 0), -1, 0)
-        found = np.where((high[:n] - x <= near) & (self._pull[:n] >= 0), 1, found)
-        return np.asarray(np.where(self.lost[:n], 0, found), np.int8)
-
-    @cached_property
-    def _pull(self) -> Array:
-        """Where the next step would go without limits."""
-        x = self.x
-        return np.asarray(-self.spread.inverse @ (self.problem.jacobian(x).T @ self.problem.residuals(x)))
+        (low, high), x = self.fit.bounds, self.x
+        near = AT_LIMIT * np.nan_to_num(self.deviation) + 1e-9 * np.abs(x)
+        limit = np.where(
+            (high - x <= near) & (self._step >= 0), 1, np.where((x - low <= near) & (self._step <= 0), -1, 0)
+        )
+        return np.asarray(np.where(self.lost, 0, limit)[: self.fit.count], np.int8)
 
     @cached_property
     def estimate(self) -> Array:
         """Estimates; on a limit the limit itself, NaN of what the data do not tell."""
-        low, high = self.problem.bounds
-        n = self.problem.count
-        at = np.where(self.limit < 0, low[:n], np.where(self.limit > 0, high[:n], self.x[:n]))
+        n = self.fit.count
+        low, high = (end[:n] for end in self.fit.bounds)
+        at = np.where(self.limit < 0, low, np.where(self.limit > 0, high, self.x[:n]))
         return np.asarray(np.where(self.lost[:n], np.nan, at))
 
     @cached_property
     def interval(self) -> tuple[Array, Array]:
         """95 %, within the limits; one-sided of an unknown on one, from where a step without limits ends if inside."""
-        low, high = (one[: self.problem.count] for one in self.problem.bounds)
-        n = self.problem.count
-        u, freedom = self.deviation[:n], self.spread.freedom[:n]
+        n = self.fit.count
+        low, high = (end[:n] for end in self.fit.bounds)
+        u, freedom, free = self.deviation[:n], self.spread.freedom[:n], (self.x + self._step)[:n]
         half, one_sided = quantile(freedom) * u, quantile(freedom, one_sided=True) * u
-        free = self.x[:n] + self._pull[:n]
         lower = np.where(self.limit > 0, np.minimum(free, high) - one_sided, self.estimate - half)
         upper = np.where(self.limit < 0, np.maximum(free, low) + one_sided, self.estimate + half)
-        lower, upper = np.where(self.limit < 0, low, lower), np.where(self.limit > 0, high, upper)
-        return np.maximum(lower, low), np.minimum(upper, high)
-
-    @cached_property
-    def correlation(self) -> Array:
-        """Between the estimates; NaN of what the data do not tell."""
-        n = self.problem.count
-        u = self.deviation[:n]
-        with np.errstate(all="ignore"):
-            found = self.spread.covariance[:n, :n] / np.outer(u, u)
-        return np.asarray(np.clip(found, -1.0, 1.0))
-
-    @cached_property
-    def budget(self) -> tuple[list[str], Array]:
-        """Sources, and the share of each in the variance of every estimate, (unknown, source)."""
-        n = self.problem.count
-        names = list(self.spread.parts)
-        parts = np.array([np.diagonal(one)[:n] for one in self.spread.parts.values()]).T
-        with np.errstate(all="ignore"):
-            shares = parts / np.sum(parts, axis=1, keepdims=True)
-        return names, np.where(self.lost[:n, None], np.nan, shares)
-
-    @cached_property
-    def singular_values(self) -> Array:
-        """Of the derivatives with every column scaled to 1, the largest first: near 0 something is not told apart."""
-        rows = self.problem.jacobian(self.x)[:, : self.problem.count]
-        size = np.linalg.norm(rows, axis=0)
-        found = np.linalg.svd(rows / np.where(size > 0, size, 1.0), compute_uv=False)
-        return np.concatenate([found, np.zeros(len(size) - len(found))])  # fewer data than unknowns
+        return np.maximum(np.where(self.limit < 0, low, lower), low), np.minimum(
+            np.where(self.limit > 0, high, upper), high
+        )
 
     # ---- residuals --------------------------------------------------------------------------------------------
 
     @cached_property
-    def start(self) -> Array:
-        """Unknowns as the search began, before friction was lessened, sensors without errors."""
-        stated = [one.start for one in self.problem.model.unknowns]
-        return np.array(stated + [0.0] * len(self.problem.sensors))
+    def by_block(self) -> dict[str, NDArray[Any]]:
+        """Residuals, (channel, condition) and (channel, condition, position), with the phases of the conditions."""
+        fit, conditions, channels = self.fit, self.measurement.conditions, list(self.fit.model.measures)
+        longest = max(len(one.phase) for one in conditions)
+        sizes = {"channel": len(channels), "condition": len(conditions), "position": longest}
+        arrays = {name: one.blank(sizes) for name, one in VARIABLES.items() if one.dims and set(one.dims) <= set(sizes)}
+        for k, condition in enumerate(conditions):
+            arrays["phase"][k, : len(condition.phase)] = condition.phase
+        allowed = fit.allowed(self.x)
+        for k, block in enumerate(fit.blocks):
+            at, mask = (channels.index(block.channel), block.condition), fit.masks[k]
+            figures: dict[str, float] = {"turns": len(block.turns), "held_out_turns": len(block.held)}
+            if len(block.turns):
+                before, after = (np.where(mask, fit.gap(x, k), np.nan) for x in (fit.start, self.x))
+                # of the positions that are used: beside jumps turns scatter more
+                scatter = np.sqrt(block.pooled(mask) / np.maximum(block.count, 1) + block.unresolved**2)
+                expected = np.where(mask & block.repeats, scatter, np.nan)
+                for name, row in zip(CURVES, (block.mean, before, after, expected), strict=True):
+                    arrays[name][at][: len(row)] = row
+                figures |= {"rms_before": rms(before), "rms_after": rms(after), "rms_expected": rms(expected)}
+                figures["used"] = int(np.count_nonzero(mask))
+                figures["left_out"] = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
+            if len(block.held):
+                where = allowed[k] & np.isfinite(block.held_mean)
+                before, after = (fit.gap(x, k, block.held_mean)[where] for x in (fit.start, self.x))
+                columns = np.nan_to_num(fit.reading(self.x, k)[1][:, where])
+                predicted = np.einsum("pi,pq,qi->i", columns, self.spread.covariance, columns)
+                count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)[where]
+                expected = np.sqrt(self._scatter(k) / count + predicted)
+                figures |= {"held_out_before": rms(before), "held_out_after": rms(after)}
+                figures["held_out_expected"] = rms(expected)
+            for name, figure in figures.items():
+                arrays[name][at] = figure
+        return arrays
 
-    @cached_property
-    def misses(self) -> list[Misses]:
-        """Of every block that was fitted."""
-        found = []
-        for k, block in enumerate(self.problem.blocks):
-            if not block.fitted:
-                continue
-            mask = self.problem.masks[k]
-            before = np.where(mask, self.problem.misses(self.start, k, block.mean), np.nan)
-            after = np.where(mask, self.problem.misses(self.x, k, block.mean), np.nan)
-            scatter = np.sqrt(self._variance(k) / np.maximum(block.count, 1) + block.unresolved**2)
-            known = scatter if block.repeats else np.full(len(mask), np.nan)
-            out = int(np.count_nonzero(np.isfinite(block.mean) & ~mask))
-            row = (before, after, np.where(mask, known, np.nan))
-            found.append(Misses(k, _rms(before), _rms(after), _rms(row[2]), int(np.count_nonzero(mask)), out, row))
-        return found
-
-    @cached_property
-    def held_out(self) -> list[HeldOut]:
-        """Of every block of which turns were held out."""
-        found = []
-        allowed = self.problem.allowed(self.x)
-        covariance = self.spread.covariance
-        for k, block in enumerate(self.problem.blocks):
-            if not len(block.held):
-                continue
-            there = allowed[k] & np.isfinite(block.held_mean)
-            before, after = (
-                np.where(there, self.problem.misses(x, k, block.held_mean), np.nan) for x in (self.start, self.x)
-            )
-            columns = np.nan_to_num(self.problem.said(self.x, k)[1])
-            predicted = np.einsum("pi,pq,qi->i", columns, covariance, columns)
-            count = np.maximum(np.count_nonzero(np.isfinite(block.held), axis=0), 1)
-            expected = np.where(there, self._scatter(k) / count + predicted, np.nan)
-            found.append(HeldOut(k, _rms(before), _rms(after), _rms(np.sqrt(expected)), len(block.held)))
-        return found
-
-    def _variance(self, k: int) -> Array:
-        """Variance of one turn of a block, at the positions that are used: beside jumps turns scatter more."""
-        block = self.problem.blocks[k]
-        used = block.pooled(self.problem.masks[k]) if block.repeats else self.problem.variances[k]
-        return np.broadcast_to(used, len(self.problem.masks[k]))
-
-    def _scatter(self, k: int) -> Array:
-        """Variance of one turn of a block, from all its turns."""
-        block = self.problem.blocks[k]
+    def _scatter(self, k: int) -> float:
+        """Variance of one turn of a block of which turns are held out."""
+        block, mask = self.fit.blocks[k], self.fit.masks[k]
         if block.repeats:
-            return self._variance(k)
+            return block.pooled(mask)
         if len(block.held) > 1:
-            gaps = (block.held - block.held_mean)[:, self.problem.masks[k]]
-            return np.full(block.held.shape[1], float(np.nanmean(gaps**2)) * len(gaps) / (len(gaps) - 1))
-        same = [self._variance(i) for i in self._alike(k)]
-        return np.full(block.held.shape[1], float(np.mean([np.mean(one) for one in same])) if same else np.nan)
-
-    def _alike(self, k: int) -> Sequence[int]:
-        channel = self.problem.blocks[k].channel
-        return [i for i, one in enumerate(self.problem.blocks) if one.channel == channel and one.fitted]
+            return float(np.nanmean(np.nanvar(block.held[:, mask], axis=0, ddof=1)))
+        alike = [one for one in self.fit.fitted() if self.fit.blocks[one].channel == block.channel]
+        return float(np.mean([self.fit.variances[one] for one in alike])) if alike else float("nan")
 
     @property
-    def trust(self) -> float:
+    def positions(self) -> tuple[int, int]:
+        """How many are used, and how many with data are left out."""
+        return int(self.by_block["used"].sum()), int(self.by_block["left_out"].sum())
+
+    @property
+    def hold_out_ratio(self) -> float:
         """Rms of all predictions over what is expected of them; NaN if nothing is held out."""
-        rows = [(one.after / one.expected) ** 2 for one in self.held_out if one.expected > 0 and np.isfinite(one.after)]
-        return float(np.sqrt(np.mean(rows))) if rows else float("nan")
-
-
-def _rms(row: Array) -> float:
-    known = row[np.isfinite(row)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+        return rms(self.by_block["held_out_after"] / self.by_block["held_out_expected"])

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.rig.identification.fit import FitProblem, LeastSquaresFit, SensorError
-from trunnion.rig.identification.search import inside, refined
-from trunnion.rig.identification.uncertainty import Test, lack_of_fit, quantile, spread_of
+from trunnion.rig.identification.fit import Evaluations, Fit, SensorError, Solution, refined, rms
+from trunnion.rig.identification.uncertainty import LackOfFit, lack_of_fit, quantile, spread_of
 
 __all__ = ["MisfitCause", "explanations"]
 
@@ -23,7 +22,6 @@ ALIKE = 3.0  # standard deviations of χ², within which two causes explain the 
 DEGREE = np.radians(1.0)
 SETTLED = np.radians(0.01)
 ROUNDS = 5
-LEAST = 1e-6  # of the model, that a wrong unit may have a sensor read: N mm for kN m
 
 
 @dataclass(frozen=True)
@@ -43,92 +41,65 @@ class MisfitCause:
     explains: float
     estimates: Array
     halves: Array
-    left: Test
+    left: LackOfFit
 
 
-def explanations(problem: FitProblem, start: Array, test: Test) -> list[MisfitCause]:
+def explanations(fit: Fit, start: Array, test: LackOfFit) -> list[MisfitCause]:
     """Errors that explain most of a misfit, and about as much as each other, the simplest first; empty if none does.
 
-    One whose size is 0 within its uncertainty explains nothing, nor does a gain at the end of its range.
+    One whose size is 0 within its uncertainty explains nothing, nor does a gain that leaves nothing of the model.
     """
-    begin = np.concatenate([start, np.zeros(len(problem.sensors))])
-    tried = [one for one in _candidates(problem, begin, test) if not (one.kind == "gain" and one.size < 2 * LEAST - 1)]
+    causes = [one for one in _candidates(fit, start, test) if not (one.kind == "gain" and one.size < 2e-6 - 1)]
     chance = 1 + ALIKE * np.sqrt(2 / max(test.freedom, 2.0))  # of the ratio of two reduced χ²
-    most = chance * max(min((one.left.reduced for one in tried), default=np.nan), 1.0)
+    most = chance * max(min((one.left.reduced for one in causes), default=np.nan), 1.0)
     return [
-        one for one in tried if one.explains >= ENOUGH and one.left.reduced <= most and abs(one.size) > one.expanded
+        one for one in causes if one.explains >= ENOUGH and one.left.reduced <= most and abs(one.size) > one.expanded
     ]
 
 
-def _candidates(problem: FitProblem, start: Array, test: Test) -> Iterator[MisfitCause]:
+def _candidates(fit: Fit, start: Array, test: LackOfFit) -> Iterator[MisfitCause]:
     """Fits with a zero or a gain of each channel, beyond what is stated of it, and with an offset of the angle."""
-    model = problem.model
+    model = fit.model
     for kind in ("zero", "gain"):
-        for channel in dict.fromkeys(block.channel for block in problem.blocks if block.fitted):
-            turns = [block.turns for block in problem.blocks if block.channel == channel]
+        for channel in dict.fromkeys(fit.blocks[k].channel for k in fit.fitted()):
             if kind == "gain" and model.measures[channel].turning(model.run.system):
                 continue
-            size = 0.01 * (kind == "gain" or float(np.sqrt(np.nanmean(np.concatenate(turns, axis=None) ** 2))) or 1.0)
-            sizes = tuple(size * (block.channel == channel) for block in problem.blocks)
-            error = SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False, least=LEAST)
-            more, found = _with(problem, start, error)
-            if np.isfinite(found.cost):
-                yield _cause(kind, channel, more, found, size, 0.0, test)
-    yield from _turned(problem, start, test)
-
-
-def _turned(problem: FitProblem, start: Array, test: Test) -> Iterator[MisfitCause]:
-    """An offset of the crank angle, the same in all conditions; the positions follow it until it is settled."""
-    model = problem.model
-    driven = [model.driven(k, start[: problem.count]) for k in range(len(model.phases))]
-    sizes = [-DEGREE / driven[one.condition][2] * (one.turns.shape[1] > 2) for one in problem.blocks]
+            turns = np.concatenate([block.turns.ravel() for block in fit.blocks if block.channel == channel])
+            unit = 0.01 * (1.0 if kind == "gain" else rms(turns) or 1.0)
+            sizes = tuple(unit * (block.channel == channel) for block in fit.blocks)
+            more, best = _with(fit, start, SensorError(f"{kind} of {channel}", channel, kind, sizes, stated=False))
+            if np.isfinite(best.cost):
+                yield _cause(more, best, unit, float(best.x[-1]) * unit, test)
+    ahead = 0.0
+    sizes = tuple(-DEGREE / model.turns[block.condition] * (block.turns.shape[1] > 2) for block in fit.blocks)
     if not np.isfinite(sizes).all() or not any(sizes):
         return
-    error, ahead = SensorError("offset of the drive angle", "", "delay", tuple(sizes), stated=False), 0.0
-    for _ in range(ROUNDS):
-        phases = tuple((phase + ahead / (last - first)) % 1.0
-                       for phase, (first, last, _) in zip(model.phases, driven, strict=True))  # fmt: skip
-        moved = replace(problem, model=replace(model, phases=phases) if ahead else model)
-        more, found = _with(moved, start, error)
-        step = float(found.x[-1]) * DEGREE
-        if not np.isfinite(found.cost) or abs(step) > np.pi:
+    for _ in range(ROUNDS):  # the positions follow the angle until it is settled
+        phases = tuple((phase + ahead / turn) % 1.0 for phase, turn in zip(model.phases, model.turns, strict=True))
+        moved = replace(fit, courses_at=Evaluations(replace(model, phases=phases))) if ahead else fit
+        more, best = _with(moved, start, SensorError("offset of the drive angle", "", "angle", sizes, stated=False))
+        step = float(best.x[-1]) * DEGREE
+        if not np.isfinite(best.cost) or abs(step) > np.pi:
             return
+        ahead, start = ahead + step, best.x[:-1]
         if not model.run.cycle.periodic or abs(step) < SETTLED:
             break
-        ahead, start = ahead + step, found.x[:-1]
-    else:
-        step = 0.0  # it is in `ahead` already
-    yield _cause("angle", "", more, found, DEGREE, ahead + step, test)
+    yield _cause(more, best, DEGREE, ahead, test)
 
 
-def _with(problem: FitProblem, start: Array, error: SensorError) -> tuple[FitProblem, LeastSquaresFit]:
+def _with(fit: Fit, start: Array, error: SensorError) -> tuple[Fit, Solution]:
     """The problem with one error more, and its fit from a start; of infinite cost where it has none."""
-    more = FitProblem(
-        problem.model, problem.blocks, [*problem.sensors, error], problem.guard, progress=problem.progress
-    )
-    more.start_scatter()
-    begin = np.append(start, 0.0)
+    more, begin = replace(fit, sensors=[*fit.sensors, error], inflation=1.0), np.append(start, 0.0)
     try:
-        return more, refined(more, inside(more, begin))[0]
+        return refined(more, begin)
     except ValueError:  # no answer of the model there
-        return more, LeastSquaresFit(begin, float("inf"), 0, converged=False)
+        return more, Solution(begin, float("inf"))
 
 
-def _cause(
-    kind: str, channel: str, problem: FitProblem, found: LeastSquaresFit, scale: float, size: float, test: Test
-) -> MisfitCause:
-    """A candidate with its uncertainty. scale: of the error fitted last; size: where it is not that times x."""
-    left, spread = lack_of_fit(problem, found.x), spread_of(problem, found.x)
-    half = quantile(spread.freedom) * np.sqrt(np.maximum(np.diagonal(spread.covariance), 0.0))
+def _cause(fit: Fit, best: Solution, unit: float, size: float, test: LackOfFit) -> MisfitCause:
+    """The error that was fitted last. unit: its standard uncertainty."""
+    left, spread, error = lack_of_fit(fit, best.x), spread_of(fit, best.x), fit.sensors[-1]
+    half = quantile(spread.freedom) * spread.deviation
     explains = min((test.reduced - left.reduced) / (test.reduced - 1), 1.0)
-    n = problem.count
-    return MisfitCause(
-        kind,
-        channel,
-        size or float(found.x[-1]) * scale,
-        float(half[-1]) * scale,
-        explains,
-        found.x[:n],
-        half[:n],
-        left,
-    )
+    estimates, halves = best.x[: fit.count], half[: fit.count]
+    return MisfitCause(error.kind, error.channel, size, float(half[-1]) * unit, explains, estimates, halves, left)

@@ -152,18 +152,36 @@ class Model:
             found |= differs | np.roll(differs, 1, axis=-1)
         return found
 
-    def rate(self, condition: int, row: Array) -> Array:
-        """Derivative by time of courses in a condition, (…, position), by differences of neighbours, with units of 1/s.
+    def by_share(self, condition: int, row: Array) -> Array:
+        """Derivative by the share of the cycle of courses in a condition, (…, position), by differences of neighbours.
 
         Linear in the course, so that what is exact of the course stays so.
         """
-        phase, duration = self.phases[condition], self._started[condition]
-        if row.shape[-1] < 3 or row.shape[-1] != len(phase) or duration == 0:
+        phase = self.phases[condition]
+        if row.shape[-1] < 3 or row.shape[-1] != len(phase):
             return np.zeros_like(row)
         if not self.run.cycle.periodic:
-            return np.asarray(np.gradient(row, phase * duration, axis=-1))
+            return np.asarray(np.gradient(row, phase, axis=-1))
         gap = (np.roll(phase, -1) - np.roll(phase, 1)) % 1.0
-        return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / (gap * duration))
+        return np.asarray((np.roll(row, -1, axis=-1) - np.roll(row, 1, axis=-1)) / gap)
+
+    @cached_property
+    def durations(self) -> tuple[float, ...]:
+        """Duration of the cycle in every condition, s, with the unknowns at their start."""
+        return tuple(self._duration(k, self._start) for k in range(len(self.phases)))
+
+    @cached_property
+    def turns(self) -> tuple[float, ...]:
+        """What the first driver turns by in the cycle, rad, in every condition, with the unknowns at their start.
+
+        NaN where its turns name no position.
+        """
+        ends = (self.driven(k, self._start) for k in range(len(self.phases)))
+        return tuple(last - first for first, last, _ in ends)
+
+    @cached_property
+    def _start(self) -> Array:
+        return np.array([one.start for one in self.unknowns])
 
     @cached_property
     def bends(self) -> tuple[Array, ...]:
@@ -171,10 +189,10 @@ class Model:
 
         Points of load tables, ends of `between`, springs that let go, motion laws; see `switches`.
         """
-        found, start = [], np.array([one.start for one in self.unknowns])
+        found = []
         for k in range(len(self.phases)):
-            values = self.run.system.mechanism.parameters(self._overrides(k, start))
-            cycle = replace(self.run.cycle, duration=self._started[k])
+            values = self.run.system.mechanism.parameters(self._overrides(k, self._start))
+            cycle = replace(self.run.cycle, duration=self.durations[k])
             times = bends(Mechanisms(self.run.system, self.run.chosen.assembly, values, [cycle]))[0]
             found.append(times / (cycle.duration or 1.0))
         return tuple(found)
@@ -220,11 +238,6 @@ class Model:
             grown = bool(more)
         return tuple(p for p, one in enumerate(self.unknowns) if not needed.isdisjoint(one.paths))
 
-    @cached_property
-    def _started(self) -> tuple[float, ...]:
-        """Duration of the cycle in every condition, s, with the unknowns at their start."""
-        return tuple(self._duration(k, np.array([one.start for one in self.unknowns])) for k in range(len(self.phases)))
-
     def _duration(self, condition: int, at: Array) -> float:
         """Of the cycle, s. Gear pairs that no driver turns are taken to turn as in the nominal cycle."""
         overrides = self._overrides(condition, at)
@@ -260,7 +273,7 @@ class Model:
         many = len(self.unknowns)
         phase = np.repeat(np.stack([self.phases[k] for k in part]), many, axis=0)
         if not self._driving:
-            return phase * np.repeat([self._started[k] for k in part], many)[:, None]
+            return phase * np.repeat([self.durations[k] for k in part], many)[:, None]
         duration = np.repeat([self._duration(k, at) for k in part], many)[:, None]
         slope = np.zeros_like(duration)
         for p in self._driving:
@@ -281,11 +294,6 @@ def said_of(number: Number, shape: tuple[int, ...], own: slice) -> Said:
     value = np.broadcast_to(np.asarray(primal(number), float), full)[own]
     slope = np.broadcast_to(np.asarray(derivative(number), float), full)[own]
     return Said(value[0], slope)
-
-
-def solved(status: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Positions with a full answer."""
-    return np.asarray(status < Status.NOT_CONVERGED)
 
 
 @dataclass(frozen=True)

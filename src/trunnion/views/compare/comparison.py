@@ -11,7 +11,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.model.names import nearest
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, prefixed
-from trunnion.rig.comparison.assessment import Verdict
+from trunnion.rig.judge import Verdict
 from trunnion.views.common.cycle import Abscissa, Array, names
 from trunnion.views.sweep.scales import Scale
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, prefixed
-from trunnion.rig.comparison.assessment import Verdict
-from trunnion.rig.comparison.causes import KINDS
+from trunnion.rig.comparison import CAUSES
+from trunnion.rig.judge import Verdict
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.common.table import TextTable
 from trunnion.views.compare.comparison import coverage_of, scale_of, sets, setting, text, units, verdict
@@ -46,10 +46,10 @@ def explained(result: xr.Dataset, channel: int | None = None) -> TextTable | Non
     rows = []
     for k, name in enumerate(told):
         for i in range(result.sizes["channel"]) if channel is None else [channel]:
-            cells = [_cause(result, kind, i, k) for kind in KINDS]
+            cells = [_cause(result, kind, i, k) for kind in CAUSES]
             if any(cell != NONE for cell in cells):
                 rows.append([name, *([] if channel is not None else [names(result, "channel")[i]]), *cells])
-    head = [what, *([] if channel is not None else ["channel"]), *KINDS]
+    head = [what, *([] if channel is not None else ["channel"]), *CAUSES]
     return TextTable("what would explain the residual, each by itself", head, rows) if rows else None
 
 

@@ -135,9 +135,8 @@ def sensors(result: xr.Dataset) -> TextTable | None:
         if name.startswith(("zero of each file", "angle of each condition")):  # as many as there are files
             continue
         kind, _, channel = name.partition(" of ")
-        unit = {"zero": units.get(channel.partition(" in ")[0], "")}.get(kind, "%" if kind == "gain" else "")
-        if kind == "angle in steps":  # in seconds it is another one at each speed
-            unit, size = "rad", math.radians(float(channel.removesuffix(" deg"))) / math.sqrt(12)
+        of_channel = units.get(channel.partition(" in ")[0], "")
+        unit = {"zero": of_channel, "gain": "%", "angle in steps": "rad"}.get(kind, "")
         factor = size * (100.0 if unit == "%" else 1.0)
         known = math.isfinite(error) and math.isfinite(factor) and bool(unit)
         rows.append([

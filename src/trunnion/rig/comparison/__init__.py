@@ -1,1 +1,0 @@
-"""A model beside a measurement."""

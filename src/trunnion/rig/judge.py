@@ -1,0 +1,244 @@
+"""Whether a model lies within the uncertainty of what was measured, position by position and as a whole.
+
+The expanded uncertainty U = k_p u of a position has the coverage probability that `coverage` (2) has of a normal
+distribution: k_p is Student's for the effective degrees of freedom of u (GUM, JCGM 100:2008, G.4 and G.6.4), so that it
+is 2 where turns are many or the sensor's own uncertainty prevails, and more where turns are few. Of a true model about
+that share of the positions lies within ±U. How far a single course may stay below it depends on how many of its
+positions are independent of each other, which the turns show (`independent`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import erf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from trunnion.errors import Coded
+from trunnion.rig.reading.measurement import Signal
+
+__all__ = [
+    "Judgement", "Uncertainty", "Verdict", "difference", "expanded", "going_on", "independent", "judge", "probability",
+    "uncertainty_of",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+SURE = 2.326  # standard deviations: the share of a true model falls below its least in 1 % of courses
+FEWEST_TURNS = 5  # that show whether errors go on from turn to turn
+ROUNDING = 1e-9  # of the size of a course: differences below it are none
+
+
+class Verdict(Coded):
+    """What a comparison of one course comes to."""
+
+    WITHIN = 0, "within"
+    OFFSET = 1, "offset only"
+    NOT = 2, "not within"
+    UNKNOWN = 3, "U unknown"
+    NOTHING = 4, "no data"
+
+
+# ---- uncertainty ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Standard uncertainty of a course, (position,), in its parts.
+
+    random: of the mean over the turns; local: what else each position has by itself, such as the resolution; shared:
+    (part, position), of the zero and of the gain, each the same at all positions; turns: deviations of the turns from
+    their mean, (turn, position).
+    """
+
+    random: Array
+    local: Array
+    shared: Array
+    count: NDArray[np.intp]
+    turns: Array
+
+    @property
+    def total(self) -> Array:
+        """All together, NaN with fewer than two turns."""
+        return np.asarray(np.sqrt(self.random**2 + self.local**2 + np.sum(self.shared**2, axis=0)))
+
+    @property
+    def freedom(self) -> Array:
+        """Effective degrees of freedom by Welch and Satterthwaite: ν u⁴/u_A⁴, infinite without scatter. GUM, G.4.1."""
+        with np.errstate(all="ignore"):
+            freedom = (self.count - 1) / (self.random**2 / self.total**2) ** 2
+        return np.where(np.isfinite(freedom), freedom, np.inf)
+
+    def at(self, where: NDArray[np.bool_]) -> Uncertainty:
+        """That of some of the positions."""
+        return Uncertainty(
+            self.random[where], self.local[where], self.shared[:, where], self.count[where], self.turns[:, where]
+        )
+
+
+def probability(coverage: float) -> float:
+    """Share of a normal distribution within ± so many standard deviations: 0.9545 for 2."""
+    return erf(coverage / sqrt(2.0))
+
+
+def expanded(standard: Array, freedom: Array, coverage: float) -> Array:
+    """U = k_p u, with k_p of Student's distribution; GUM, G.3.2."""
+    factor = stdtrit(np.where(np.isinf(freedom), 1e12, freedom), 0.5 + probability(coverage) / 2)
+    return np.asarray(np.where(np.isinf(freedom), coverage, factor) * standard)
+
+
+def uncertainty_of(signal: Signal) -> Uncertainty:
+    """The parts of a signal's uncertainty."""
+    zero = np.full_like(signal.mean, np.hypot(signal.accuracy.zero, signal.accuracy.cut))
+    shared = np.array([zero, signal.accuracy.gain * signal.read])
+    random = signal.scatter / np.sqrt(np.maximum(signal.count, 1))
+    local = np.sqrt(np.maximum(signal.uncertainty**2 - random**2 - np.sum(shared**2, axis=0), 0.0))
+    return Uncertainty(random, local, shared, signal.count, signal.turns - signal.mean)
+
+
+def _bias_expanded(of: Uncertainty, coverage: float) -> float:
+    """U of the mean residual: scatter of the means of the turns, zero and gain; NaN with fewer than two turns."""
+    means = np.mean(_nearly_complete(of.turns), axis=1)
+    if len(means) < 2:
+        return float("nan")
+    random = np.array([np.std(means, ddof=1) / np.sqrt(len(means))])
+    local = np.array([np.sqrt(np.mean(of.local**2) / len(of.local))])
+    shared = np.mean(of.shared, axis=1, keepdims=True)
+    mean = Uncertainty(random, local, shared, np.array([len(means)]), of.turns[:, :1])
+    return float(expanded(mean.total, mean.freedom, coverage)[0])
+
+
+def _nearly_complete(turns: Array) -> Array:
+    """The turns that have at least half of their positions, with no deviation where a position is missing."""
+    return np.asarray(np.nan_to_num(turns[np.mean(np.isfinite(turns), axis=1) >= 0.5]))
+
+
+# ---- the verdict ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Figures of a residual, measured less model, over the positions that can be compared; NaN where not known.
+
+    largest: the residual of the largest size; place: its position, −1 if there is none; within: share of the positions
+    within ±U; least: the share from which the course is taken to be within; bias_expanded: U of the bias.
+    """
+
+    rms: float = np.nan
+    largest: float = np.nan
+    place: int = -1
+    bias: float = np.nan
+    bias_expanded: float = np.nan
+    rms_unbiased: float = np.nan
+    within: float = np.nan
+    least: float = np.nan
+    correlation: float = np.nan
+    verdict: Verdict = Verdict.NOTHING
+
+
+def judge(signal: Signal, model: Array, comparable: NDArray[np.bool_], coverage: float = 2.0) -> Judgement:
+    """Compare a signal with the model at the positions where that can be done.
+
+    Parameters
+    ----------
+    signal : what was measured, turn by turn.
+    model : (position,), the course of the model.
+    comparable : (position,), where the model has one number.
+    coverage : factor k of U = k u where turns are many.
+
+    Returns
+    -------
+    The figures of the residual, and the verdict: within ±U, but for a constant offset, or not.
+    """
+    where = comparable & np.isfinite(signal.mean) & np.isfinite(model)
+    if not np.any(where):
+        return Judgement()
+    measured, modelled = signal.mean[where], model[where]
+    residual = difference(measured, modelled)
+    size = float(np.max(np.abs(np.append(measured, modelled))))
+    bias = float(np.mean(residual))
+    of = uncertainty_of(signal).at(where)
+    worst = int(np.argmax(np.abs(residual)))
+    share, least = _share(residual, of, coverage, ROUNDING * size)
+    # a constant is taken out: what is left is against the scatter and what the gain makes of the shape
+    shape = replace(of, shared=(of.shared - np.mean(of.shared, axis=1, keepdims=True))[1:])
+    unbiased_share, unbiased_least = _share(residual - bias, shape, coverage, ROUNDING * size)
+    verdict = Verdict.NOT
+    if not np.isfinite(share):
+        verdict = Verdict.UNKNOWN
+    elif share >= least:
+        verdict = Verdict.WITHIN
+    elif unbiased_share >= unbiased_least:
+        verdict = Verdict.OFFSET
+    return Judgement(
+        _rms(residual), float(residual[worst]), int(np.flatnonzero(where)[worst]), bias, _bias_expanded(of, coverage),
+        _rms(residual - bias), share, least, _correlation(measured, modelled), verdict,
+    )  # fmt: skip
+
+
+def difference(measured: Array, model: Array) -> Array:
+    """Measured less model, 0 where it is rounding."""
+    residual = measured - model
+    size = float(np.nanmax(np.abs(np.append(measured, model)), initial=0.0))
+    return np.where(np.abs(residual) <= ROUNDING * size, 0.0, residual)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _share(residual: Array, of: Uncertainty, coverage: float, rounding: float) -> tuple[float, float]:
+    """Share of the positions within ±U, and how small that of a true model may be; NaN if no uncertainty is known."""
+    limit = expanded(of.total, of.freedom, coverage)
+    finite = np.isfinite(limit)
+    if not np.any(finite):
+        return np.nan, np.nan
+    share = float(np.mean(np.abs(residual[finite]) <= limit[finite] + rounding))
+    p = probability(coverage)
+    return share, p - SURE * float(np.sqrt(p * (1 - p) / independent(of.at(finite))))
+
+
+def independent(of: Uncertainty) -> float:
+    """How many positions are as good as independent of each other: N²/Σρᵢⱼ², from 1 to N.
+
+    Correlated are the parts shared by all positions, and the scatter as the turns show it; its Σρ² is that of n turns
+    less what chance makes of n, by Srivastava (2005), J. Japan Statist. Soc. 35, 251-272. Two turns do not show it:
+    then it is 1.
+    """
+    total, turns = of.total, _nearly_complete(of.turns)
+    count, freedom = len(total), len(turns) - 1
+    if freedom < 2 or not np.any(of.random > 0):
+        return 1.0
+    unit = np.where(total > 0, total, 1.0)
+    rows = turns / unit / np.sqrt(len(turns) * freedom)  # Σ rows² is the random share of the variance of each position
+    gram = rows @ rows.T if len(rows) < count else rows.T @ rows  # the smaller has the same trace, and its square
+    trace, square = float(np.trace(gram)), float(np.sum(gram**2))
+    scatter = freedom**2 / ((freedom - 1) * (freedom + 2)) * (square - trace**2 / freedom)
+    parts = of.shared / unit
+    mixed = 2 * float(np.sum((rows @ parts.T) ** 2))
+    both = max(scatter, 0.0) + mixed + float(np.sum((parts @ parts.T) ** 2))
+    return float(np.clip(count**2 / max(both, count), 1.0, count))
+
+
+def going_on(signal: Signal) -> tuple[float, int]:
+    """Correlation of the mean error of a turn with that of the next, and of how many; (NaN, 0) of fewer than five.
+
+    That of n independent turns is −1/n in the mean, which is taken off, and scatters by 1/√n.
+    """
+    turns = _nearly_complete(signal.turns - signal.mean)
+    if len(turns) < FEWEST_TURNS:
+        return float("nan"), 0
+    means = np.mean(turns, axis=1) - np.mean(turns)
+    square = float(np.sum(means**2))
+    if square <= (ROUNDING * float(np.nanmax(np.abs(signal.mean), initial=0.0))) ** 2:
+        return float("nan"), 0
+    return float(np.sum(means[1:] * means[:-1])) / square + 1 / len(means), len(means)
+
+
+def _correlation(measured: Array, model: Array) -> float:
+    """Pearson's; NaN where one of them is flat."""
+    flat = ROUNDING * float(np.max(np.abs(np.append(measured, model)), initial=0.0))
+    if np.max(np.abs(measured - np.mean(measured))) <= flat or np.max(np.abs(model - np.mean(model))) <= flat:
+        return float("nan")
+    return float(np.corrcoef(measured, model)[0, 1])

@@ -97,13 +97,14 @@ class ActiveMotion(Integration):
 
     def _rate(self, sense: float, now: float, between: tuple[float, float]) -> Rate:
         """The derivative of a row by time."""
+        n = self.layout.coordinates
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            if not np.all(np.isfinite(numbers)):
+            if not np.all(np.isfinite(numbers[: 2 * n])):
                 return np.full(len(numbers), np.nan)
             inside = numbers.copy()
-            inside[: len(self.motion.names)] = self._in_range(numbers[: len(self.motion.names)])
+            inside[:n] = self._in_range(numbers[:n])
             return self.seeing.derivative(moment, inside, self.onsets, now, self.senses)
 
         return rate

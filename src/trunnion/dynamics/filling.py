@@ -13,7 +13,7 @@ from trunnion.dynamics.energy import kinetic_energy, potential_energy
 from trunnion.dynamics.opened import Opened
 from trunnion.dynamics.rest import Rest
 from trunnion.dynamics.result import Books
-from trunnion.dynamics.shown import JointsInSpace, Touches, as_stated
+from trunnion.dynamics.shown import PlayedJoints, Touches, as_stated
 from trunnion.dynamics.solution import Solution, Stretch
 from trunnion.dynamics.state import FreeMotion, Moment
 from trunnion.dynamics.touching import Onset
@@ -44,9 +44,7 @@ class Filling:
         layout = self.solution.layout
         seconds, energies = np.full((layout.coordinates, len(self.time)), np.nan), np.full((2, len(self.time)), np.nan)
         touches = Touches.empty(len(motion.contacts.each), len(system.axes), len(self.time))
-        joints = None
-        if self.stated is not None and system.mechanism.space == "spatial":
-            joints = JointsInSpace(self.stated, motion.contacts, len(self.time))
+        played = None if self.stated is None else PlayedJoints(self.stated, motion.contacts, len(self.time))
         arrays["status"][...] = Status.NOT_CONVERGED
         for lanes, stretch in self._alike(which):
             at = layout.moment(self.time[lanes], rows[:, lanes], stretch.sense, stretch.now, stretch.slips)
@@ -58,19 +56,17 @@ class Filling:
             energies[0, lanes], energies[1, lanes] = kinetic_energy(back.walk), potential_energy(back.walk)
             touched = motion.contacts.pushes(back.walk, onsets)
             touches.fill(lanes, touched, onsets)
-            if joints is not None:
-                joints.fill(back, touched, window)
+            if played is not None:
+                played.fill(back, touched, window)
         whole = layout.moment(self.time, rows)
         for array in arrays.values():  # there is no motion any more
             if array.dtype == np.float64:
                 array[..., which < 0] = np.nan
         fill.unwrap(arrays, system, motion.values_at(whole, np.nan_to_num(seconds)), self.time)
         resting = np.array([k >= 0 and self.solution.stretches[k].resting for k in which])
-        if self.stated is not None:
-            if joints is not None:
-                joints.unwrap(self.time)
-            filled = None if joints is None else joints.arrays
-            arrays, labels = as_stated(self.stated.run, motion.contacts, touches, arrays, labels, filled)
+        if self.stated is not None and played is not None:
+            played.unwrap(self.time)
+            arrays, labels = as_stated(self.stated.run, played, arrays, labels)
             energies = np.vstack([energies, touches.stored.sum(axis=0)])
         works, sticking = layout.works(rows), self._sticking(which)
         return Books(self.time, arrays, labels, whole, seconds, energies, works, resting, touches, sticking)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.algebra.dual import primal
-from trunnion.algebra.space import NULL, Screw, about, added, moment_at
+from trunnion.algebra.space import Screw, moment_at
 from trunnion.algebra.unwrap import unwrap_row
-from trunnion.algebra.vector import Vector3, dot, scaled
+from trunnion.algebra.vector import dot
 from trunnion.cycle import fill
 from trunnion.dynamics.active_motion import Impact
 from trunnion.dynamics.opened import Opened, in_play
@@ -23,10 +22,10 @@ from trunnion.results.dataset import Variable
 from trunnion.results.figure import Figure
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_middle
-from trunnion.solve.forward import SpatialWalk
+from trunnion.solve.forward import Forward, SpatialWalk
 from trunnion.solve.run import Run
 
-__all__ = ["CONTACT", "IMPACT", "JointsInSpace", "Touches", "as_stated", "impact_arrays", "impact_figures"]
+__all__ = ["CONTACT", "IMPACT", "PlayedJoints", "Touches", "as_stated", "impact_arrays", "impact_figures"]
 
 Array = NDArray[np.float64]
 Touched = Sequence[tuple[ContactState, Push]]
@@ -56,8 +55,7 @@ IMPACT: dict[str, Variable] = {
 
 
 class Touches(NamedTuple):
-    """What the contacts were at every row: (contact, time), and the offsets (contact, axis, time); force: on the body,
-    (contact, axis, time); place: of the contact."""
+    """What the contacts were at every row: (contact, time), and the offsets (contact, axis, time)."""
 
     gap: Array
     normal: Array
@@ -66,14 +64,12 @@ class Touches(NamedTuple):
     touching: Array
     stored: Array
     offset: Array
-    force: Array
-    place: Array
 
     @classmethod
     def empty(cls, contacts: int, axes: int, times: int) -> Touches:
         """Nothing known."""
-        flat, deep = (contacts, times), (contacts, axes, times)
-        return cls(*(np.full(flat, np.nan) for _ in range(6)), *(np.full(deep, np.nan) for _ in range(3)))
+        sizes = [*[(contacts, times)] * 6, (contacts, axes, times)]
+        return cls(*(np.full(size, np.nan) for size in sizes))
 
     def fill(self, lanes: NDArray[np.intp], found: Touched, onsets: Sequence[object]) -> None:
         """Write the rows of one walk."""
@@ -82,8 +78,7 @@ class Touches(NamedTuple):
             self.friction[k, lanes], self.slip[k, lanes] = push.friction, state.slip
             self.touching[k, lanes], self.stored[k, lanes] = float(onsets[k] is not None), push.stored
             for axis in range(self.offset.shape[1]):
-                self.offset[k, axis, lanes], self.place[k, axis, lanes] = state.offset[axis], state.place[axis]
-                self.force[k, axis, lanes] = -push.normal * state.normal[axis] + push.friction * state.tangent[axis]
+                self.offset[k, axis, lanes] = state.offset[axis]
 
     def arrays(self, work: Array) -> dict[str, Array]:
         """The variables of `CONTACT`."""
@@ -100,18 +95,12 @@ class Touches(NamedTuple):
 
 
 def as_stated(
-    run: Run, contacts: Contacts, touches: Touches, arrays: Mapping[str, Array], labels: Mapping[str, Sequence[str]],
-    filled: dict[str, Array] | None,
-) -> tuple[dict[str, Array], dict[str, list[str]]]:  # fmt: skip
-    """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play.
-
-    filled: arrays as stated that have the rows of these joints; None in the plane, where they are filled here.
-    """
+    run: Run, played: PlayedJoints, arrays: Mapping[str, Array], labels: Mapping[str, Sequence[str]]
+) -> tuple[dict[str, Array], dict[str, list[str]]]:
+    """Arrays and labels of the mechanism as it is stated, from those of the mechanism without its joints in play."""
     system = run.system
-    wanted = fill.labels(system)
+    wanted, found = fill.labels(system), played.arrays
     known = results.variables(system.mechanism.space)
-    count = arrays["status"].shape[-1]
-    found = results.allocate(wanted, count) if filled is None else filled
     for name, array in arrays.items():
         if name not in found or results.SAME_AS.get(name) in found:
             continue
@@ -123,57 +112,17 @@ def as_stated(
             continue
         to, of = (np.ix_(*([pair[side] for pair in some] for some in places)) for side in (0, 1))
         into[to] = array[of]
-    if filled is None:
-        _fill_joints(run, contacts, touches, found, wanted)
+    if system.mechanism.space == "planar":
+        for joint, row in played.rows.items():
+            first, second = (wanted["link"].index(link) for link in system.joints[joint][1])
+            for suffix in ("", "_velocity", "_acceleration"):
+                angles = found[f"link_angle{suffix}"]
+                found[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
     return found, wanted
 
 
-def _fill_joints(
-    run: Run, contacts: Contacts, touches: Touches, found: dict[str, Array], labels: Mapping[str, list[str]]
-) -> None:
-    """Motion and reaction of the joints in play."""
-    system = run.system
-    for joint in dict.fromkeys(one.joint for one in contacts.each):
-        row, links = labels["joint"].index(joint), system.joints[joint][1]
-        first, second = (labels["link"].index(link) for link in links)
-        for suffix in ("", "_velocity", "_acceleration"):
-            angles = found[f"link_angle{suffix}"]
-            found[f"joint_rotation{suffix}"][row] = angles[second] - angles[first]
-        point = found["point_position"][labels["point"].index(f"{links[1]}.{joint}")]
-        found["reaction_force"][row] = 0.0
-        for name in ("reaction_moment", "friction_torque", "friction_power", "friction_force"):
-            found[name][row] = 0.0
-        if not system.turns(joint):
-            _fill_slide(run, joint, found, labels)
-        for k, one in enumerate(contacts.each):
-            if one.joint != joint:
-                continue
-            force = touches.force[k] if one.body == links[1] else -touches.force[k]
-            arm = touches.place[k] - point
-            found["reaction_force"][row] += force
-            found["friction_power"][row] -= touches.friction[k] * touches.slip[k]
-            moment = arm[0] * force[1] - arm[1] * force[0]
-            found["friction_torque" if system.turns(joint) else "reaction_moment"][row] += moment
-
-
-def _fill_slide(run: Run, joint: str, found: dict[str, Array], labels: Mapping[str, list[str]]) -> None:
-    """How far, and how fast, a slider in play has come along its guide."""
-    first, second = run.system.joints[joint][1]
-    axis = run.system.holes(run.values)[first, joint]
-    angle = found["link_angle"][labels["link"].index(first)]
-    base = np.arctan2(float(np.ravel(primal(axis.s))[0]), float(np.ravel(primal(axis.c))[0]))
-    row, (one, other) = (
-        labels["joint"].index(joint),
-        (labels["point"].index(f"{link}.{joint}") for link in (first, second)),
-    )
-    c, s = np.cos(angle + base), np.sin(angle + base)
-    for suffix, name in (("", "position"), ("_velocity", "velocity"), ("_acceleration", "acceleration")):
-        apart = found[f"point_{name}"][other] - found[f"point_{name}"][one]
-        found[f"joint_slide{suffix}"][row] = c * apart[0] + s * apart[1]
-
-
 @dataclass
-class JointsInSpace:
+class PlayedJoints:
     """Motion and reaction of the joints that the opened mechanism does not have. arrays: of the mechanism as stated,
     in which their rows alone are filled; times: how many there are."""
 
@@ -188,7 +137,7 @@ class JointsInSpace:
         self.cut = in_play(system.mechanism)
         self.rows = {joint: k for k, joint in enumerate(system.joints) if joint in (*self.cut, *self.opened.parts)}
         for name, array in self.arrays.items():
-            if "joint" in results.variables("spatial")[name].dims:
+            if "joint" in results.variables(system.mechanism.space)[name].dims:
                 array[list(self.rows.values())] = np.nan
 
     def fill(self, back: Backward, touched: Touched, window: slice) -> None:
@@ -197,44 +146,59 @@ class JointsInSpace:
         local = run.system.elements(run.values)
         own = {key: hole for key, hole in run.system.holes(run.values).items() if key[1] in self.cut}
         motions = {link: back.walk.motions[link] for link in run.system.mechanism.effective_links}
-        walk = SpatialWalk(run.system, run.values, {**local, **own}, motions, back.walk.time)
+        walk = type(back.walk)(run.system, run.values, {**local, **own}, motions, back.walk.time)
         for joint, row in self.rows.items():
-            fill.fill_joint(self.arrays, walk, row, joint, window)
-            middle, axis = bearing_middle(walk, joint), walk.ends(joint)[1].z
-            whole, rubbing, lost = self._wrenches(back, joint, touched)
-            fill.put(self.arrays["reaction_force"], row, whole.u, window)
-            fill.put(self.arrays["reaction_moment"], row, moment_at(whole, middle), window)
-            fill.put(self.arrays["friction_moment"], row, moment_at(rubbing, middle), window)
-            self.arrays["friction_torque"][row, window] = dot(moment_at(rubbing, middle), axis)
-            self.arrays["friction_force"][row, window] = dot(rubbing.u, axis)
+            reaction, rubbing, lost = self._wrenches(back, joint, touched)
             self.arrays["friction_power"][row, window] = lost
+            if isinstance(walk, SpatialWalk):
+                self._fill_in_space(walk, joint, row, window, reaction, rubbing)
+            else:
+                self._fill_in_plane(walk, joint, row, window, reaction)
 
-    def _wrenches(self, back: Backward, joint: str, touched: Touched) -> tuple[Screw, Screw, Array | float]:
+    def _fill_in_space(
+        self, walk: SpatialWalk, joint: str, row: int, window: slice, reaction: Screw, rubbing: Screw
+    ) -> None:
+        fill.fill_joint(self.arrays, walk, row, joint, window)
+        middle, axis = bearing_middle(walk, joint), walk.ends(joint)[1].z
+        fill.put(self.arrays["reaction_force"], row, reaction.u, window)
+        fill.put(self.arrays["reaction_moment"], row, moment_at(reaction, middle), window)
+        fill.put(self.arrays["friction_moment"], row, moment_at(rubbing, middle), window)
+        self.arrays["friction_torque"][row, window] = dot(moment_at(rubbing, middle), axis)
+        self.arrays["friction_force"][row, window] = dot(rubbing.u, axis)
+
+    def _fill_in_plane(self, walk: Forward, joint: str, row: int, window: slice, reaction: Any) -> None:
+        point = walk.point(walk.system.joints[joint][1][1], joint).place
+        fill.put(self.arrays["reaction_force"], row, reaction[:2], window)
+        moment, turns = walk.algebra.moment_at(reaction, point), walk.system.turns(joint)
+        for name in ("reaction_moment", "friction_torque", "friction_force"):
+            self.arrays[name][row, window] = 0.0
+        self.arrays["friction_torque" if turns else "reaction_moment"][row, window] = moment
+        motion = walk.coordinates(joint), walk.rates(joint), walk.second_rates(joint)
+        for suffix, numbers in zip(("", "_velocity", "_acceleration"), motion, strict=True):
+            self.arrays[f"joint_slide{suffix}"][row, window] = numbers[1]
+
+    def _wrenches(self, back: Backward, joint: str, touched: Touched) -> tuple[Any, Any, Array | float]:
         """What a joint does to its second link, all and by friction, and what is lost to this, W."""
+        algebra = back.walk.algebra
+        reaction, rubbing, lost = algebra.ZERO_LOAD, algebra.ZERO_LOAD, np.zeros(1)
         if joint in self.opened.parts:
-            return back.reactions[self.opened.parts[joint][-1]], Screw(NULL, NULL), 0.0
-        whole, rubbing, lost = Screw(NULL, NULL), Screw(NULL, NULL), np.zeros(1)
-        for one, (state, push) in zip(self.contacts.each, touched, strict=True):
-            if one.joint != joint:
-                continue
-            tangent, normal, place = _vector(state.tangent), _vector(state.normal), _vector(state.place)
-            along = about(scaled(-push.friction, tangent), NULL, place)
-            rubbing = added(rubbing, along)
-            whole = added(whole, added(about(scaled(push.normal, normal), NULL, place), along))
-            lost = lost - push.friction * state.slip
-        return whole, rubbing, lost
+            return back.reactions[self.opened.parts[joint][-1]], rubbing, 0.0
+        second = self.opened.run.system.joints[joint][1][1]
+        for contact, (state, push) in zip(self.contacts.each, touched, strict=True):
+            if contact.joint == joint:
+                along = push._replace(normal=0.0 * push.normal)
+                reaction = algebra.added(reaction, dict(contact.action(back.walk, state, push).on)[second])
+                rubbing = algebra.added(rubbing, dict(contact.action(back.walk, state, along).on)[second])
+                lost = lost - push.friction * state.slip
+        return reaction, rubbing, lost
 
     def unwrap(self, time: Array) -> None:
-        """Rotations without jumps of a whole turn."""
+        """Rotations in space without jumps of a whole turn."""
         step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-        for joint, row in self.rows.items():
-            if PAIRS[self.opened.run.system.joints[joint][0]].angle:
+        system = self.opened.run.system
+        for joint, row in self.rows.items() if system.mechanism.space == "spatial" else ():
+            if PAIRS[system.joints[joint][0]].angle:
                 unwrap_row(self.arrays["joint_rotation"][row], self.arrays["joint_rotation_velocity"][row], step)
-
-
-def _vector(numbers: Sequence[float | Array]) -> Vector3:
-    x, y, z = numbers
-    return x, y, z
 
 
 def impact_arrays(impacts: Sequence[Impact]) -> dict[str, Array]:

@@ -25,7 +25,7 @@ from trunnion.model.limits import Limits
 from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind, placed_measures
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
-from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, Spring, freedoms
+from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
@@ -213,8 +213,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
-                kind = _resistance_kind(str(entry.location[-1]), "rotation" in freedoms(joint.type))
-                entry = replace(entry, kind=kind)
+                entry = replace(entry, kind=entry.kind.of("rotation" in freedoms(joint.type)))
             follows = shared.get(entry.path) is entry.quantity
             alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
             yield replace(entry, alias=alias)
@@ -264,60 +263,21 @@ def _of_law(friction: Friction, entry: Entry) -> Entry:
 
 def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
     """The kind that the place of an entry leaves of several: a slide is driven at a speed, a rotation at rad/s."""
-    joint = mechanism.effective_joints.get(name)
     if section == "measures":
         return _measure_kind(mechanism, name, entry)
     if section == "tables":
-        return _table_kind(mechanism, name) if entry.location[-1] in (0, "period") else ANY
-    if section == "springs":
-        return _spring_kind(mechanism, mechanism.springs[name], entry)
-    if joint is None or section == "loads" or entry.kind in KINDS.values():
-        return entry.kind
-    slides = "rotation" not in freedoms(joint.type)
-    if "motor" in entry.location:
-        return _motor_kind(mechanism.drivers[name], entry, slides)
-    if entry.location[-1] == "speed":
-        return KINDS["speed" if slides else "angular speed"]
-    return KINDS["length" if slides else "angle"]
-
-
-def _motor_kind(driver: Driver, entry: Entry, slides: bool) -> Kind:
-    """Efforts of a motor are torques or forces, by what its joint does; so are its speeds."""
-    key = str(entry.location[-1] if isinstance(entry.location[-1], str) else entry.path.rpartition(".")[2])
-    speed, effort = KINDS["speed" if slides else "angular speed"], KINDS["force" if slides else "moment"]
-    if key == "place":
-        return KINDS["time"] if driver.motor and driver.motor.over == "time" else speed
-    if key.endswith("speed") or key == "target":
-        return speed
-    if key == "inertia":
-        return KINDS["mass" if slides else "moment of inertia"]
-    if key in ("proportional", "integral"):
-        gain = "damping" if key == "proportional" else "stiffness"
-        return KINDS[gain if slides else f"torsional {gain}"]
-    return effort if key in ("effort", "limit", "brake", "clutch") or key.endswith("_effort") else entry.kind
-
-
-def _table_kind(mechanism: Fields, name: str) -> Kind:
-    """What the first column of a table measures: a time, or the coordinate of the first driver."""
-    return KINDS["time"] if mechanism.tables[name].over == "time" else drive_kind(mechanism)
-
-
-def _spring_kind(mechanism: Fields, spring: Spring, entry: Entry) -> Kind:
-    """A spring in a joint that turns has a torsional stiffness; every other acts along a line."""
-    joint = mechanism.effective_joints.get(spring.joint or "")
-    turns = joint is not None and "rotation" in freedoms(joint.type)
-    match entry.location[-1]:
-        case "stiffness" | "damping" | "preload" as key:
-            return _resistance_kind(key, turns)
-    return entry.kind
-
-
-def _resistance_kind(key: str, turns: bool) -> Kind:
-    """What a stiffness, a damping or an effort in a joint measures."""
-    if key in ("preload", "constant"):
-        return KINDS["moment" if turns else "force"]
-    acts = "damping" if key == "viscous" else key
-    return KINDS[f"torsional {acts}" if turns else acts]
+        in_time = mechanism.tables[name].over == "time"
+        place = entry.location[-1] in (0, "period")
+        return (KINDS["time"] if in_time else drive_kind(mechanism)) if place else ANY
+    spring = mechanism.springs[name] if section == "springs" else None
+    joint = mechanism.effective_joints.get((spring.joint or "") if spring else name)
+    if joint is None:  # of a spring along a line; else a finding of its own
+        return entry.kind.of(turns=False) if spring else entry.kind
+    turns = "rotation" in freedoms(joint.type)
+    if "motor" in entry.location and entry.path.endswith(".place"):
+        motor = mechanism.drivers[name].motor
+        return KINDS["time"] if motor and motor.over == "time" else KINDS["angular speed" if turns else "speed"]
+    return entry.kind.of(turns)
 
 
 def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:

@@ -61,13 +61,14 @@ class Kind:
     """What a quantity measures.
 
     unit: the SI unit its plain numbers are in; example: how one is written; dimensions: those it may have
-    (a driver's speed is a speed or an angular speed, by its joint), any if empty.
+    (a driver's speed is a speed or an angular speed, by its joint), any if empty; either: the kinds of which it is one.
     """
 
     name: str
     unit: str
     example: str
     dimensions: tuple[Dimension, ...] = field(repr=False, hash=False)  # fractions are slow to hash
+    either: tuple[Kind, ...] = field(default=(), repr=False, hash=False)
 
     def __or__(self, other: Kind) -> Kind:
         """A quantity that may be either, until its place says which."""
@@ -76,13 +77,19 @@ class Kind:
             f"{self.unit} or {other.unit}",
             self.example,
             self.dimensions + other.dimensions,
+            (self, other),
         )
+
+    def of(self, turns: bool) -> Kind:
+        """Which of two it is, of what turns or of what slides."""
+        return next((kind for kind in self.either if (kind.name in TURNING) == turns), self)
 
     def accepts(self, dimension: Dimension | None) -> bool:
         """Whether a value of this dimension (None: a plain number, unknown) can stand here."""
         return dimension is None or not self.dimensions or any(fits(dimension, one) for one in self.dimensions)
 
 
+TURNING = ("angle", "angular speed", "moment", "moment of inertia", "torsional stiffness", "torsional damping")
 KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,17 +23,14 @@ from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.space import contact, coordinates, driven, loop, pitch, resisted, space
 from trunnion.model.checks.tolerances import cost_names, cost_values, stated_entries, tolerance_names, tolerance_values
 from trunnion.model.checks.values import check_values
-from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, RESERVED
+from trunnion.model.joint_parts import motions
 from trunnion.model.names import ERRORS, as_key, nearest
-from trunnion.model.parameters import ParameterSet, dimension_errors
+from trunnion.model.parameters import Numbers, ParameterSet, dimension_errors
 from trunnion.model.parts import Driver, Friction, Joint, Load, freedoms
 from trunnion.model.quantity import UNREADABLE, evaluation_order
 from trunnion.model.rules import InSpace, Refers, stated_findings
 from trunnion.model.units import ANY, Dimension, UnitError
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = ["check_model"]
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding
+from trunnion.model.parameters import Numbers
 from trunnion.model.parts import freedoms
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = [
     "gear_values",

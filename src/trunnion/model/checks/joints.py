@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import clearance, has_play
-
-if TYPE_CHECKING:
-    from trunnion.model.joint_parts import Contact, Joint
-    from trunnion.model.numbers import Numbers
+from trunnion.model.joint_parts import Contact, Joint, clearance, has_play
+from trunnion.model.parameters import Numbers
 
 __all__ = [
     "contact_law",

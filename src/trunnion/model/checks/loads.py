@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.model.contact import motions
 from trunnion.model.expression import MOTION, PLACED, RESERVED
+from trunnion.model.joint_parts import motions
 from trunnion.model.names import as_key, nearest
+from trunnion.model.parameters import Numbers
 from trunnion.model.parts import Joint, Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = [
     "losses",

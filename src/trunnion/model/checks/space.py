@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity, counted
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
+from trunnion.model.joint_parts import contact_lacks, has_guide, has_pin, motions
 from trunnion.model.names import nearest
+from trunnion.model.parameters import Numbers
 from trunnion.model.parts import Joint, LoopJoint, PolarPoint
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = ["contact", "coordinates", "direction_values", "driven", "loop", "pitch", "resisted", "space"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +14,9 @@ from trunnion.model.checks.errors import error_sizes, play_values
 from trunnion.model.checks.joints import contact_values
 from trunnion.model.checks.loads import spring_values, table_values
 from trunnion.model.checks.space import direction_values
-from trunnion.model.parameters import ParameterSet
+from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
 from trunnion.model.rules import group_findings, limit_findings
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = ["check_values"]
 

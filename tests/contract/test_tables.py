@@ -16,7 +16,7 @@ from trunnion.groups import GROUPS
 from trunnion.joints.clearance import CLEARANCE_MODELS, pressed, worst_case
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS, PlanarContactLoad
-from trunnion.model.contact import has_guide, has_pin, motions
+from trunnion.model.joint_parts import has_guide, has_pin, motions
 
 loads = st.floats(0, 1e6)
 slips = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-9)

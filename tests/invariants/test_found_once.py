@@ -12,7 +12,7 @@ import pytest
 import trunnion
 from trunnion.errors import Severity
 from trunnion.model.checks.values import check_values
-from trunnion.model.numbers import ParameterSet
+from trunnion.model.parameters import ParameterSet
 from trunnion.solve import assembly
 from trunnion.solve.run import prepare
 from trunnion.solve.track import Track

@@ -13,8 +13,8 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.fits import GRADES, limits, standard_tolerance
 from trunnion.model.checks.check import check_model
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.prices import FORMULA, Price
 from trunnion.model.tolerance_parts import COST_MODELS
+from trunnion.model.tolerances import FORMULA, Price
 
 FindingsOf = Callable[..., tuple[Finding, ...]]
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -114,8 +114,8 @@ BAD = [
     ("# only\n\n", ["points.csv:1: error: has only comments"]),
     ("time, angle\n", ["points.csv:1: error: has no rows of numbers, a table needs two"]),
     ("time, angle\n0,0\n", ["points.csv:2: error: has 1 row of numbers, a table needs two"]),
-    ("0 0\n1 1\n", ["points.csv:1: error: has a single column — write two"]),
-    ("0,0,1,5\n1,0,2,5\n", ["points.csv:1: error: has 4 columns, a table has two — keep two; numbers with a decimal"]),
+    ("0 0\n1 1\n", ["points.csv:1: error: has 1 column, a table has 2 — write time"]),
+    ("0,0,1,5\n1,0,2,5\n", ["points.csv:1: error: has 4 columns, a table has 2 — write time or drive coordinate"]),
     ("0;0\n1;x\n", ["points.csv:2: error: 'x' is not a finite number — write a number"]),
     ("0;0\n1;nan\n2;inf\n3;1e999\n4;1_0\n", [f"points.csv:{k}: error: '{cell}' is not a finite number"
                                            for k, cell in ((2, "nan"), (3, "inf"), (4, "1e999"), (5, "1_0"))]),

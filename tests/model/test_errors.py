@@ -14,7 +14,7 @@ from trunnion import sweep
 from trunnion.algebra.dual import Dual
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.checks.check import check_model
-from trunnion.model.contact import has_play, play
+from trunnion.model.joint_parts import has_play, play
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Joint, Misalignment, Seat
 

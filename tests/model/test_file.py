@@ -65,7 +65,7 @@ speed = "10 rad/s"
     path.write_text(text)
     assert read_mechanism(path).parameters()["links.crank.points.B.x"] == 2.0
     found = findings_of(text.replace("speed =", "sped ="), "model.toml")
-    assert {(one.where, one.line) for one in found} >= {("drivers.A.sped", 14)}
+    assert {(one.where, one.line) for one in found} >= {("drivers.A.sped", None)}
     with pytest.raises(MechanismError, match=r"TOML is read but not written — write \.yaml or \.json"):
         read_mechanism(path).write(tmp_path / "other.toml")
 

@@ -11,8 +11,8 @@ import pytest
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.model.checks.check import check_model
-from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
 from trunnion.model.file import placed
+from trunnion.model.joint_parts import contact_lacks, has_guide, has_pin, motions
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.parts import Joint
 

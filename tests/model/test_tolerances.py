@@ -359,7 +359,7 @@ def test_a_sample_from_a_file(varied: Mechanism, tmp_path: Path, text: str, expe
         ("d [kg]\n1\n2\n", 1, "its unit is that of a mass"),
         ("d [mm]\n1\nthree\n", 3, "'three' is not a finite number"),
         ("d [mm]\n1\n", 2, "has 1 row"),
-        ("1; 2\n3; 4\n", 1, "has several columns"),
+        ("1; 2\n3; 4\n", 1, "has 2 columns, a sample has 1"),
         ("# nothing\n", 1, "only comments"),
         ("", 1, "is empty"),
     ],

@@ -181,7 +181,7 @@ def _named(findings: list[Finding], mechanism: Mechanism) -> list[Finding]:
     """Findings about costs by the names that the file has for them."""
     from dataclasses import replace
 
-    from trunnion.model.prices import cost_paths
+    from trunnion.model.tolerances import cost_paths
 
     known = {f"costs.{path}": f"costs.{name}" for name in mechanism.costs for path in cost_paths(mechanism, name)}
     return [replace(one, where=known.get(one.where, one.where)) for one in findings]

@@ -18,7 +18,7 @@ from trunnion.cycle.causes import Causes
 from trunnion.errors import Status
 from trunnion.joints.clearance import describing
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import clearance
+from trunnion.model.joint_parts import clearance
 from trunnion.results import variables as results
 from trunnion.solve.backward import Backward
 from trunnion.solve.contacts import bearing_middle

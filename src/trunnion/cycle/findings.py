@@ -23,7 +23,7 @@ from trunnion.cycle.positions import Positions
 from trunnion.cycle.scales import scales_of
 from trunnion.errors import Finding, Status
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import clearance
+from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.quantity import Quantity
 from trunnion.model.tolerances import tolerated

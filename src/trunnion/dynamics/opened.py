@@ -27,7 +27,7 @@ from trunnion.dynamics.state import FreeMotion
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.numbers import Numbers
+from trunnion.model.parameters import Numbers
 from trunnion.model.parts import Driver
 from trunnion.solve.forward import Forward
 from trunnion.solve.run import Run

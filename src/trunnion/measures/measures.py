@@ -18,7 +18,7 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, MechanismError
 from trunnion.measures.curves import AXES, CURVES, MOTIONS
 from trunnion.model.checks.measures import check_measure
-from trunnion.model.contact import motions
+from trunnion.model.joint_parts import motions
 from trunnion.model.measure_table import MEASURES, STATISTICS, MeasureKind
 from trunnion.model.mechanism import Mechanism
 from trunnion.model.names import nearest

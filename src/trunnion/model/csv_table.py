@@ -193,22 +193,11 @@ def _points(path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "") -
 
     shown: what the file is called in findings.
     """
-    shown = shown or str(path)
-    try:
-        separator, rows = _rows(read_text(path, "a table", MAX_BYTES, "write a row for each point, such as 0; 12.5"))
-        units, numbers = ["", ""], rows
-        if not any(_number(cell, separator) for cell in rows[0][1]):
-            units, numbers = _units(rows[0], kinds), rows[1:]
-        if len(numbers) < 2:
-            what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a table needs two"
-            raise MechanismError(Finding(what, remedy="add rows such as 0; 12.5", line=rows[-1][0]))
-        findings = list(_unreadable(numbers, separator))
-        if findings:
-            raise MechanismError(_few(findings))
-    except MechanismError as error:
-        raise MechanismError([finding.at(shown, finding.line) for finding in error.findings]) from None
-    points = [[_value(cell, separator, one) for cell, one in zip(cells, units, strict=True)] for _, cells in numbers]
-    return TablePoints(where, shown, points, [line for line, _ in numbers])
+    units, rows = _columns(path, kinds, shown or str(path))
+    points: list[list[float | str]] = []
+    for _, cells in rows:
+        points.append([f"{cell} {one}" if one else float(cell) for cell, one in zip(cells, units, strict=True)])
+    return TablePoints(where, shown or str(path), points, [line for line, _ in rows])
 
 
 def column(path: Path, kind: Kind) -> list[float]:
@@ -216,82 +205,75 @@ def column(path: Path, kind: Kind) -> list[float]:
 
     A header may state the unit as in a table; numbers may have a decimal comma.
     """
+    units, rows = _columns(path, (kind,), str(path))
+    return [literal(cells[0], units[0]).value for _, cells in rows]
+
+
+# by the number of columns: what a file is, of what it has a row, an example of one, and what to do about too many
+_TABLE = ("table", "a row for each point", "0; 12.5", "use fewer points: values between them are interpolated")
+_SAMPLE = ("sample", "a deviation in each line", "0.012", "use a random subset")
+
+
+def _columns(path: Path, kinds: Sequence[Kind], shown: str) -> tuple[list[str], list[Row]]:
+    """The units of one or two columns, and their rows of plain numbers; MechanismError as `_points`."""
+    noun, each, example, fewer = _TABLE if len(kinds) == 2 else _SAMPLE
     try:
-        text = read_text(path, "a list of deviations", MAX_BYTES, "write a deviation in each line, such as 0.012")
-        lines = _lines(text, "sample", "a deviation in each line", "use a random subset")
-        rows = [(number, [line.strip().rstrip(";,\t").strip(' "')]) for number, line in lines]
-        if any(sign in rows[0][1][0] for sign in ";\t"):
-            remedy = "keep the column of the deviations; a table of two columns is given by --table"
-            raise MechanismError(Finding("has several columns, a sample has one", remedy=remedy, line=rows[0][0]))
-        unit_text, numbers = "", rows
-        if not _number(rows[0][1][0], ";"):
-            unit_text, numbers = _units(rows[0], (kind,))[0], rows[1:]
-        if len(numbers) < 2:
-            what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a sample needs two"
-            raise MechanismError(Finding(what, remedy="add deviations, one a line", line=rows[-1][0]))
-        findings = list(_unreadable(numbers, ";", 1))
-        if findings:
-            raise MechanismError(_few(findings))
-    except MechanismError as error:
-        raise MechanismError([finding.at(str(path), finding.line) for finding in error.findings]) from None
-    return [literal(_number(cells[0], ";"), unit_text).value for _, cells in numbers]
-
-
-def _lines(text: str, noun: str, rows: str, fewer: str) -> list[tuple[int, str]]:
-    """The lines with something in them but remarks, with their numbers. rows: what to write; fewer: if too many."""
-    stated = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
-              if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
-    if not stated:
-        raise MechanismError(Finding("has only comments", remedy=f"write {rows}", line=1))
-    if len(stated) > MAX_ROWS + 1:
-        raise MechanismError(Finding(f"has {len(stated)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
-    return stated
-
-
-def _rows(text: str) -> tuple[str, list[Row]]:
-    """The separator, and the lines with their cells; the first has two."""
-    stated = _lines(text, "table", "a row for each point", "use fewer points: values between them are interpolated")
-    separator = next((one for one in ";\t" if one in stated[0][1]), ",")
-    try:
+        text = read_text(path, f"a {noun}", MAX_BYTES, f"write {each}, such as {example}")
+        stated = [(number, line) for number, line in enumerate(io.StringIO(text, newline=None), start=1)
+                  if line.strip() and not line.lstrip().startswith("#")]  # fmt: skip
+        if not stated:
+            raise MechanismError(Finding("has only comments", remedy=f"write {each}", line=1))
+        if len(stated) > MAX_ROWS + 1:
+            raise MechanismError(Finding(f"has {len(stated)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
+        separator = next((one for one in ";\t" if one in stated[0][1]), "," if len(kinds) == 2 else ";")
         rows = [(number, _cells(line, separator)) for number, line in stated]
+        if len(rows[0][1]) != len(kinds):
+            what = f"has {len(rows[0][1])} column{'s' * (len(rows[0][1]) > 1)}, a {noun} has {len(kinds)}"
+            raise MechanismError(Finding(what, remedy=_OTHER_COLUMNS[len(kinds)], line=rows[0][0]))
+        headed = not any(_number(cell, separator) for cell in rows[0][1])
+        units = _units(rows[0], kinds) if headed else [""] * len(kinds)
+        numbers = rows[1:] if headed else rows
+        if len(numbers) < 2:
+            what = f"has {len(numbers) or 'no'} row{'s' * (not numbers)} of numbers, a {noun} needs two"
+            raise MechanismError(Finding(what, remedy=f"add rows such as {example}", line=rows[-1][0]))
+        if findings := list(_unreadable(numbers, separator, len(kinds))):
+            raise MechanismError(_few(findings))
     except csv.Error as error:
-        raise MechanismError(Finding(f"is not CSV: {error}", remedy="check that it is a text file")) from None
-    line, first = rows[0]
-    if len(first) == 1:
-        remedy = "write two: time or drive coordinate, then value, with a comma, semicolon or tab between them"
-        raise MechanismError(Finding("has a single column", remedy=remedy, line=line))
-    if len(first) > 2:
-        remedy = "keep two; numbers with a decimal comma need a semicolon or tab between them"
-        raise MechanismError(Finding(f"has {len(first)} columns, a table has two", remedy=remedy, line=line))
-    return separator, rows
+        raise MechanismError(
+            Finding(f"is not CSV: {error}", remedy="check that it is a text file", file=shown)
+        ) from None
+    except MechanismError as error:
+        raise MechanismError([finding.at(shown, finding.line) for finding in error.findings]) from None
+    return units, [(line, [_number(cell, separator) for cell in cells]) for line, cells in numbers]
+
+
+_OTHER_COLUMNS = {
+    1: "keep the column of the deviations; a table of two columns is given by --table",
+    2: "write time or drive coordinate, then value, and between them a comma, or beside decimal commas ; or a tab",
+}
 
 
 def _cells(line: str, separator: str) -> list[str]:
     cells = [cell.strip() for cell in next(csv.reader([line.rstrip("\n")], delimiter=separator, skipinitialspace=True))]
-    while len(cells) > 2 and not cells[-1]:  # a separator at the end of a line
+    while len(cells) > 1 and not cells[-1]:  # a separator at the end of a line
         cells.pop()
     return cells
 
 
 def _number(cell: str, separator: str) -> str:
     """The cell as a plain number; empty if it is none."""
-    text = cell.replace("−", "-")
+    text = cell.replace("−", "-").removesuffix(",")
     if separator != "," and text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")
     return text if _NUMBER.fullmatch(text) and abs(float(text)) < float("inf") else ""
 
 
-def _value(cell: str, separator: str, unit_text: str) -> float | str:
-    number = _number(cell, separator)
-    return f"{number} {unit_text}" if unit_text else float(number)
-
-
-def _unreadable(rows: Sequence[Row], separator: str, columns: int = 2) -> Iterator[Finding]:
+def _unreadable(rows: Sequence[Row], separator: str, columns: int) -> Iterator[Finding]:
     """What is no pair of numbers, or no number in a single column."""
     for line, cells in rows:
         if len(cells) != columns:
-            what = f"has {len(cells)} cell{'s' * (len(cells) > 1)}, the rows before have two"
-            yield Finding(what, remedy="write two numbers", line=line)
+            what = f"has {len(cells)} cell{'s' * (len(cells) > 1)}, the rows before have {columns}"
+            yield Finding(what, remedy="write as many numbers", line=line)
             continue
         for cell in cells:
             if not _number(cell, separator):

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from trunnion.model.contact import motions
 from trunnion.model.entry import ReadOnlyDict
+from trunnion.model.joint_parts import motions
 from trunnion.model.merge import FitChoice, merge_joint
 from trunnion.model.parts import (
     Correlation,

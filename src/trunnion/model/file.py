@@ -177,13 +177,7 @@ def _parse_toml(text: str) -> tuple[dict[str, Any], Lines]:
         raise MechanismError(Finding(f"is not TOML: {error}", remedy="write a number as 1.25e1")) from error
     if _depth(data) > MAX_DEPTH:
         raise MechanismError(Finding("is nested too deeply", remedy="check brackets and the dots in keys"))
-    # tomllib keeps no lines: a key that stands once in the file is found by searching for it.
-    places: dict[str, list[int]] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        for key in set(re.findall(r"(?<![\w-])[\w-]++(?=\"?\s*[=.\]])", line)):
-            places.setdefault(key, []).append(number)
-    unique = {key: numbers[0] for key, numbers in places.items() if len(numbers) == 1}
-    return data, {path: unique[key] for path, key in _paths(data) if key in unique}
+    return data, {}  # tomllib keeps no lines
 
 
 def _depth(data: Any) -> int:
@@ -194,13 +188,6 @@ def _depth(data: Any) -> int:
         groups = (one.values() if isinstance(one, dict) else one for one in layer)
         layer = [one for group in groups for one in group if isinstance(one, (dict, list))]
     return depth
-
-
-def _paths(data: Any, prefix: str = "") -> Iterable[tuple[str, str]]:
-    for key, value in data.items() if isinstance(data, dict) else ():
-        path = f"{prefix}.{key}" if prefix else key
-        yield path, key
-        yield from _paths(value, path)
 
 
 def _parse_yaml(text: str, kind: str) -> tuple[dict[str, Any], Lines]:

@@ -22,15 +22,14 @@ from trunnion.joints.motion import MotionLaw
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.changes import assign, not_stated, with_law
 from trunnion.model.checks.check import check_model
-from trunnion.model.contact import has_play, play
 from trunnion.model.csv_table import TableFiles, place_findings, with_points
 from trunnion.model.entry import ReadOnlyDict
 from trunnion.model.findings import repair, schema_findings
+from trunnion.model.joint_parts import has_play, play
 from trunnion.model.limits import DIGITS
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import nearest
-from trunnion.model.numbers import Numbers
-from trunnion.model.parameters import Location
+from trunnion.model.parameters import Location, Numbers
 from trunnion.model.parts import (
     Contact,
     Guide,
@@ -42,12 +41,15 @@ from trunnion.model.parts import (
     Seat,
     Variation,
 )
-from trunnion.model.prices import FORMULA, Price, cost_paths, prices
 from trunnion.model.tolerances import (
+    FORMULA,
+    Price,
     Tolerance,
     correlation,
+    cost_paths,
     keep_limits,
     kept,
+    prices,
     tolerated,
     with_samples,
     with_tolerances,

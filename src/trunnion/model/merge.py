@@ -14,8 +14,21 @@ from trunnion.errors import MechanismError
 from trunnion.joints.fits import fit
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import contact_lacks, has_guide, has_pin, has_play
-from trunnion.model.joint_parts import Fit, Friction, Guide, Joint, JointDefaults, Misalignment, Pin, Seat, SeatChoice
+from trunnion.model.joint_parts import (
+    Fit,
+    Friction,
+    Guide,
+    Joint,
+    JointDefaults,
+    Misalignment,
+    Pin,
+    Seat,
+    SeatChoice,
+    contact_lacks,
+    has_guide,
+    has_pin,
+    has_play,
+)
 from trunnion.model.quantity import Quantity
 
 __all__ = ["DEFAULT_LAW", "FitChoice", "merge_joint", "stated"]

@@ -2,8 +2,7 @@
 
 Every number has a path such as `links.crank.points.B.x` or `joints.B.friction.coefficient`. The set is compiled
 once: which numbers depend on which dimensions, and in what order. Evaluating it with other values of some is
-then cheap, and arrays (sample, 1) or dual numbers flow through the expressions of the file.
-"""
+then cheap, and arrays (sample, 1) or dual numbers flow through the expressions of the file."""
 
 from __future__ import annotations
 
@@ -11,7 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -20,27 +20,32 @@ from trunnion.algebra.namespace import Number
 from trunnion.errors import MechanismError
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.model.entry import ReadOnlyDict
-from trunnion.model.expression import MOTION, PLACED
+from trunnion.model.expression import MOTION, PLACED, RESERVED
+from trunnion.model.fields import Fields
 from trunnion.model.limits import Limits
-from trunnion.model.measure_kinds import course_kind, drive_kind, figure_kind, is_place, place_kind, placed_measures
+from trunnion.model.measure_table import MEASURES, Measure
 from trunnion.model.merge import DEFAULT_LAW
 from trunnion.model.names import ERRORS, ParameterNames
-from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, Spring, freedoms
+from trunnion.model.parts import Contact, Driver, Friction, Gear, Joint, Losses, Point, freedoms
 from trunnion.model.quantity import Quantity, evaluation_order
 from trunnion.model.rules import Within, markers
 from trunnion.model.units import ANY, KINDS, Dimension, Kind, UnitError, si_unit, unit
 
-if TYPE_CHECKING:
-    from trunnion.model.fields import Fields
-
 __all__ = [
     "LIMITS",
     "Entry",
+    "Numbers",
     "ParameterSet",
+    "course_kind",
     "dimension_errors",
     "dimension_kinds",
+    "drive_kind",
     "entries",
+    "figure_kind",
+    "is_place",
     "measured",
+    "place_kind",
+    "placed_measures",
 ]
 
 Location = tuple[str | int, ...]
@@ -213,8 +218,7 @@ def _joint_entries(mechanism: Fields, name: str, joint: Joint) -> Iterator[Entry
             if isinstance(part, Friction):
                 entry = _of_law(part, entry)
             elif isinstance(part, Losses):
-                kind = _resistance_kind(str(entry.location[-1]), "rotation" in freedoms(joint.type))
-                entry = replace(entry, kind=kind)
+                entry = replace(entry, kind=entry.kind.of("rotation" in freedoms(joint.type)))
             follows = shared.get(entry.path) is entry.quantity
             alias = f"joint_defaults.{entry.path.removeprefix(f'joints.{name}.')}" if follows else ""
             yield replace(entry, alias=alias)
@@ -264,60 +268,21 @@ def _of_law(friction: Friction, entry: Entry) -> Entry:
 
 def _narrow(mechanism: Fields, section: str, name: str, entry: Entry) -> Kind:
     """The kind that the place of an entry leaves of several: a slide is driven at a speed, a rotation at rad/s."""
-    joint = mechanism.effective_joints.get(name)
     if section == "measures":
         return _measure_kind(mechanism, name, entry)
     if section == "tables":
-        return _table_kind(mechanism, name) if entry.location[-1] in (0, "period") else ANY
-    if section == "springs":
-        return _spring_kind(mechanism, mechanism.springs[name], entry)
-    if joint is None or section == "loads" or entry.kind in KINDS.values():
-        return entry.kind
-    slides = "rotation" not in freedoms(joint.type)
-    if "motor" in entry.location:
-        return _motor_kind(mechanism.drivers[name], entry, slides)
-    if entry.location[-1] == "speed":
-        return KINDS["speed" if slides else "angular speed"]
-    return KINDS["length" if slides else "angle"]
-
-
-def _motor_kind(driver: Driver, entry: Entry, slides: bool) -> Kind:
-    """Efforts of a motor are torques or forces, by what its joint does; so are its speeds."""
-    key = str(entry.location[-1] if isinstance(entry.location[-1], str) else entry.path.rpartition(".")[2])
-    speed, effort = KINDS["speed" if slides else "angular speed"], KINDS["force" if slides else "moment"]
-    if key == "place":
-        return KINDS["time"] if driver.motor and driver.motor.over == "time" else speed
-    if key.endswith("speed") or key == "target":
-        return speed
-    if key == "inertia":
-        return KINDS["mass" if slides else "moment of inertia"]
-    if key in ("proportional", "integral"):
-        gain = "damping" if key == "proportional" else "stiffness"
-        return KINDS[gain if slides else f"torsional {gain}"]
-    return effort if key in ("effort", "limit", "brake", "clutch") or key.endswith("_effort") else entry.kind
-
-
-def _table_kind(mechanism: Fields, name: str) -> Kind:
-    """What the first column of a table measures: a time, or the coordinate of the first driver."""
-    return KINDS["time"] if mechanism.tables[name].over == "time" else drive_kind(mechanism)
-
-
-def _spring_kind(mechanism: Fields, spring: Spring, entry: Entry) -> Kind:
-    """A spring in a joint that turns has a torsional stiffness; every other acts along a line."""
-    joint = mechanism.effective_joints.get(spring.joint or "")
-    turns = joint is not None and "rotation" in freedoms(joint.type)
-    match entry.location[-1]:
-        case "stiffness" | "damping" | "preload" as key:
-            return _resistance_kind(key, turns)
-    return entry.kind
-
-
-def _resistance_kind(key: str, turns: bool) -> Kind:
-    """What a stiffness, a damping or an effort in a joint measures."""
-    if key in ("preload", "constant"):
-        return KINDS["moment" if turns else "force"]
-    acts = "damping" if key == "viscous" else key
-    return KINDS[f"torsional {acts}" if turns else acts]
+        in_time = mechanism.tables[name].over == "time"
+        place = entry.location[-1] in (0, "period")
+        return (KINDS["time"] if in_time else drive_kind(mechanism)) if place else ANY
+    spring = mechanism.springs[name] if section == "springs" else None
+    joint = mechanism.effective_joints.get((spring.joint or "") if spring else name)
+    if joint is None:  # of a spring along a line; else a finding of its own
+        return entry.kind.of(turns=False) if spring else entry.kind
+    turns = "rotation" in freedoms(joint.type)
+    if "motor" in entry.location and entry.path.endswith(".place"):
+        motor = mechanism.drivers[name].motor
+        return KINDS["time"] if motor and motor.over == "time" else KINDS["angular speed" if turns else "speed"]
+    return entry.kind.of(turns)
 
 
 def _measure_kind(mechanism: Fields, name: str, entry: Entry) -> Kind:
@@ -471,3 +436,91 @@ def _is_error(path: str) -> bool:
     section, _, rest = path.partition(".")
     misaligned = section == "joints" and rest.endswith((".misalignment.tilt", ".misalignment.offset"))
     return misaligned or path.startswith(ERRORS)
+
+
+def drive_kind(mechanism: Fields) -> Kind:
+    """What the coordinate of the first driver measures."""
+    joint = mechanism.effective_joints.get(next(iter(mechanism.drivers), ""))
+    return KINDS["length" if joint and "rotation" not in freedoms(joint.type) else "angle"]
+
+
+def is_place(measure: Measure) -> bool:
+    """Whether a measure gives a position: a dead centre, or where something is largest or smallest."""
+    return (measure.statistic or "").startswith("place-of-") or measure.kind == "dead_centre"
+
+
+def figure_kind(mechanism: Fields, measure: Measure) -> Kind:
+    """What a measure gives: of a joint with two motions the rotation, of a place the drive coordinate.
+
+    A driver that does not run one way passes a coordinate twice: its places are times, which `place_kind` tells.
+    """
+    if is_place(measure):
+        return drive_kind(mechanism)
+    if measure.statistic == "dwell" or measure.kind == "time_ratio":
+        return KINDS["number"]
+    return course_kind(mechanism, measure)
+
+
+def course_kind(mechanism: Fields, measure: Measure) -> Kind:
+    """What a measure is at every position; of a joint with two motions the rotation."""
+    if not measure.kind:  # a finding of its own
+        return ANY
+    both = MEASURES[measure.kind].quantities
+    return both[-1 if slides(mechanism, measure) else 0]
+
+
+def slides(mechanism: Fields, measure: Measure) -> bool:
+    """Whether the joint, driver, load or spring that a measure is of slides and does not turn."""
+    load = mechanism.loads.get(measure.subject)
+    if MEASURES[measure.kind].of == "load on a joint":
+        return load is None or load.resisting_torque is None
+    name: str | None = measure.subject
+    if MEASURES[measure.kind].of == "spring":
+        spring = mechanism.springs.get(measure.subject)
+        name = spring.joint if spring else None
+        if name is None:  # between two points
+            return True
+    joint = mechanism.effective_joints.get(name or "")
+    return joint is not None and "rotation" not in freedoms(joint.type)
+
+
+def place_kind(mechanism: Fields, quantity: Quantity, dimensions: Mapping[str, Dimension | None]) -> Kind:
+    """A time if it is stated as one, else the coordinate of the first driver. dimensions: of the names in it."""
+    with suppress(UnitError, KeyError):  # findings of their own
+        if quantity.check(dimensions) in KINDS["time"].dimensions:
+            return KINDS["time"]
+    return drive_kind(mechanism)
+
+
+def placed_measures(mechanism: Fields) -> dict[str, str]:
+    """Measures that are a place or a speed at every position, by the names that a load has for these."""
+    others = {*RESERVED, *MOTION, *mechanism.tables, *mechanism.dimensions}
+    found = {name: _placed(mechanism, one) for name, one in mechanism.measures.items() if name not in others}
+    return {name: placed for name, placed in found.items() if placed}
+
+
+def _placed(mechanism: Fields, measure: Measure) -> str:
+    if measure.at is not None or measure.over is not None or measure.statistic or measure.along:
+        return ""
+    joint = mechanism.effective_joints.get(measure.subject)
+    if measure.kind in ("rotation", "slide"):
+        return f"{measure.subject}{PLACED}{measure.kind}"
+    if measure.kind == "rate" and joint is not None:
+        freedom = "rotation" if "rotation" in freedoms(joint.type) else "slide"
+        return f"{measure.subject}{PLACED}{freedom}_velocity"
+    component = {"point": "", "velocity": "velocity_"}.get(measure.kind)
+    return f"{measure.subject}{PLACED}{component}{measure.axis}" if component is not None and measure.axis else ""
+
+
+class Numbers(Fields):
+    """A model with its numbers by path. Checks, tolerances and prices read it; `Mechanism` is one that is sound."""
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """Every number of the mechanism and where it stands, defaults filled in; see `model.parameters.entries`."""
+        return tuple(entries(self))
+
+    @cached_property
+    def parameter_set(self) -> ParameterSet:
+        """The numbers of the mechanism, compiled once."""
+        return ParameterSet(self.entries, self.dimensions)

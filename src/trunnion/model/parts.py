@@ -55,6 +55,7 @@ from trunnion.model.quantity import (
     Inertia,
     Length,
     Mass,
+    MassOrInertia,
     Moment,
     Quantity,
     Rate,
@@ -206,12 +207,12 @@ class Motor(Part):
     points: Annotated[tuple[tuple[AnyQuantity, ForceOrMoment], ...], Field(min_length=2), Rising("place")] | None = None
     over: Literal["speed", "time"] = "speed"
     target: Rate | None = None
-    proportional: Annotated[AnyQuantity | None, NotNegative] = None
-    integral: Annotated[AnyQuantity | None, NotNegative] = None
+    proportional: Annotated[Damping | None, NotNegative] = None
+    integral: Annotated[Stiffness | None, NotNegative] = None
     limit: Annotated[ForceOrMoment | None, Positive] = None
     ratio: Annotated[Dimensionless | None, NotZero("the motor would not turn")] = None
     efficiency: Annotated[Dimensionless | None, Within(0, 1, "(]", "such as 0.95")] = None
-    inertia: Annotated[AnyQuantity | None, NotNegative] = None
+    inertia: Annotated[MassOrInertia | None, NotNegative] = None
     off_from: Annotated[Time | None, NotNegative] = None
     brake: Annotated[ForceOrMoment | None, NotNegative, OnlyWith("brake_from", "add brake_from: 0.5 s")] = None
     brake_from: Annotated[Time | None, NotNegative, OnlyWith("brake", "add brake: 5 N m")] = None

@@ -35,6 +35,7 @@ __all__ = [
     "Inertia",
     "Length",
     "Mass",
+    "MassOrInertia",
     "Moment",
     "Pressure",
     "Quantity",
@@ -284,6 +285,7 @@ Moment = Annotated[Quantity, _Read(KINDS["moment"])]
 Acceleration = Annotated[Quantity, _Read(KINDS["acceleration"])]
 Time = Annotated[Quantity, _Read(KINDS["time"])]
 Rate = Annotated[Quantity, _Read(KINDS["angular speed"] | KINDS["speed"])]
+MassOrInertia = Annotated[Quantity, _Read(KINDS["mass"] | KINDS["moment of inertia"])]
 ForceOrMoment = Annotated[Quantity, _Read(KINDS["force"] | KINDS["moment"])]
 Pressure = Annotated[Quantity, _Read(KINDS["pressure"])]
 Stiffness = Annotated[Quantity, _Read(KINDS["stiffness"] | KINDS["torsional stiffness"])]

@@ -9,7 +9,6 @@ prefix before every unit takes `Grad` for a giga-radian and `Min` for a million 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache
@@ -61,13 +60,14 @@ class Kind:
     """What a quantity measures.
 
     unit: the SI unit its plain numbers are in; example: how one is written; dimensions: those it may have
-    (a driver's speed is a speed or an angular speed, by its joint), any if empty.
+    (a driver's speed is a speed or an angular speed, by its joint), any if empty; either: the kinds of which it is one.
     """
 
     name: str
     unit: str
     example: str
     dimensions: tuple[Dimension, ...] = field(repr=False, hash=False)  # fractions are slow to hash
+    either: tuple[Kind, ...] = field(default=(), repr=False, hash=False)
 
     def __or__(self, other: Kind) -> Kind:
         """A quantity that may be either, until its place says which."""
@@ -76,13 +76,19 @@ class Kind:
             f"{self.unit} or {other.unit}",
             self.example,
             self.dimensions + other.dimensions,
+            (self, other),
         )
+
+    def of(self, turns: bool) -> Kind:
+        """Which of two it is, of what turns or of what slides."""
+        return next((kind for kind in self.either if (kind.name in TURNING) == turns), self)
 
     def accepts(self, dimension: Dimension | None) -> bool:
         """Whether a value of this dimension (None: a plain number, unknown) can stand here."""
         return dimension is None or not self.dimensions or any(fits(dimension, one) for one in self.dimensions)
 
 
+TURNING = ("angle", "angular speed", "moment", "moment of inertia", "torsional stiffness", "torsional damping")
 KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (
@@ -140,7 +146,8 @@ BASES = ("m", "kg", "s", "rad", "A", "K", "count")
 # plural, of those with a star with micro, milli, kilo and mega. Prefixes are few: krad and Mm are slips of the pen.
 _TABLE: Final = """
 m(n µ m c d k)          |                 | meter* metre*
-g(µ m k)                | 0.001 kg        | gram*
+kg                      |                 |
+g(µ m)                  | 0.001 kg        | gram*
 s(n µ m) sec secs       |                 | second*
 rad(µ m)                |                 | radian
 A(n µ m k)              |                 | ampere*
@@ -215,27 +222,34 @@ _PREFIXES: Final = {
 }  # fmt: skip
 Root = tuple[Fraction, dict[str, Fraction], frozenset[str]]  # factor to SI, exponents of BASES, names of units
 _SYMBOL = re.compile(r"([^\s(]+)(?:\(([^)]*)\))?")
-ONE: Final[Root] = (Fraction(1), {}, frozenset())
 
 
 @cache
-def _table() -> dict[str, Root]:
-    """Every spelling with what it is; the name of a unit is its first symbol, else its first word."""
-    table: dict[str, Root] = {"1": ONE, "kg": (Fraction(1), {"kg": Fraction(1)}, frozenset())}
+def _spellings() -> dict[str, tuple[str, str, str]]:
+    """Every spelling with its prefix, what one of the unit is, and its name: its first symbol, else its first word."""
+    spellings: dict[str, tuple[str, str, str]] = {}
     for line in _TABLE.strip().splitlines():
         first, definition, last = (part.strip() for part in line.split("|"))
-        symbols = dict(_SYMBOL.findall(first))
-        name = next(iter(symbols), last.split(" ")[0].strip("*"))
-        number, _, product = definition.partition(" ")
-        factor, exponents, _ = _product(product or "1", table)[0]
-        size, powers = Fraction(number or 1) * factor, exponents if definition else {name: Fraction(1)}
-        spellings = {f"{before}{symbol}": before for symbol in symbols for before in _before(symbols[symbol])}
-        for word in last.split():
+        symbols, words = dict(_SYMBOL.findall(first)), last.split()
+        name = next(iter(symbols), "") or words[0].strip("*")
+        prefixed = {f"{before}{symbol}": before for symbol, taken in symbols.items() for before in _before(taken)}
+        for word in words:
             metric = ("", "micro", "milli", "kilo", "mega") if word.endswith("*") else ("",)
-            spellings |= {f"{before}{word.strip('*')}{end}": before for before in metric for end in ("", "s")}
-        sizes = {before: Fraction(_PREFIXES[before]) * size for before in {*spellings.values()}}
-        table |= {text: (sizes[before], powers, frozenset({name})) for text, before in spellings.items()}
-    return table
+            prefixed |= {f"{before}{word.strip('*')}{end}": before for before in metric for end in ("", "s")}
+        spellings |= {text: (before, definition, name) for text, before in prefixed.items()}
+    return spellings
+
+
+@cache
+def _named(word: str) -> Root:
+    """What a spelling, or 1, stands for; KeyError if it is none."""
+    if word == "1":
+        return Fraction(1), {}, frozenset()
+    before, definition, name = _spellings()[word]
+    number, _, product = definition.partition(" ")
+    factor, exponents, _names = _product(product or "1")[0]
+    size = Fraction(_PREFIXES[before]) * Fraction(number or 1) * factor
+    return size, exponents if definition else {name: Fraction(1)}, frozenset({name})
 
 
 def _before(prefixes: str) -> list[str]:
@@ -255,18 +269,17 @@ MOST_SIGNS = 200
 _FORMS = "write a unit as N m, kg/m^3 or s^-1"
 
 
-def _product(text: str, table: Mapping[str, Root], begin: int = 0) -> tuple[Root, int]:
+def _product(text: str, begin: int = 0) -> tuple[Root, int]:
     """A product of units from a place on, and where it ends; ValueError, KeyError, ArithmeticError if it is none."""
     factor, exponents, names, place = Fraction(1), dict.fromkeys(BASES, Fraction(0)), frozenset[str](), begin
     while found := _FACTOR.match(text, place):
         if found["sign"] and place == begin:
             raise ValueError(text)
-        (size, powers, named), place = table.get(found["word"], ONE), found.end()
         if found["word"] == "(":
-            (size, powers, named), place = _product(text, table, place)
+            (size, powers, named), place = _product(text, found.end())
             place = text.index(")", place) + 1
-        elif found["word"] not in table:
-            raise KeyError(found["word"])
+        else:
+            (size, powers, named), place = _named(found["word"]), found.end()
         raised = _POWER.match(text, place)
         power = Fraction("".join((raised[1] or raised[2]).split())) if raised else Fraction(1)
         power, place = -power if found["sign"] == "/" else power, raised.end() if raised else place
@@ -285,15 +298,15 @@ def _product(text: str, table: Mapping[str, Root], begin: int = 0) -> tuple[Root
 @cache
 def root(text: str) -> Root:
     """What a unit in use is: factor to SI, exponents by `BASES`, the units named in it; UnitError if it is none."""
-    written, table = _plain(text).strip(), _table()
+    written = _plain(text).strip()
     try:
         if len(text) > MOST_SIGNS:
             raise ValueError(text)
-        product, end = _product(written or "1", table)
+        product, end = _product(written or "1")
         if end < len(written):
             raise ValueError(text)
     except (ValueError, LookupError, ArithmeticError):
-        word = next((one for one in _WORD.findall(written) if one not in table), "")
+        word = next((one for one in _WORD.findall(written) if one not in _spellings()), "")
         remedy = _remedy(text, word) or ("" if word else _FORMS)
         raise UnitError(f"the unit '{text[:60]}' is not known", remedy) from None
     return product

@@ -18,7 +18,7 @@ from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.errors import Finding
 from trunnion.joints.clearance import CLEARANCE_MODELS, ClearanceModel, described, leaning, pressed
-from trunnion.model.contact import clearance
+from trunnion.model.joint_parts import clearance
 
 if TYPE_CHECKING:
     from trunnion.model.mechanism import Mechanism

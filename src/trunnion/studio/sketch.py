@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.fields import FIXED_NAMES
-from trunnion.model.numbers import Numbers
+from trunnion.model.parameters import Numbers
 from trunnion.model.units import unit
 
 __all__ = ["TOGETHER", "Change", "Frame", "Sketch", "length_unit"]

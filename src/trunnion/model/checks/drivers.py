@@ -3,25 +3,83 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding
-from trunnion.model.parts import freedoms
+from trunnion.errors import Finding, counted
+from trunnion.joints.pairs import PAIRS
+from trunnion.model.checks.loads import unread
+from trunnion.model.names import nearest
+from trunnion.model.parameters import Numbers
+from trunnion.model.parts import Driver, freedoms
 
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
-
-__all__ = [
-    "gear_values",
-    "gears",
-    "motor_values",
-]
+__all__ = ["driver_findings", "driver_values", "gear_values", "gears"]
 
 
-def motor_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:
+def driver_findings(mechanism: Numbers) -> Iterator[Finding]:
+    """Whether each driver drives a joint that one number can move, by a law that fits it."""
+    joints = mechanism.effective_joints
+    for name, driver in mechanism.drivers.items():
+        where = f"drivers.{name}"
+        if name not in joints:
+            yield Finding(f"there is no joint '{name}' to drive", where, nearest(name, joints))
+        elif not PAIRS[joints[name].type].drivable:
+            pair, drivable = PAIRS[joints[name].type], [kind for kind, one in PAIRS.items() if one.drivable]
+            moves = f"has {counted(pair.count, 'freedom')}" if pair.count else "does not move"
+            what = f"the joint '{name}' is {joints[name].type}: it {moves} and cannot be driven by one number"
+            yield Finding(what, where, f"drive one that is {', '.join(drivable[:-1])} or {drivable[-1]}")
+        elif "rotation" not in freedoms(joints[name].type) and driver.law == "constant" and driver.range is None:
+            yield Finding(f"a driven {joints[name].type} joint needs a range", where, "add range: [0 mm, 50 mm]")
+        yield from _motion(driver, where)
+
+
+def _motion(driver: Driver, where: str) -> Iterator[Finding]:
+    """Whether a table that a driver follows can be read, and what else it states goes with it."""
+    if driver.file is not None and driver.law == "table":
+        yield unread(driver.file, where)
+    if driver.found and driver.law != "constant":
+        what = f"the motion law {driver.law} prescribes a coordinate that is free"
+        yield Finding(what, f"{where}.law", "state speed: … (what all but `simulate` prescribe), or no motor")
+    if driver.points is not None and driver.periodic and len(driver.points) < 3:
+        yield Finding("a periodic table needs at least three points", f"{where}.points", "add points")
+    if driver.points is not None and driver.ends == "natural":
+        for key in ("periodic", "delay"):
+            if key in driver.model_fields_set and getattr(driver, key):
+                yield Finding(f"a table with natural ends has no '{key}'", f"{where}.{key}", f"remove ends or {key}")
+
+
+def driver_values(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> Iterator[Finding]:
+    """Whether table, motor and range of a driver make a motion."""
+    where, driver = f"drivers.{name}", mechanism.drivers[name]
+    if driver.points is not None:
+        yield from _table(mechanism, name, values)
+    yield from _motor_values(values, where)
+    start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
+    if start == end:
+        yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")
+
+
+def _table(mechanism: Numbers, name: str, values: Mapping[str, Number]) -> Iterator[Finding]:
+    """Whether the points of a driver's table make a motion."""
+    driver, where = mechanism.drivers[name], f"drivers.{name}.points"
+    rows = range(len(driver.points or ()))
+    times, coordinates = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("time", "coordinate"))
+    if times[0] != 0 and not np.isnan(times[0]):
+        what = f"the table begins at {times[0]:g} s"
+        yield Finding(what, f"{where}.0", "begin it at 0 s and shift it by delay: …")
+    if all(coordinate == coordinates[0] for coordinate in coordinates):
+        yield Finding("the table never moves", where, "give it an extent")
+    joint = mechanism.effective_joints.get(name)
+    gap = coordinates[-1] - coordinates[0]
+    if driver.periodic and joint and abs(gap) > 1e-9 * np.max(np.abs(coordinates)):
+        turns = gap / (2 * np.pi)
+        if "rotation" not in freedoms(joint.type) or abs(turns - np.round(turns)) > 1e-9:
+            what = f"a periodic table that begins at {coordinates[0]:g} and ends at {coordinates[-1]:g} (SI)"
+            yield Finding(what, where, "end it where it begins, or whole turns from there, or state periodic: false")
+
+
+def _motor_values(values: Mapping[str, float], where: str) -> Iterator[Finding]:
     """Whether the numbers of a motor can be those of one."""
     where = f"{where}.motor"
     for effort, speed in (("stall_effort", "no_load_speed"), ("breakdown_effort", "synchronous_speed")):

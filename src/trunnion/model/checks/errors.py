@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,15 +11,23 @@ from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.clearance import ellipse_error
 from trunnion.joints.fits import FitLimits, fit
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import PLAY_PAIRS, TURNING_PAIRS, clearance, has_guide, has_pin, has_play, play
-from trunnion.model.joint_parts import Friction, Joint, Pin, Seat
+from trunnion.model.joint_parts import (
+    PLAY_PAIRS,
+    TURNING_PAIRS,
+    Friction,
+    Joint,
+    Pin,
+    Seat,
+    clearance,
+    has_guide,
+    has_pin,
+    has_play,
+    play,
+)
 from trunnion.model.merge import stated
 from trunnion.model.names import ERRORS, ParameterNames
-from trunnion.model.parameters import ParameterSet
+from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.quantity import nominal_dimensions
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = ["error_sizes", "errors", "joint_errors", "play_values"]
 

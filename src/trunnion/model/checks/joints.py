@@ -3,25 +3,148 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trunnion.errors import Finding
+from trunnion.algebra.namespace import Number
+from trunnion.errors import Finding, Severity
+from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import clearance, has_play
+from trunnion.model.checks.space import coordinates
+from trunnion.model.joint_parts import (
+    Contact,
+    Friction,
+    Joint,
+    clearance,
+    contact_lacks,
+    has_guide,
+    has_pin,
+    has_play,
+    motions,
+)
+from trunnion.model.names import as_key, nearest
+from trunnion.model.parameters import Numbers, ParameterSet
 
-if TYPE_CHECKING:
-    from trunnion.model.joint_parts import Contact, Joint
-    from trunnion.model.numbers import Numbers
-
-__all__ = [
-    "contact_law",
-    "contact_values",
-]
+__all__ = ["joint_findings", "joint_values"]
 
 
-def contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) -> Iterator[Finding]:
+def joint_findings(mechanism: Numbers) -> Iterator[Finding]:
+    """Whether each joint has its links and points, and pin, guide, friction, losses and contact suit its type."""
+    for name, joint in mechanism.effective_joints.items():
+        where = f"joints.{name}"
+        if mechanism.space == "planar" and not PAIRS[joint.type].planar:
+            flat = ", ".join(pair for pair in PAIRS if PAIRS[pair].planar)
+            yield Finding(f"a {joint.type} joint does not exist in the plane", where, f"use one of {flat}")
+        if name in mechanism.joints:
+            yield from _ends(mechanism, name, joint)
+        yield from _pitch(joint, where)
+        yield from _contact(joint, where, mechanism.space == "spatial")
+        if joint.contact is not None:
+            yield from _contact_law(mechanism, name, joint, joint.contact)
+        yield from _losses(joint, f"{where}.losses")
+        if joint.friction is not None:
+            own = mechanism.stated_joints[name].friction
+            yield from _parameters_of_law(
+                joint.friction, "joint_defaults.friction" if own is None else f"{where}.friction"
+            )
+
+
+def _ends(mechanism: Numbers, name: str, joint: Joint) -> Iterator[Finding]:
+    """The links of a joint and its point on each."""
+    where = f"joints.{name}"
+    for link in dict.fromkeys(joint.links):
+        if link not in mechanism.links:
+            continue
+        points = mechanism.links[link].points
+        axis = "[1, 0]" if mechanism.space == "planar" else "[0, 0, 1]"
+        if name not in points:
+            remedy = f"add {as_key(name)}: {coordinates(mechanism)} to the points of '{link}'"
+            yield Finding(f"the link '{link}' has no point '{name}'", where, f"{remedy} ({nearest(name, points)})")
+        elif mechanism.space in PAIRS[joint.type].needs_axis and points[name].axis is None:
+            yield Finding(
+                f"the point '{name}' of the link '{link}' has no axis, a {joint.type} joint needs one",
+                f"links.{link}.points.{name}",
+                f"write {as_key(name)}: {{at: {coordinates(mechanism)}, axis: {axis}}}",
+            )
+
+
+def _parameters_of_law(friction: Friction, where: str) -> Iterator[Finding]:
+    law = str(friction.law)  # stated or filled in
+    declared = FRICTION_LAWS[law].parameters
+    for parameter in friction.parameters:
+        if parameter not in declared:
+            what = f"the key '{parameter}' is unknown to the friction law {law}"
+            yield Finding(what, f"{where}.{parameter}", nearest(parameter, ["law", "model", *declared]))
+    for parameter, one in declared.items():
+        if one.default is None and parameter not in friction.parameters:
+            remedy = f"add {parameter}" + f" ({one.meaning})" * bool(one.meaning)
+            yield Finding(f"the friction law {law} needs '{parameter}'", where, remedy)
+
+
+def _contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
+    """Whether pin and guide suit the type of joint, and whether what its friction needs is stated."""
+    kind = joint.type
+    turns, slides = has_pin(kind), has_guide(kind)
+    for part, other, suits, other_suits in (("guide", "pin", slides, turns), ("pin", "guide", turns, slides)):
+        if getattr(joint, part) and not suits:
+            has = f"a {other}, not a {part}" if other_suits else f"neither {other} nor {part}"
+            remedy = f"state {other} instead" if other_suits else "remove it"
+            yield Finding(f"a {kind} joint has {has}", f"{where}.{part}", remedy)
+    if spatial and PAIRS[kind].ball and joint.pin and joint.pin.offset is not None:
+        yield Finding(
+            "a ball has no axis to offset its bearing along", f"{where}.pin.offset", "move the joint's points"
+        )
+    if joint.guide and joint.guide.height is not None and joint.contact is None:
+        what = "the height of a guide is not used where it is not in play"
+        yield Finding(what, f"{where}.guide.height", "remove it, or state a contact", Severity.NOTE)
+    coefficient = joint.friction and joint.friction.parameters.get("coefficient")
+    if joint.friction is None or (coefficient and not {"off", "none"}.isdisjoint(coefficient.names)):
+        return  # none is stated, or none is meant: see `loads.unknown_name`
+    if not turns and not slides:
+        what = f"friction of a {kind} joint is not modelled"
+        reason = (
+            "this joint has no sliding motion: remove it"
+            if not PAIRS[kind].count
+            else "state friction: 0 for this joint"
+        )
+        yield Finding(what, f"{where}.friction", reason)
+        return
+    lacks = contact_lacks(joint, spatial)
+    if "radius" in lacks:
+        body = "ball" if PAIRS[kind].ball else "pin"
+        remedy = "state pin: {radius: …}" + " or a fit" * (body == "pin") + ", or friction: 0"
+        yield Finding(f"friction without the radius of the {body}", where, remedy)
+    if "bearing" in lacks:
+        what = "friction without the length of the bearing, which carries a bearing moment in space"
+        yield Finding(what, where, "state pin: {bearing: …} or {length: …}, or friction: 0")
+    if "length" in lacks:
+        yield Finding("friction without the length of the guide", where, "state guide: {length: …}, or friction: 0")
+    elif spatial and slides and joint.guide and joint.guide.width is None:
+        what = "without a width of the guide its torsion about the slide is carried without friction"
+        yield Finding(what, where, "state guide: {width: …} if it does not slide on a round bar", Severity.NOTE)
+
+
+def _pitch(joint: Joint, where: str) -> Iterator[Finding]:
+    """A pitch where there is a thread, and only there."""
+    if PAIRS[joint.type].threaded and joint.pitch is None:
+        remedy = "add pitch: 5 mm, the slide of one turn, negative for a left-hand thread"
+        yield Finding("a helical joint without a pitch", where, remedy)
+    elif not PAIRS[joint.type].threaded and joint.pitch is not None:
+        yield Finding(f"a {joint.type} joint has no pitch", f"{where}.pitch", "remove it, or state type: helical")
+
+
+def _losses(joint: Joint, where: str) -> Iterator[Finding]:
+    """Whether the losses of a joint state something and have an axis to act about or along."""
+    if joint.losses is None:
+        return
+    if joint.losses.constant is None and joint.losses.viscous is None:
+        yield Finding("states no loss", where, "state constant: …, viscous: … or both")
+    elif not motions(joint.type):
+        remedy = "give losses to a revolute, prismatic, cylindrical or helical joint"
+        yield Finding(f"a {joint.type} joint has no one axis for a loss to act about or along", where, remedy)
+
+
+def _contact_law(mechanism: Numbers, name: str, joint: Joint, contact: Contact) -> Iterator[Finding]:
     """Whether a joint can be in play, and whether its contact states what its law needs."""
     where, pair = f"joints.{name}.contact", PAIRS[joint.type]
     spatial = mechanism.space == "spatial"
@@ -84,7 +207,35 @@ def _needs(joint: Joint, contact: Contact, where: str) -> Iterator[Finding]:
         yield Finding("the stiffness by a modulus needs the pin's radius", where, "add pin: {radius: 10 mm}")
 
 
-def contact_values(joint: Joint, values: Mapping[str, float], where: str) -> Iterator[Finding]:
+def joint_values(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Finding]:
+    """What the numbers of a joint make doubtful: friction without a size, a play as large as its pin."""
+    joint, where = mechanism.effective_joints[name], f"joints.{name}"
+
+    def value(path: str) -> Number:
+        return numbers.nominal.get(f"{where}.{path}", np.nan)
+
+    def stated(path: str) -> str:
+        """Where a value stands: with the joint or with the defaults."""
+        entry = numbers.entries[f"{where}.{path}"]
+        return entry.alias or entry.path
+
+    yield from _contact_values(joint, numbers.nominal, where)
+    if joint.friction and joint.friction.law:
+        if (number := value("friction.coefficient")) > 1:
+            what, remedy = f"is {number:g}, above 1", "check it: dry metals have 0.1 to 0.6"
+            yield Finding(what, stated("friction.coefficient"), remedy, Severity.WARNING)
+        across = ("pin.bearing", "guide.width") if mechanism.space == "spatial" else ()
+        for size in ("pin.radius", "guide.length", *across):
+            if value(size) == 0:
+                yield Finding("is 0, where friction needs it", stated(size), "give a value above 0")
+    for part, size in (("pin", "radius"), ("guide", "length")):
+        clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
+        if clearance >= body > 0:
+            what = f"is {1e3 * clearance:g} mm, not less than the {size} {1e3 * body:g} mm of the {part}"
+            yield Finding(what, stated(f"{part}.clearance"), "check its unit")
+
+
+def _contact_values(joint: Joint, values: Mapping[str, float], where: str) -> Iterator[Finding]:
     """Whether the numbers of a contact can be those of one. values: by path; where: path of the joint."""
     contact = joint.contact
     if contact is None:

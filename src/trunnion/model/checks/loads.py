@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.model.contact import motions
+from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import MOTION, PLACED, RESERVED
+from trunnion.model.joint_parts import motions
 from trunnion.model.names import as_key, nearest
-from trunnion.model.parts import Joint, Spring, freedoms
+from trunnion.model.parameters import Numbers
+from trunnion.model.parts import Joint, Load, Spring, freedoms
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
 
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
-
 __all__ = [
-    "losses",
+    "load_findings",
     "motion_dimensions",
     "spring_values",
     "springs",
@@ -235,17 +233,6 @@ def _cycle(mechanism: Numbers, over: str, values: Values) -> tuple[float | None,
 # ---- losses of joints ------------------------------------------------------------------------------------------
 
 
-def losses(joint: Joint, where: str) -> Iterator[Finding]:
-    """Whether the losses of a joint state something and have an axis to act about or along."""
-    if joint.losses is None:
-        return
-    if joint.losses.constant is None and joint.losses.viscous is None:
-        yield Finding("states no loss", where, "state constant: …, viscous: … or both")
-    elif not motions(joint.type):
-        remedy = "give losses to a revolute, prismatic, cylindrical or helical joint"
-        yield Finding(f"a {joint.type} joint has no one axis for a loss to act about or along", where, remedy)
-
-
 # ---- springs --------------------------------------------------------------------------------------------------
 
 
@@ -309,3 +296,68 @@ def spring_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
         if spring.joint not in mechanism.drivers and turns > 1:
             what = f"is {turns:.3g} turns, but the rotation of '{spring.joint}', which is not driven, counts none"
             yield Finding(what, f"{where}.free_angle", "state the angle within a turn and the winding as preload: …")
+
+
+def load_findings(mechanism: Numbers) -> Iterator[Finding]:
+    """Whether each load acts on a link or resists a joint, with what that needs."""
+    for name, load in mechanism.loads.items():
+        where = f"loads.{name}"
+        if (load.link is None) == (load.joint is None):
+            link, _, point = str(load.at or "").rpartition(".")
+            remedy = (
+                f"state link: {link}, at: {point}" if link in mechanism.effective_links else "state link: … or joint: …"
+            )
+            yield Finding("acts on neither or both of a link and a joint", where, remedy)
+        elif load.link is not None:
+            yield from _link_load(mechanism, load, load.link, where)
+        else:
+            yield from _joint_load(mechanism, load, where)
+
+
+def _link_load(mechanism: Numbers, load: Load, link: str, where: str) -> Iterator[Finding]:
+    if load.resisting_torque is not None or load.resisting_force is not None:
+        yield Finding("a resisting load acts on a joint, not a link", where, "state joint: … instead of link: …")
+    elif load.only is not None:
+        yield Finding("only is for a load that resists a joint", f"{where}.only", "remove it, or state joint: …")
+    elif load.force is None and load.moment is None:
+        yield Finding("this load is empty", where, "state a force or a moment")
+    if load.force is not None and load.at is None:
+        yield Finding("the force has no point to act at", where, "add at: <a point of the link>")
+    if load.moment is not None and isinstance(load.moment, tuple) != (mechanism.space == "spatial"):
+        form = "one number" if mechanism.space == "planar" else "[x, y, z]"
+        yield Finding(f"the moment of a {mechanism.space} model is {form}", f"{where}.moment", f"write {form}")
+    if link in mechanism.points and load.at is not None and load.at not in mechanism.points[link]:
+        points = mechanism.points[link]
+        yield Finding(f"the link '{link}' has no point '{load.at}'", f"{where}.at", nearest(load.at, points))
+    if link == mechanism.fixed_link:
+        yield Finding("acts on the fixed link and has no effect", where, "name a moving link", Severity.WARNING)
+
+
+def _joint_load(mechanism: Numbers, load: Load, where: str) -> Iterator[Finding]:
+    joints = mechanism.effective_joints
+    if load.frame != "global":
+        yield Finding("frame is for a load on a link", f"{where}.frame", "remove it")
+    if load.force is not None or load.moment is not None or load.at is not None:
+        yield Finding(
+            "at, force and moment are for a load on a link", where, "state resisting_torque or resisting_force"
+        )
+    elif load.resisting_torque is None and load.resisting_force is None:
+        yield Finding("this load is empty", where, "state resisting_torque or resisting_force")
+    elif load.resisting_torque is not None and load.resisting_force is not None:
+        yield Finding("resists a rotation and a slide at once", where, "state a load for each")
+    if load.joint is None or load.joint not in joints:
+        return
+    for key, freedom in (("resisting_torque", "rotation"), ("resisting_force", "slide")):
+        if getattr(load, key) is not None:
+            yield from resisted(joints[load.joint], key, freedom, where)
+
+
+def resisted(joint: Joint, key: str, freedom: str, where: str) -> Iterator[Finding]:
+    """Whether a joint has the motion that a load resists."""
+    if freedom in motions(joint.type):
+        return
+    what, remedy = f"a {joint.type} joint has no {freedom} to resist", "remove it"
+    if not motions(joint.type) and PAIRS[joint.type].count:
+        what = f"a {joint.type} joint has no one axis that a {key.replace('_', ' ')} could act about or along"
+        remedy = "resist a revolute, prismatic, cylindrical or helical joint, or state a force or moment on a link"
+    yield Finding(what, f"{where}.{key}", remedy)

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from trunnion.errors import Finding, Severity
 from trunnion.model.checks.tolerances import stated_entries
-from trunnion.model.parameters import Entry, ParameterSet, measured
+from trunnion.model.parameters import Entry, Numbers, ParameterSet, measured
 from trunnion.model.parts import USUAL_PRESSURE_ANGLE
-from trunnion.model.prices import cost_paths
 from trunnion.model.quantity import Quantity, evaluation_order
+from trunnion.model.tolerances import cost_paths
 from trunnion.model.units import KINDS, NUMBER, Dimension, Kind, UnitError, unit
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = [
     "Bare",

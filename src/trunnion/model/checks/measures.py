@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.errors import Finding
-from trunnion.model.contact import motions
+from trunnion.model.joint_parts import motions
 from trunnion.model.measure_table import MEASURES, Measure
-from trunnion.model.parameters import ParameterSet
+from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.rules import Refers
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = ["check_measure", "measure_values"]
 

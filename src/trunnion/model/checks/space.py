@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
-from trunnion.errors import Finding, Severity, counted
+from trunnion.errors import Finding
 from trunnion.joints.pairs import PAIRS
-from trunnion.model.contact import contact_lacks, has_guide, has_pin, motions
+from trunnion.model.joint_parts import motions
 from trunnion.model.names import nearest
-from trunnion.model.parts import Joint, LoopJoint, PolarPoint
+from trunnion.model.parameters import Numbers
+from trunnion.model.parts import LoopJoint, PolarPoint
 
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
-
-__all__ = ["contact", "coordinates", "direction_values", "driven", "loop", "pitch", "resisted", "space"]
+__all__ = ["coordinates", "direction_values", "loop", "space"]
 
 Values = Mapping[str, Number]
 # Sine of the angle below which `x` is taken to lie along `axis`: what is left of it across is rounding of the file.
@@ -25,7 +22,6 @@ ALONG = 1e-6
 LOOP_PAIRS = tuple(
     kind for kind, pair in PAIRS.items() if pair.one_axis
 )  # those whose motion is a dual angle about one axis
-DRIVEN_PAIRS = tuple(kind for kind, pair in PAIRS.items() if pair.drivable)
 
 
 def coordinates(mechanism: Numbers) -> str:
@@ -53,58 +49,6 @@ def space(mechanism: Numbers) -> Iterator[Finding]:
 # ---- joints ---------------------------------------------------------------------------------------------------
 
 
-def contact(joint: Joint, where: str, spatial: bool) -> Iterator[Finding]:
-    """Whether pin and guide suit the type of joint, and whether what its friction needs is stated."""
-    kind = joint.type
-    turns, slides = has_pin(kind), has_guide(kind)
-    for part, other, suits, other_suits in (("guide", "pin", slides, turns), ("pin", "guide", turns, slides)):
-        if getattr(joint, part) and not suits:
-            has = f"a {other}, not a {part}" if other_suits else f"neither {other} nor {part}"
-            remedy = f"state {other} instead" if other_suits else "remove it"
-            yield Finding(f"a {kind} joint has {has}", f"{where}.{part}", remedy)
-    if spatial and PAIRS[kind].ball and joint.pin and joint.pin.offset is not None:
-        yield Finding(
-            "a ball has no axis to offset its bearing along", f"{where}.pin.offset", "move the joint's points"
-        )
-    if joint.guide and joint.guide.height is not None and joint.contact is None:
-        what = "the height of a guide is not used where it is not in play"
-        yield Finding(what, f"{where}.guide.height", "remove it, or state a contact", Severity.NOTE)
-    coefficient = joint.friction and joint.friction.parameters.get("coefficient")
-    if joint.friction is None or (coefficient and not {"off", "none"}.isdisjoint(coefficient.names)):
-        return  # none is stated, or none is meant: see `loads.unknown_name`
-    if not turns and not slides:
-        what = f"friction of a {kind} joint is not modelled"
-        reason = (
-            "this joint has no sliding motion: remove it"
-            if not PAIRS[kind].count
-            else "state friction: 0 for this joint"
-        )
-        yield Finding(what, f"{where}.friction", reason)
-        return
-    lacks = contact_lacks(joint, spatial)
-    if "radius" in lacks:
-        body = "ball" if PAIRS[kind].ball else "pin"
-        remedy = "state pin: {radius: …}" + " or a fit" * (body == "pin") + ", or friction: 0"
-        yield Finding(f"friction without the radius of the {body}", where, remedy)
-    if "bearing" in lacks:
-        what = "friction without the length of the bearing, which carries a bearing moment in space"
-        yield Finding(what, where, "state pin: {bearing: …} or {length: …}, or friction: 0")
-    if "length" in lacks:
-        yield Finding("friction without the length of the guide", where, "state guide: {length: …}, or friction: 0")
-    elif spatial and slides and joint.guide and joint.guide.width is None:
-        what = "without a width of the guide its torsion about the slide is carried without friction"
-        yield Finding(what, where, "state guide: {width: …} if it does not slide on a round bar", Severity.NOTE)
-
-
-def pitch(joint: Joint, where: str) -> Iterator[Finding]:
-    """A pitch where there is a thread, and only there."""
-    if PAIRS[joint.type].threaded and joint.pitch is None:
-        remedy = "add pitch: 5 mm, the slide of one turn, negative for a left-hand thread"
-        yield Finding("a helical joint without a pitch", where, remedy)
-    elif not PAIRS[joint.type].threaded and joint.pitch is not None:
-        yield Finding(f"a {joint.type} joint has no pitch", f"{where}.pitch", "remove it, or state type: helical")
-
-
 def direction_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
     """A direction x of an element along its axis, from which no rotation can be counted."""
     if mechanism.space == "planar":
@@ -121,26 +65,6 @@ def direction_values(mechanism: Numbers, values: Values) -> Iterator[Finding]:
             if size > 0 and across <= ALONG * size:
                 what = "lies along the axis" + ("" if place.axis is not None else " [0, 0, 1]")
                 yield Finding(what, f"{path}.x", "give a direction across the axis, or none")
-
-
-def driven(name: str, joint: Joint, where: str) -> Iterator[Finding]:
-    """Whether one number can say how far the joint has moved."""
-    if not PAIRS[joint.type].drivable:
-        count = PAIRS[joint.type].count
-        moves = f"has {counted(count, 'freedom')}" if count else "does not move"
-        what = f"the joint '{name}' is {joint.type}: it {moves} and cannot be driven by one number"
-        yield Finding(what, where, f"drive one that is {', '.join(DRIVEN_PAIRS[:-1])} or {DRIVEN_PAIRS[-1]}")
-
-
-def resisted(joint: Joint, key: str, freedom: str, where: str) -> Iterator[Finding]:
-    """Whether a joint has the motion that a load resists."""
-    if freedom in motions(joint.type):
-        return
-    what, remedy = f"a {joint.type} joint has no {freedom} to resist", "remove it"
-    if not motions(joint.type) and PAIRS[joint.type].count:
-        what = f"a {joint.type} joint has no one axis that a {key.replace('_', ' ')} could act about or along"
-        remedy = "resist a revolute, prismatic, cylindrical or helical joint, or state a force or moment on a link"
-    yield Finding(what, f"{where}.{key}", remedy)
 
 
 # ---- loops ----------------------------------------------------------------------------------------------------

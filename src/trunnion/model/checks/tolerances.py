@@ -4,35 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from trunnion.errors import Finding, MechanismError, Severity
 from trunnion.joints.fits import standard_tolerance
-from trunnion.model.contact import has_play
+from trunnion.model.joint_parts import has_play
 from trunnion.model.names import ParameterNames, as_key
-from trunnion.model.parameters import Entry, ParameterSet, measured
-from trunnion.model.prices import FORMULA, Price, cost_entries, cost_paths, price
+from trunnion.model.parameters import Entry, Numbers, ParameterSet, measured
 from trunnion.model.quantity import Quantity
 from trunnion.model.rules import stray
 from trunnion.model.tolerance_parts import COST_MODELS, DISTRIBUTIONS, OPTIONS, Cost, Variation
 from trunnion.model.tolerances import (
     DEFAULTS,
+    FORMULA,
     FULL_TURN,
+    Price,
     Tolerance,
     correlation,
+    cost_entries,
+    cost_paths,
     may_vary,
     named_paths,
+    price,
     tolerated,
     towards,
     variations,
     written_limits,
 )
 from trunnion.model.units import KINDS, Kind, UnitError, dimension_text, unit
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = [
     "cost_names",

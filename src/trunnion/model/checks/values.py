@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trunnion.algebra.namespace import Number
 from trunnion.errors import Finding, Severity
-from trunnion.model.checks.drivers import gear_values, motor_values
+from trunnion.model.checks.drivers import driver_values, gear_values
 from trunnion.model.checks.errors import error_sizes, play_values
-from trunnion.model.checks.joints import contact_values
+from trunnion.model.checks.joints import joint_values
 from trunnion.model.checks.loads import spring_values, table_values
 from trunnion.model.checks.space import direction_values
-from trunnion.model.parameters import ParameterSet
+from trunnion.model.parameters import Numbers, ParameterSet
 from trunnion.model.parts import InertiaTensor, Link, freedoms
 from trunnion.model.rules import group_findings, limit_findings
-
-if TYPE_CHECKING:
-    from trunnion.model.numbers import Numbers
 
 __all__ = ["check_values"]
 
@@ -52,10 +48,10 @@ def check_values(
         yield from _inertia(mechanism, mechanism.links[name], values, f"links.{name}")
     for name in among("joints", mechanism.effective_joints):
         yield from group_findings(f"joints.{name}", mechanism.effective_joints[name], values)
-        yield from _joint(mechanism, name, numbers)
+        yield from joint_values(mechanism, name, numbers)
         yield from play_values(mechanism, name, numbers)
     for name in among("drivers", mechanism.drivers):
-        yield from _driver(mechanism, name, values)
+        yield from driver_values(mechanism, name, values)
     sections = None if parts is None else {section for section, _ in parts}
     if sections is None or "errors" in sections:
         yield from error_sizes(numbers)
@@ -93,62 +89,6 @@ def _each(numbers: ParameterSet, paths: Iterable[str]) -> Iterator[Finding]:
             )
         if not entry.alias:
             yield from limit_findings(entry.rules, values[path], entry.kind, path)
-
-
-def _joint(mechanism: Numbers, name: str, numbers: ParameterSet) -> Iterator[Finding]:
-    joint, where = mechanism.effective_joints[name], f"joints.{name}"
-
-    def value(path: str) -> Number:
-        return numbers.nominal.get(f"{where}.{path}", np.nan)
-
-    def stated(path: str) -> str:
-        """Where a value stands: with the joint or with the defaults."""
-        entry = numbers.entries[f"{where}.{path}"]
-        return entry.alias or entry.path
-
-    yield from contact_values(joint, numbers.nominal, where)
-    if joint.friction and joint.friction.law:
-        if (number := value("friction.coefficient")) > 1:
-            what, remedy = f"is {number:g}, above 1", "check it: dry metals have 0.1 to 0.6"
-            yield Finding(what, stated("friction.coefficient"), remedy, Severity.WARNING)
-        across = ("pin.bearing", "guide.width") if mechanism.space == "spatial" else ()
-        for size in ("pin.radius", "guide.length", *across):
-            if value(size) == 0:
-                yield Finding("is 0, where friction needs it", stated(size), "give a value above 0")
-    for part, size in (("pin", "radius"), ("guide", "length")):
-        clearance, body = value(f"{part}.clearance"), value(f"{part}.{size}")
-        if clearance >= body > 0:
-            what = f"is {1e3 * clearance:g} mm, not less than the {size} {1e3 * body:g} mm of the {part}"
-            yield Finding(what, stated(f"{part}.clearance"), "check its unit")
-
-
-def _driver(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
-    where, driver = f"drivers.{name}", mechanism.drivers[name]
-    if driver.points is not None:
-        yield from _table(mechanism, name, values)
-    yield from motor_values(values, where)
-    start, end = (values.get(f"{where}.range.{end}", np.nan) for end in ("from", "to"))
-    if start == end:
-        yield Finding(f"the range begins and ends at {start:g}", f"{where}.range", "give it an extent")
-
-
-def _table(mechanism: Numbers, name: str, values: Values) -> Iterator[Finding]:
-    """Whether the points of a driver's table make a motion."""
-    driver, where = mechanism.drivers[name], f"drivers.{name}.points"
-    rows = range(len(driver.points or ()))
-    times, coordinates = ([values[f"{where}.{k}.{key}"] for k in rows] for key in ("time", "coordinate"))
-    if times[0] != 0 and not np.isnan(times[0]):
-        what = f"the table begins at {times[0]:g} s"
-        yield Finding(what, f"{where}.0", "begin it at 0 s and shift it by delay: …")
-    if all(coordinate == coordinates[0] for coordinate in coordinates):
-        yield Finding("the table never moves", where, "give it an extent")
-    joint = mechanism.effective_joints.get(name)
-    gap = coordinates[-1] - coordinates[0]
-    if driver.periodic and joint and abs(gap) > 1e-9 * np.max(np.abs(coordinates)):
-        turns = gap / (2 * np.pi)
-        if "rotation" not in freedoms(joint.type) or abs(turns - np.round(turns)) > 1e-9:
-            what = f"a periodic table that begins at {coordinates[0]:g} and ends at {coordinates[-1]:g} (SI)"
-            yield Finding(what, where, "end it where it begins, or whole turns from there, or state periodic: false")
 
 
 def _letters(values: Values, path: str) -> list[str]:

@@ -18,7 +18,7 @@ from trunnion.algebra.dual import Dual, derivative
 from trunnion.errors import Finding, MechanismError
 from trunnion.model.arguments import strict_arguments
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.prices import Price
+from trunnion.model.tolerances import Price
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod

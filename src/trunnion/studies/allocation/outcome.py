@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion.errors import Finding
 from trunnion.model.mechanism import Mechanism
-from trunnion.model.prices import Price
+from trunnion.model.tolerances import Price
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.studies.allocation.problem import Answer, Criterion
 from trunnion.studies.allocation.rows import Rows

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Severity
-from trunnion.model.prices import Price
+from trunnion.model.tolerances import Price
 from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
 from trunnion.results.scales import scales_in

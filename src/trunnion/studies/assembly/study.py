@@ -19,7 +19,7 @@ from trunnion.cycle.positions import check_steps
 from trunnion.errors import Finding, MechanismError
 from trunnion.joints.clearance import CLEARANCE_MODELS
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.contact import clearance
+from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts

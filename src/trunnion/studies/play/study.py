@@ -40,7 +40,7 @@ from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, chosen, outputs
 from trunnion.measures.positions import place_of, plan, within
 from trunnion.model.arguments import strict_arguments
-from trunnion.model.contact import clearance
+from trunnion.model.joint_parts import clearance
 from trunnion.model.mechanism import Mechanism
 from trunnion.results.sentences import finding_for
 from trunnion.solve import shifts

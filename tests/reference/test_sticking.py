@@ -8,10 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import clarabel
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.sparse import csc_matrix
 
 from timed import slider_crank, wheel
 from trunnion.dynamics.simulate import simulate
@@ -273,3 +275,45 @@ def test_a_linkage_breaks_away_beside_another_as_alone() -> None:
     assert [time for kind, of, time in events(both) if (kind, of) == ("break-away", "O")] == pytest.approx([left])
     for key in ("drive_coordinate", "drive_rate"):
         assert both[key].sel(driver="O").values == pytest.approx(alone[key].sel(driver="O").values, abs=1e-7)
+
+
+# ---- many at once -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.spread(1)
+@pytest.mark.parametrize("seed", range(6))
+def test_a_stack_at_rest_accelerates_so_that_gauss_constraint_is_least(seed: int) -> None:
+    """Four blocks on each other, each pushed: of all accelerations that with the least ½ aᵀMa − Fᵀa + Σ μ N |Δa|, a
+    convex function whose minimum is found by clarabel, apart from this code."""
+    random, axis = np.random.default_rng(seed), {"at": [0, 0], "axis": [1, 0]}
+    names = ["A", "B", "C", "D"]
+    masses, rough, pushes = random.uniform(1, 3, 4), random.uniform(0.05, 0.6, 4), random.normal(0, 12, 4)
+    bodies = ["ground", *(f"block{k}" for k in range(4))]
+    links: dict[str, Any] = {body: {"points": {}} for body in bodies}
+    for k, name in enumerate(names):
+        links[bodies[k]]["points"][name] = links[bodies[k + 1]]["points"][name] = axis
+        links[bodies[k + 1]]["mass"] = masses[k]
+    model = Mechanism(
+        gravity=[0, -G],
+        links=links,
+        joints={name: {"type": "prismatic", "links": [bodies[k], bodies[k + 1]], "friction": rough[k],
+                       "guide": {"length": 1e3}} for k, name in enumerate(names)},
+        drivers={name: {"speed": 1, "range": [-50, 50], "free": True, "initial": {"coordinate": 0, "speed": 0}}
+                 for name in names},
+        loads={f"push{k}": {"link": bodies[k + 1], "at": name, "force": [float(pushes[k]), 0]}
+               for k, name in enumerate(names)},
+    )  # fmt: skip
+    normal = np.cumsum(masses[::-1])[::-1] * G
+    across = np.eye(4) - np.eye(4, k=-1)  # Δa of each joint
+    # min ½ aᵀMa − Fᵀa + (μN)ᵀt with −t ≤ Δa ≤ t
+    quadratic = np.zeros((8, 8))
+    quadratic[:4, :4] = np.diag(masses)
+    rows = np.block([[across, -np.eye(4)], [-across, -np.eye(4)]])
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = False, 1e-12, 1e-12, 1e-12
+    solved = clarabel.DefaultSolver(
+        csc_matrix(quadratic), np.concatenate([-pushes, rough * normal]), csc_matrix(rows), np.zeros(8),
+        [clarabel.NonnegativeConeT(8)], settings,
+    ).solve()  # fmt: skip
+    data = simulate(model, 0.1, 1)
+    assert data.drive_rate.values[:, -1] == pytest.approx(0.1 * across @ np.array(solved.x[:4]), abs=1e-6)

@@ -39,6 +39,7 @@ TINY = 1e-9  # of the accelerations and forces: what is none
 SOON = 1e-3  # of a typical time: how far ahead one looks for the sense of what does not move now
 IDLE = 1e-7  # of a typical speed for a typical rate: what moves a joint as little does not, now
 MOST_CASES = 4096  # which are tried one after the other where changing the worst row comes round
+MOST_MOVED = 6  # joints that may stick, up to which one looks for other accelerations
 INSTANT = 1e-12  # of a typical time: in which a joint locks
 APART = 1e-6  # of the accelerations: those that differ by as much are two
 
@@ -145,22 +146,22 @@ class ActiveSet:
         that are at the end of their share."""
         if not self._alike(at):
             return None
-        found = self.motion.accelerate(at)
-        pulls = self.motion.pulls(found.back.walk, 1)[:, 0] / self.motion.typical
-        small = TINY * max(1.0, float(np.max(np.abs(found.second / self.motion.unit[:, None]))))
+        answer = self.motion.accelerate(at)
+        pulls = self.motion.pulls(answer.back.walk, 1)[:, 0] / self.motion.typical
+        small = TINY * max(1.0, float(np.max(np.abs(answer.second / self.motion.unit[:, None]))))
         stuck = [row for row, k in enumerate(may) if at.senses[k] == 0]
-        if not np.all(found.converged & ~found.turned):
+        if not np.all(answer.converged & ~answer.turned):
             moved = [row for row in stuck if abs(pulls[may[row]]) > small]  # nothing can hold it
             worst = max(moved, key=lambda row: abs(pulls[may[row]]), default=None)
             return None if worst is None else {worst: int(np.sign(pulls[may[worst]]))}
-        if changes := self._of_contacts(at, found, contacts, small):
+        if changes := self._of_contacts(at, answer, contacts, small):
             return {len(may) + list(contacts).index(k): mode for k, mode in changes.items()}
         if stuck:
-            assert found.shares is not None
-            shares = {row: float(found.shares[may[row], 0]) for row in stuck}
+            assert answer.shares is not None
+            shares = {row: float(answer.shares[may[row], 0]) for row in stuck}
             most = max(map(abs, shares.values()))
             if most > 1.0 + SLACK or (brink and most > 1.0 - BRINK):
-                return {row: int(np.sign(one)) for row, one in shares.items() if abs(one) >= most * (1.0 - BRINK)}
+                return {row: int(np.sign(share)) for row, share in shares.items() if abs(share) >= most * (1.0 - BRINK)}
         back = {row: at.senses[k] * pulls[k] for row, k in enumerate(may) if at.senses[k] * pulls[k] < -small}
         return {min(back, key=lambda row: back[row]): 0} if back else {}
 
@@ -173,7 +174,7 @@ class ActiveSet:
         return len(senses) == len({surface for surface, _ in senses})
 
     def _of_contacts(
-        self, at: Moment, found: Accelerated, contacts: Mapping[int, int], small: float
+        self, at: Moment, answer: Accelerated, contacts: Mapping[int, int], small: float
     ) -> dict[int, Mode]:
         """The worst of the contacts that pull, sink in, or slip or stick against their friction, with those on its
         wall, and what they seem to do instead. contacts: those that were closed, with their senses."""
@@ -181,8 +182,8 @@ class ActiveSet:
         pull *= small * float(np.ravel(primal(self.motion.system.pace(self.motion.values)))[0]) ** 2
         force, worst = TINY * self.motion.force, list[tuple[float, int, Mode]]()
         for k, before in contacts.items():
-            contact, onset = self.motion.contacts.each[k], found.onsets[k]
-            gap, slip = (float(np.ravel(part)[0]) for part in contact.accelerations(found.back.walk))
+            contact, onset = self.motion.contacts.each[k], answer.onsets[k]
+            gap, slip = (float(np.ravel(part)[0]) for part in contact.accelerations(answer.back.walk))
             if not isinstance(onset, Closed):
                 worst.append((-gap / pull, k, before))
                 continue
@@ -205,18 +206,17 @@ class ActiveSet:
     def lock(self, at: Moment, senses: Senses) -> Lock | None:
         """What locks where there are no accelerations: of the least sets of joints that friction can stop at once, and
         after which there are accelerations, the one that loses least; None: there is none."""
-        found = [one for one in self._locks(at, senses) if one is not None]
-        least = min((len(one.joints) for one in found), default=0)
-        return min((one for one in found if len(one.joints) == least), key=lambda one: one.loss, default=None)
+        locks = [lock for lock in self._locks(at, senses) if lock is not None]
+        return min(locks, key=lambda lock: (len(lock.joints), lock.loss), default=None)
 
     def _locks(self, at: Moment, senses: Senses) -> Iterator[Lock | None]:
         """What may lock, by joints that are stopped: with them all that then can no longer move."""
         ways, _ = self.motion.ways(at)
         slides = [k for k, sense in enumerate(senses) if sense != 0 and np.max(np.abs(ways[k])) > IDLE]
-        held, tried = [k for k, sense in enumerate(senses) if sense == 0], set[tuple[int, ...]]()
+        sticks, tried = [k for k, sense in enumerate(senses) if sense == 0], set[tuple[int, ...]]()
         for size in range(1, min(len(slides), len(self.motion.names)) + 1):
             for chosen in itertools.combinations(slides, size):
-                inside = [*held, *chosen]
+                inside = [*sticks, *chosen]
                 rows = np.linalg.svd(ways[inside])[2][: np.linalg.matrix_rank(ways[inside], tol=RANK)]
                 left = ways - ways @ rows.T @ rows
                 joints = tuple(k for k in slides if np.max(np.abs(left[k])) <= IDLE)
@@ -227,42 +227,42 @@ class ActiveSet:
     def _stopped(self, at: Moment, senses: Senses, joints: Sequence[int]) -> Lock | None:
         """The stop of some joints as an acceleration over an instant, in which loads are nothing and friction is what
         the reactions to the inertia make it; None where friction cannot hold them."""
-        own, instant = [0 if k in joints else sense for k, sense in enumerate(senses)], INSTANT / self.pace
+        after, instant = [0 if k in joints else sense for k, sense in enumerate(senses)], INSTANT / self.pace
         speeds = self.motion.speeds(self.motion.walk(at, np.zeros_like(at.q)), 1)
         for _ in senses:
-            sticks = [k for k, sense in enumerate(own) if sense == 0]
-            stopping = at._replace(senses=tuple(own))
+            sticks = [k for k, sense in enumerate(after) if sense == 0]
             guess = (self.motion.stopped(at, sticks)[:, None] - at.rate) / instant
-            found = self.motion.accelerate(stopping, guess, -speeds[sticks] / instant)
-            assert found.shares is not None
-            if np.all(found.converged) and np.all(np.isfinite(found.second)):
-                torn = {k: found.shares[k, 0] for k in sticks if abs(found.shares[k, 0]) > 1.0 + SLACK}
+            stop = self.motion.accelerate(at._replace(senses=tuple(after)), guess, -speeds[sticks] / instant)
+            assert stop.shares is not None
+            if np.all(stop.converged) and np.all(np.isfinite(stop.second)):
+                torn = {k: stop.shares[k, 0] for k in sticks if abs(stop.shares[k, 0]) > 1.0 + SLACK}
                 if not torn:
-                    return self._after(at, found, tuple(own), joints, instant)
+                    return self._after(at, stop, tuple(after), joints, instant)
             else:  # as nothing to speak of resists some, they go on as if they had not stuck
-                loose = at._replace(rate=self.motion.stopped(at, joints)[:, None])
-                torn = {k: one for k, one in enumerate(self.motion.ways(loose)[1]) if abs(one) > MEET and k in sticks}
-            torn = {k: one for k, one in torn.items() if k not in joints}  # they stuck until now
+                loose = self.motion.ways(at._replace(rate=self.motion.stopped(at, joints)[:, None]))[1]
+                torn = {k: loose[k] for k in sticks if abs(loose[k]) > MEET}
+            torn = {k: sense for k, sense in torn.items() if k not in joints}  # they stuck until now
             if not torn:
                 return None
-            for k, one in torn.items():
-                own[k] = int(np.sign(one))
+            for k, sense in torn.items():
+                after[k] = int(np.sign(sense))
         return None
 
     def _after(
-        self, at: Moment, found: Accelerated, senses: Senses, joints: Sequence[int], instant: float
+        self, at: Moment, stop: Accelerated, senses: Senses, joints: Sequence[int], instant: float
     ) -> Lock | None:
         """What is so after a stop; None where something else would turn round, or there are no accelerations."""
         sticks = [k for k, sense in enumerate(senses) if sense == 0]
-        after = at._replace(rate=at.rate + instant * found.second, senses=senses)
+        after = at._replace(rate=at.rate + instant * stop.second, senses=senses)
         after = after._replace(rate=self.motion.stopped(after, sticks)[:, None])
         _, speeds = self.motion.ways(after)
         if any(sense * speeds[k] < -MEET for k, sense in enumerate(senses)):
             return None
         if self.of(after, senses).senses is None:
             return None
-        energies = [kinetic_energy(self.motion.walk(one, np.zeros_like(at.q))) for one in (at, after)]
-        return Lock(joints, after.rate[:, 0], senses, float(np.ravel(energies[0])[0] - np.ravel(energies[1])[0]))
+        walks = (self.motion.walk(moment, np.zeros_like(at.q)) for moment in (at, after))
+        before, left = (float(np.ravel(kinetic_energy(walk))[0]) for walk in walks)
+        return Lock(joints, after.rate[:, 0], senses, before - left)
 
     # ---- other accelerations ----------------------------------------------------------------------------------
 
@@ -271,29 +271,29 @@ class ActiveSet:
         away, where more of some acceleration takes less effort there."""
         count, starts = len(self.motion.names), self.motion.far(np.zeros_like(at.q))
         ends = np.array(list(itertools.product((1.0, -1.0), repeat=len(may)))).T
-        if 3 ** len(may) > MOST_CASES or not np.any(
+        if len(may) > MOST_MOVED or not np.any(
             self.motion.turning(at, np.repeat(starts, ends.shape[1], axis=1), may, np.tile(ends, (1, 2 * count)))
         ):
             return False
-        known = self.motion.accelerate(at).second
-        size = np.maximum(self.motion.unit[:, None], np.max(np.abs(known)))
+        second = self.motion.accelerate(at).second
+        size = np.maximum(self.motion.unit[:, None], np.max(np.abs(second)))
         many = repeated(at, 2 * count)
         for modes in itertools.product((0, 1, -1), repeat=len(may)):
             case = [modes[may.index(k)] if k in may else sense for k, sense in enumerate(at.senses)]
-            found = self.motion.searched(many._replace(senses=tuple(case)), starts)
-            apart = np.max(np.abs(found.second - known) / size, axis=0) > APART
-            if np.any(self._agrees(found, tuple(case), may) & (found.turned | apart)):
+            others = self.motion.searched(many._replace(senses=tuple(case)), starts)
+            apart = np.max(np.abs(others.second - second) / size, axis=0) > APART
+            if np.any(self._agrees(others, tuple(case), may) & (others.turned | apart)):
                 return True
         return False
 
-    def _agrees(self, found: Accelerated, senses: Senses, may: Sequence[int]) -> Flags:
+    def _agrees(self, others: Accelerated, senses: Senses, may: Sequence[int]) -> Flags:
         """Lanes in which the joints that may stick do what a case says."""
-        fine = np.array(found.converged)
-        pulls = self.motion.pulls(found.back.walk, len(fine)) / self.motion.typical[:, None]
+        agrees = np.array(others.converged)
+        pulls = self.motion.pulls(others.back.walk, len(agrees)) / self.motion.typical[:, None]
         small = TINY * np.maximum(1.0, np.max(np.abs(pulls), axis=0))
         for k in may:
             if senses[k]:
-                fine &= senses[k] * pulls[k] >= -small
-            elif found.shares is not None:
-                fine &= np.abs(found.shares[k]) <= 1.0 + SLACK
-        return fine
+                agrees &= senses[k] * pulls[k] >= -small
+            elif others.shares is not None:
+                agrees &= np.abs(others.shares[k]) <= 1.0 + SLACK
+        return agrees

@@ -25,19 +25,13 @@ from trunnion.dynamics.motor import Drive
 from trunnion.dynamics.rates import WORKS, Rates, Walks
 from trunnion.dynamics.rest import Meanwhile, Rest
 from trunnion.dynamics.solution import Stretch
-from trunnion.dynamics.state import FreeMotion, Moment
+from trunnion.dynamics.state import Moment
 
 __all__ = ["ClutchMotion"]
 
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-12  # of the capacity: what a clutch that just holds may carry more, by rounding
-
-
-def _drive(motion: FreeMotion) -> Drive:
-    """That of the one free coordinate."""
-    (found,) = motion.drives.values()
-    return found
 
 
 class ClutchRates:
@@ -73,10 +67,10 @@ class ClutchMotion(Integration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.drive = _drive(self.motion)
+        (self.drive,) = self.motion.drives.values()
         self.rates = ClutchRates(self.drive, cast("CompiledRates | Walks", self.dynamics))
         self.dynamics = self.rates
-        self.meanwhile: Meanwhile | None = None  # what those do
+        self.meanwhile: Meanwhile | None = None  # what prescribed drivers do while the coordinate rests
         self.let_go = 0.0  # sense in which a clutch that held begins to slip
         self.known = "holds" if self.drive.engaged(0.0) else "opens"
 
@@ -122,31 +116,27 @@ class ClutchMotion(Integration):
 
     # ---- where that changes -------------------------------------------------------------------------------------
 
-    def _values(self, stretch: Stretch) -> Callable[[Array], Array]:
-        return lambda times: self._left(stretch, times)[None]
+    def _values(self, stretch: Stretch) -> Callable[[Array], Array] | None:
+        """What is left of the slip, or of the capacity of a clutch that holds."""
+        if self.slips:
+            return lambda times: self.slips * stretch.state(times)[[self.layout.slip]]
+        if not self.drive.engaged(stretch.now):
+            return None
+        return lambda times: (self._capacity - np.abs(self._through(stretch, times)))[None]
 
     def _changed(self, crossing: Crossing, row: Array) -> float:
         """The slip becomes 0, or a clutch that holds carries its capacity."""
         if self.slips:
             row[self.layout.slip] = 0.0
         else:
-            last = self.solution.stretches[-1]
-            carried = self._carried(self._holding(last, np.array([crossing.time])), last.resting)
+            carried = self._through(self.solution.stretches[-1], np.array([crossing.time]))
             self.let_go = float(np.sign(carried[0]))
         return np.inf
 
-    def _left(self, stretch: Stretch, times: Array) -> Array:
-        """What is left of the slip, or of the capacity of a clutch that holds; below 0 it has changed."""
-        if self.slips:
-            slip: Array = self.slips * stretch.state(times)[self.layout.slip]
-            return slip
-        if not self.drive.engaged(stretch.now):
-            return np.ones_like(times)
-        left: Array = self._capacity - np.abs(self._carried(self._holding(stretch, times), stretch.resting))
-        return left
-
-    def _holding(self, stretch: Stretch, times: Array) -> Moment:
-        return self.layout.moment(times, stretch.state(times), stretch.sense, stretch.now)
+    def _through(self, stretch: Stretch, times: Array) -> Array:
+        """Effort through a clutch that holds at times of a step."""
+        at = self.layout.moment(times, stretch.state(times), stretch.sense, stretch.now)
+        return self._carried(at, stretch.resting)
 
     # ---- the steps ----------------------------------------------------------------------------------------------
 

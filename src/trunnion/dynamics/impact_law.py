@@ -47,9 +47,9 @@ def strike(delassus: Array, before: Array, restitution: Array, friction: Array) 
     Applications, McGraw-Hill, 1985); the restitutions are then lowered together until nothing is gained, for without
     any the law always loses.
     """
-    found = _struck(delassus, before, restitution, friction)
-    if found is None or found.loss >= -CLOSE * _energy(found, before):
-        return found
+    struck = _struck(delassus, before, restitution, friction)
+    if struck is None or struck.loss >= -CLOSE * _energy(struck, before):
+        return struck
     low, high, best = 0.0, 1.0, None
     for _ in range(HALVINGS):
         share = 0.5 * (low + high) if best is not None else 0.0
@@ -63,8 +63,8 @@ def strike(delassus: Array, before: Array, restitution: Array, friction: Array) 
     return best
 
 
-def _energy(found: Struck, before: Array) -> float:
-    return float(np.abs(found.impulse) @ (np.abs(before) + np.abs(found.after)))
+def _energy(struck: Struck, before: Array) -> float:
+    return float(np.abs(struck.impulse) @ (np.abs(before) + np.abs(struck.after)))
 
 
 def _struck(delassus: Array, before: Array, restitution: Array, friction: Array) -> Struck | None:

@@ -65,17 +65,17 @@ class ImpactMotion(ActiveMotion):
     def _gaps(self, at: Moment) -> Array:
         """What stays above 0 within a step, (2 contacts, lane): gap or normal force, and slip or what friction has left
         before it slips."""
-        found = np.ones((2 * self.count, len(at.time)))
+        values = np.ones((2 * self.count, len(at.time)))
         if not any(self.onsets):
-            found[: self.count] = self.rigid.look(at).gap
-            return found
+            values[: self.count] = self.rigid.look(at).gap
+            return values
         seen = self.rigid.touches(at)
         for k, onset in enumerate(self.onsets):
-            found[k] = seen.normal[k] if onset else seen.gap[k]
+            values[k] = seen.normal[k] if onset else seen.gap[k]
             if isinstance(onset, Closed) and self.friction[k] > 0.0:
                 left = self.friction[k] * seen.normal[k] - np.abs(seen.friction[k])
-                found[self.count + k] = onset.sense * seen.slip[k] if onset.sense else left
-        return found
+                values[self.count + k] = onset.sense * seen.slip[k] if onset.sense else left
+        return values
 
     def _measured(self, stretch: Stretch) -> None:
         """Forces, impulse and wear of the contacts that are closed, whose slips keep their sense within a step."""
@@ -83,10 +83,10 @@ class ImpactMotion(ActiveMotion):
             return
         times, weights = step_nodes(stretch.begin, stretch.end)
         seen = self._touches(stretch.state, times)
-        for k, one in self._open.items():
-            one.force = np.fmax(one.force, float(np.max(seen.normal[k])))
-            one.impulse += float(weights @ seen.normal[k])
-            one.wear += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
+        for k, contact in self._open.items():
+            contact.force = np.fmax(contact.force, float(np.max(seen.normal[k])))
+            contact.impulse += float(weights @ seen.normal[k])
+            contact.wear += float(weights @ np.abs(seen.normal[k] * seen.slip[k]))
 
     def _met(self, k: int, time: float, row: Array) -> float:
         """An impact, a lift-off, or a change between slip and stick; `row` is what it is after it."""
@@ -129,17 +129,17 @@ class ImpactMotion(ActiveMotion):
         places = [i for i in range(self.count) if i == k or meet[i] or self.onsets[i] is not None]
         crowded = len(self.recent) == CROWD and self.recent[-1] - self.recent[0] < CROWDED * self.duration
         restitution = np.zeros(self.count) if crowded else self.restitution
-        found, pauses = self._law(linear, places, rates, restitution), dict[int, float]()
-        if found is not None:
-            flights = self._flights(time, row, places, rates, *found)
+        law, pauses = self._law(linear, places, rates, restitution), dict[int, float]()
+        if law is not None:
+            flights = self._flights(time, row, places, rates, *law)
             pauses = {i: pause for i, (pause, low) in flights.items() if low}
             if pauses:
                 restitution = np.where([i in pauses for i in range(self.count)], 0.0, restitution)
-                found = self._law(linear, places, rates, restitution)
-        if found is None:
+                law = self._law(linear, places, rates, restitution)
+        if law is None:
             self._stop("no_contact_force", time, row)
             return np.inf
-        struck, change = found
+        struck, change = law
         if crowded:
             self.recent.clear()
         if crowded or struck.kept < 1.0:
@@ -189,7 +189,7 @@ class ImpactMotion(ActiveMotion):
     ) -> dict[int, tuple[float, bool]]:
         """Of every place that rebounds and comes back: the time until it does, s; where it goes so low, rebounding or
         let go, that this is none, that until its impacts have accumulated."""
-        n, after, found = self.layout.coordinates, row.copy(), dict[int, tuple[float, bool]]()
+        n, after, flights = self.layout.coordinates, row.copy(), dict[int, tuple[float, bool]]()
         after[n : 2 * n] += change
         rebounds = [i for i, k in enumerate(places) if struck.cases[i] is not OPEN and before[k] < 0.0]
         closed = [k for i, k in enumerate(places) if struck.cases[i] is not OPEN and self.onsets[k] is not None]
@@ -202,8 +202,8 @@ class ImpactMotion(ActiveMotion):
             if pull > 0.0 and e > 0.0 and k in free:
                 low = 0.5 * speed * speed / pull < self.low[k]
                 if low or i in rebounds:
-                    found[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
-        return found
+                    flights[k] = 2.0 * speed / pull / (1.0 - e if low and e < 1.0 else 1.0), low
+        return flights
 
     def _after(
         self, time: float, row: Array, places: Sequence[int], before: Array, struck: Struck, pauses: Mapping[int, float]
@@ -294,5 +294,5 @@ class ImpactMotion(ActiveMotion):
 
     def _cause(self, time: float, row: Array, sense: float, now: float) -> str:
         """Why a state has no acceleration; empty if it has one."""
-        found = super()._cause(time, row, sense, now)
-        return "no_contact_force" if found == "no_acceleration" and any(self.onsets) else found
+        cause = super()._cause(time, row, sense, now)
+        return "no_contact_force" if cause == "no_acceleration" and any(self.onsets) else cause

@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ellipk
 
-from playing import rattling
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
 from trunnion.dynamics.compiled_rates import compiled_rates
@@ -291,13 +290,6 @@ def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
 def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(MechanismError):
         simulate(wheel(LINEAR), **options)
-
-
-def test_joints_do_not_stick_beside_rigid_bodies_in_play() -> None:
-    loads = {"drag": {"joint": "S", "resisting_force": 1}}
-    with pytest.raises(MechanismError) as caught:
-        simulate(rattling({"law": "rigid", "restitution": 0.4}, loads=loads), 1e-3)
-    assert [one.where for one in caught.value.findings] == ["loads.drag"]
 
 
 @pytest.mark.parametrize("name", MOTORS)

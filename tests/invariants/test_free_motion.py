@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -290,6 +291,18 @@ def test_the_speed_of_a_pendulum_is_largest_between_the_rows() -> None:
 def test_numbers_without_sense_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(MechanismError):
         simulate(wheel(LINEAR), **options)
+
+
+def test_a_load_that_may_hold_a_joint_stands_beside_rigid_bodies_in_play() -> None:
+    """The slider rests until the pin strikes, and the load takes a force times the way."""
+    loads = {"drag": {"joint": "S", "resisting_force": 1}}
+    found = simulate(rattling({"law": "rigid", "restitution": 0.4}, loads=loads), 6e-4, 60)
+    slide, torn = found["joint_slide"].sel(joint="S").values, found["event_time"].values
+    kinds = [row[:2] for row in json.loads(found.attrs["events"])]
+    assert kinds[:3] == [["stick", "S"], ["impact", "Q"], ["break-away", "S"]]
+    assert torn[1] == torn[2] > 0.0
+    assert float(found["work_loads"][-1]) == pytest.approx(-abs(slide[-1] - slide[0]), rel=1e-9)
+    assert float(abs(found["energy_residual"]).max()) < 1e-8 * float(abs(found["work_drive"]).max())
 
 
 @pytest.mark.parametrize("name", MOTORS)

@@ -101,8 +101,6 @@ class ActiveMotion(Integration):
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            if not np.all(np.isfinite(numbers[: 2 * n])):
-                return np.full(len(numbers), np.nan)
             inside = numbers.copy()
             inside[:n] = self._in_range(numbers[:n])
             return self.seeing.derivative(moment, inside, self.onsets, now, self.senses)

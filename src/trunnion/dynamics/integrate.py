@@ -324,8 +324,6 @@ class Integration:
 
         def rate(moment: float, numbers: Array) -> Array:
             self.solution.asked += 1
-            if not np.all(np.isfinite(numbers[: 2 * n])):  # no more of a step one of whose rates is unknown
-                return np.full(len(numbers), np.nan)
             speeds = numbers[n : 2 * n]
             asked = numbers.copy()
             if not one_way:

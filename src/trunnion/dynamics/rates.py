@@ -147,7 +147,11 @@ class Walks:
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
-        motion = self.motion
+        motion, n = self.motion, self.layout.coordinates
+        if not (np.all(np.isfinite(at.q)) and np.all(np.isfinite(at.rate))):  # of a step one of whose rates is unknown
+            unknown = np.full(2 * n + len(at.bristles) + len(self.layout.works_named), np.nan)
+            second, integral, bristles, works = np.split(unknown, [n, 2 * n, 2 * n + len(at.bristles)])
+            return Rates(second, integral, bristles, works, False)
         found = motion.accelerate(at, self._last)
         if self._last is not None and not np.all(found.converged & ~found.turned):
             found = motion.accelerate(at)  # the last ones may lie on the wrong side of where a reaction turns round

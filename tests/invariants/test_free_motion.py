@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ellipk
 
+from playing import rattling
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
 from trunnion.dynamics.compiled_rates import compiled_rates

@@ -27,7 +27,7 @@ from trunnion.model.joint_parts import motions
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Numbers, ParameterSet, dimension_errors
 from trunnion.model.quantity import UNREADABLE, evaluation_order
-from trunnion.model.rules import InSpace, Refers, stated_findings
+from trunnion.model.rules import InSpace, Refers, key_findings
 from trunnion.model.units import ANY, Dimension, UnitError
 
 __all__ = ["check_model"]
@@ -44,7 +44,7 @@ def check_model(mechanism: Numbers, lost: Collection[str] = ()) -> list[Finding]
         return [Finding(what, "space", "state space: spatial")]
     findings = [
         *_quantities(mechanism, unreadable),
-        *stated_findings(mechanism),
+        *key_findings(mechanism),
         *space(mechanism),
         *_links(mechanism),
         *joint_findings(mechanism),

@@ -15,6 +15,7 @@ from trunnion.model.quantity import Quantity
 __all__ = [
     "assign",
     "not_stated",
+    "part_types",
     "with_law",
 ]
 
@@ -79,12 +80,12 @@ def _has(kind: type[BaseModel], keys: Sequence[str]) -> bool:
     fields = {field.alias or name: field for name, field in kind.model_fields.items()}
     if keys[0] not in fields:
         return False
-    return len(keys) == 1 or any(_has(part, keys[1:]) for part in _parts(fields[keys[0]].annotation))
+    return len(keys) == 1 or any(_has(part, keys[1:]) for part in part_types(fields[keys[0]].annotation))
 
 
-def _parts(annotation: object) -> Iterator[type[BaseModel]]:
+def part_types(annotation: object) -> Iterator[type[BaseModel]]:
     """The kinds of entries that a field may be."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for one in get_args(annotation):
-        yield from _parts(one)
+        yield from part_types(one)

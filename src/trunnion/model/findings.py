@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-import types
 import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from trunnion.errors import Finding
+from trunnion.model.changes import part_types
 from trunnion.model.names import nearest
 from trunnion.model.parameters import item_name
 from trunnion.model.parts import FORMS
@@ -118,41 +118,15 @@ def _path(location: tuple[int | str, ...], data: Mapping[str, Any]) -> str:
 
 def _fields(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """The keys that the part of the model at a location can have."""
-    reached: list[Any] = [model]
-    for part in location:
-        reached = [below for annotation in reached for below in _below(annotation, part)]
-    return [field.alias or key for one in reached if _is_part(one) for key, field in one.model_fields.items()]
-
-
-def _below(annotation: Any, part: int | str) -> Iterator[type[BaseModel]]:
-    """The model classes, or containers of them, that an annotation has under a key."""
-    if _is_part(annotation):
-        fields = annotation.model_fields.items()
-        for field in (field for key, field in fields if (field.alias or key) == part):
-            yield from _classes(field.annotation)
-    else:
-        yield from _classes(typing.get_args(annotation)[1 if _origin(annotation) is Mapping else 0])
-
-
-def _is_part(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
-
-
-def _origin(annotation: Any) -> Any:
-    found = typing.get_origin(annotation)
-    return Mapping if isinstance(found, type) and issubclass(found, Mapping) else found
-
-
-def _classes(annotation: Any) -> Iterator[Any]:
-    """Model classes and containers in an annotation, unions and Annotated unwrapped."""
-    origin = typing.get_origin(annotation)
-    if origin in (typing.Union, types.UnionType):
-        for one in typing.get_args(annotation):
-            yield from _classes(one)
-    elif origin is typing.Annotated:
-        yield from _classes(typing.get_args(annotation)[0])
-    elif _origin(annotation) in (Mapping, tuple) or _is_part(annotation):
-        yield annotation
+    reached, named = [model], False
+    for key in location:
+        fields = [one for kind in reached for name, one in kind.model_fields.items() if (one.alias or name) == key]
+        if named or not fields:  # the name of an entry, or its place in a list
+            named = False
+            continue
+        reached = [part for field in fields for part in part_types(field.annotation)]
+        named = any(typing.get_origin(field.annotation) in (Mapping, tuple) for field in fields)
+    return [field.alias or name for kind in reached for name, field in kind.model_fields.items()]
 
 
 def repair(

@@ -36,11 +36,15 @@ ROUNDING = 1e-12  # of a limit: 180 deg as 3.14159265358980 rad is no more than 
 Values = Mapping[str, Number]
 
 
+class Rule:
+    """A marker of a field."""
+
+
 # ---- of one number --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Within:
+class Within(Rule):
     """A number between two limits, SI. A limit with a round bracket in `ends` is itself outside.
 
     remedy: what to do about a number outside, where the limits alone do not say it.
@@ -59,12 +63,12 @@ class Within:
         if not (below or above):
             return ""
         negative = self.low == 0 and self.ends[0] == "[" and below
-        return f"is {_shown(value, kind)}, which is {'negative' if negative else f'not {self.limits(kind)}'}"
+        return f"is {_with_unit(value, kind)}, which is {'negative' if negative else f'not {self.limits(kind)}'}"
 
     def limits(self, kind: Kind) -> str:
         """The limits in words: `at least 0`, `above 0 and at most 1`."""
-        low = f"{'above' if self.ends[0] == '(' else 'at least'} {_shown(self.low, kind) if self.low else 0}"
-        high = f"{'below' if self.ends[1] == ')' else 'at most'} {_shown(self.high, kind)}"
+        low = f"{'above' if self.ends[0] == '(' else 'at least'} {_with_unit(self.low, kind) if self.low else 0}"
+        high = f"{'below' if self.ends[1] == ')' else 'at most'} {_with_unit(self.high, kind)}"
         return " and ".join(text for text, end in ((low, self.low), (high, self.high)) if math.isfinite(end))
 
     def instead(self, kind: Kind) -> str:
@@ -74,15 +78,15 @@ class Within:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """The limits of a plain number, beside its form."""
-        found = handler(schema)
+        limits = handler(schema)
         for end, key, bracket in ((self.low, "inimum", self.ends[0]), (self.high, "aximum", self.ends[1])):
             if math.isfinite(end):
-                found[f"exclusiveM{key}" if bracket in "()" else f"m{key}"] = end
-        return found
+                limits[f"exclusiveM{key}" if bracket in "()" else f"m{key}"] = end
+        return limits
 
 
 @dataclass(frozen=True)
-class NotZero:
+class NotZero(Rule):
     """A number other than 0, which would mean something."""
 
     meaning: str
@@ -101,12 +105,12 @@ NotNegative = Within(0.0)
 Positive = Within(0.0, ends="(]")
 
 
-def _shown(value: float, kind: Kind) -> str:
+def _with_unit(value: float, kind: Kind) -> str:
     """A number with its unit, an angle in degrees."""
     if kind is KINDS["angle"]:
         return f"{math.degrees(value):.4g} deg"
-    known = len(kind.dimensions) == 1 and kind.unit != "1"
-    return f"{value:g} {kind.unit}" if known else f"{value:g}"
+    one_unit = len(kind.dimensions) == 1 and kind.unit != "1"
+    return f"{value:g} {kind.unit}" if one_unit else f"{value:g}"
 
 
 def limit_findings(rules: tuple[Any, ...], value: float, kind: Kind, where: str) -> Iterator[Finding]:
@@ -120,19 +124,19 @@ def limit_findings(rules: tuple[Any, ...], value: float, kind: Kind, where: str)
 
 
 @dataclass(frozen=True)
-class Directed:
+class Directed(Rule):
     """Components of a direction, of which one is other than 0."""
 
     def check(self, path: str, values: Values) -> Iterator[Finding]:
         """A finding where all are 0. path: of the field."""
         components = [values[f"{path}.{axis}"] for axis in "xyz" if f"{path}.{axis}" in values]
-        if components and all(one == 0 for one in components):
+        if components and not any(components):
             example = ", ".join(("1", "0", "0")[: len(components)])
             yield Finding("has no direction: all its components are 0", path, f"write [{example}] for along x")
 
 
 @dataclass(frozen=True)
-class Rising:
+class Rising(Rule):
     """Points in the order of their first column, which has this name in paths."""
 
     column: str
@@ -173,13 +177,13 @@ class Model(Protocol):
 
 
 @dataclass(frozen=True)
-class Refers:
+class Refers(Rule):
     """The name of another part, or several: of a link, joint, point, process …; distinct: no two alike."""
 
     noun: str
     distinct: bool = False
 
-    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+    def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """Findings about names that mean nothing. where: the part stands."""
         value = getattr(part, key)
         names, at = (value,) if isinstance(value, str) else value, f"{where}.{key}".lstrip(".")
@@ -199,10 +203,10 @@ class Refers:
 
 
 @dataclass(frozen=True)
-class InSpace:
+class InSpace(Rule):
     """As many coordinates as a point of the model has."""
 
-    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+    def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """A finding about another number of coordinates; the position of a point is the point itself."""
         yield from self.counted(getattr(part, key), where if key == "at" else f"{where}.{key}".lstrip("."), model)
 
@@ -215,21 +219,21 @@ class InSpace:
 
 
 @dataclass(frozen=True)
-class OnlyWith:
+class OnlyWith(Rule):
     """A key that has an effect only beside another. remedy: how to state that; words: what it is."""
 
     key: str
     remedy: str
     words: str = ""
 
-    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+    def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """A finding if the other is not stated."""
         if key in part.model_fields_set and not getattr(part, self.key):
             yield Finding(f"has no effect without {self.words or self.key}", f"{where}.{key}", self.remedy)
 
 
 @dataclass(frozen=True, eq=False)
-class Selects:
+class Selects(Rule):
     """A word that says which other keys of its part are needed, and which have an effect.
 
     table: by word, with `needs` and `takes`; also: keys beside any word; examples: of what is needed, by key; instead:
@@ -242,11 +246,11 @@ class Selects:
     also: tuple[str, ...] = ()
     instead: Mapping[str, str] = field(default_factory=dict)
 
-    def stated(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
+    def findings(self, key: str, part: BaseModel, where: str, model: Model) -> Iterator[Finding]:
         """Findings about keys that are missing and keys without effect."""
         word = getattr(part, key)
-        takes = {name: (*one.needs, *one.takes) for name, one in self.table.items()}
-        keys = {self.instead.get(one, one) for one in part.model_fields_set - {key, *self.also}}
+        takes = {name: (*entry.needs, *entry.takes) for name, entry in self.table.items()}
+        keys = {self.instead.get(name, name) for name in part.model_fields_set - {key, *self.also}}
         yield from stray(keys, takes, key, word, self.noun, where)
         for need in self.table[word].needs:
             if getattr(part, need) is None and need not in keys:
@@ -258,15 +262,14 @@ def stray(
     keys: Iterable[str], takes: Mapping[str, Collection[str]], key: str, word: str, noun: str, where: str
 ) -> Iterator[Finding]:
     """Findings about keys that have no effect beside a word; takes: keys by word."""
-    for one in sorted({*keys} - {*takes[word]}):
-        others = [name for name, taken in takes.items() if one in taken]
+    for vain in sorted({*keys} - {*takes[word]}):
+        others = [name for name, effective in takes.items() if vain in effective]
         other = f", or state {key}: {' or '.join(others)}" if others else ""
-        own = ", ".join(takes[word]) or "nothing but limits"
-        remedy = f"remove it{other}; the parameters of {word} are {own}"
-        yield Finding(f"'{one}' has no effect on the {noun} {word}", f"{where}.{one}", remedy)
+        remedy = f"remove it{other}; the parameters of {word} are {', '.join(takes[word]) or 'nothing but limits'}"
+        yield Finding(f"'{vain}' has no effect on the {noun} {word}", f"{where}.{vain}", remedy)
 
 
-def stated_findings(model: Any) -> Iterator[Finding]:
+def key_findings(model: Any) -> Iterator[Finding]:
     """Findings about names and keys, of every part of a model: its joints with their defaults."""
     sections = {key: getattr(model, key) for key in type(model).model_fields if key not in ("joints", "loop")}
     every: list[tuple[str, BaseModel]] = [("", model), *parts("", {**sections, "joints": model.effective_joints})]
@@ -274,7 +277,7 @@ def stated_findings(model: Any) -> Iterator[Finding]:
         for key, rules in markers(type(part)).items():
             for rule in rules:
                 if isinstance(rule, Refers | InSpace | OnlyWith | Selects) and getattr(part, key) is not None:
-                    yield from rule.stated(key, part, where, model)
+                    yield from rule.findings(key, part, where, model)
 
 
 # ---- where rules stand ----------------------------------------------------------------------------------------
@@ -284,11 +287,7 @@ def stated_findings(model: Any) -> Iterator[Finding]:
 def markers(kind: type[BaseModel]) -> Mapping[str, tuple[Any, ...]]:
     """The rules of the fields of a part, by key."""
     fields = {key: (*field.metadata, *_marked(field.annotation)) for key, field in kind.model_fields.items()}
-    return {key: found for key, all_of in fields.items() if (found := tuple(one for one in all_of if _is_rule(one)))}
-
-
-def _is_rule(marker: object) -> bool:
-    return isinstance(marker, Within | NotZero | Directed | Rising | Refers | InSpace | OnlyWith | Selects)
+    return {key: tuple(marker for marker in every if isinstance(marker, Rule)) for key, every in fields.items()}
 
 
 def _marked(annotation: Any) -> Iterator[Any]:
@@ -297,8 +296,8 @@ def _marked(annotation: Any) -> Iterator[Any]:
         yield from annotation.__metadata__
         yield from _marked(get_args(annotation)[0])
     elif get_origin(annotation) in (Union, type(int | str)):
-        for one in get_args(annotation):
-            yield from _marked(one)
+        for form in get_args(annotation):
+            yield from _marked(form)
 
 
 def parts(path: str, value: object) -> Iterator[tuple[str, BaseModel]]:
@@ -308,6 +307,6 @@ def parts(path: str, value: object) -> Iterator[tuple[str, BaseModel]]:
         below: Mapping[str, object] = {key: getattr(value, key) for key in type(value).model_fields}
     else:
         below = value if isinstance(value, Mapping) else {}
-    for key, one in below.items():
-        if isinstance(one, BaseModel | Mapping):
-            yield from parts(f"{path}.{key}".lstrip("."), one)
+    for key, item in below.items():
+        if isinstance(item, BaseModel | Mapping):
+            yield from parts(f"{path}.{key}".lstrip("."), item)

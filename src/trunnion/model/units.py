@@ -232,7 +232,7 @@ def _spellings() -> dict[str, tuple[str, str, str]]:
         first, definition, last = (part.strip() for part in line.split("|"))
         symbols, words = dict(_SYMBOL.findall(first)), last.split()
         name = next(iter(symbols), "") or words[0].strip("*")
-        prefixed = {f"{before}{symbol}": before for symbol, taken in symbols.items() for before in _before(taken)}
+        prefixed = {f"{before}{symbol}": before for symbol, prefixes in symbols.items() for before in _before(prefixes)}
         for word in words:
             metric = ("", "micro", "milli", "kilo", "mega") if word.endswith("*") else ("",)
             prefixed |= {f"{before}{word.strip('*')}{end}": before for before in metric for end in ("", "s")}
@@ -254,7 +254,7 @@ def _named(word: str) -> Root:
 
 def _before(prefixes: str) -> list[str]:
     """The prefixes of a symbol, none among them; micro has two signs in Unicode, and none on most keyboards."""
-    return ["", *(sign for one in prefixes.split() for sign in (("µ", "μ", "u") if one == "µ" else (one,)))]
+    return ["", *(sign for prefix in prefixes.split() for sign in (("µ", "μ", "u") if prefix == "µ" else (prefix,)))]
 
 
 # ---- reading --------------------------------------------------------------------------------------------------
@@ -272,17 +272,17 @@ _FORMS = "write a unit as N m, kg/m^3 or s^-1"
 def _product(text: str, begin: int = 0) -> tuple[Root, int]:
     """A product of units from a place on, and where it ends; ValueError, KeyError, ArithmeticError if it is none."""
     factor, exponents, names, place = Fraction(1), dict.fromkeys(BASES, Fraction(0)), frozenset[str](), begin
-    while found := _FACTOR.match(text, place):
-        if found["sign"] and place == begin:
+    while item := _FACTOR.match(text, place):
+        if item["sign"] and place == begin:
             raise ValueError(text)
-        if found["word"] == "(":
-            (size, powers, named), place = _product(text, found.end())
+        if item["word"] == "(":
+            (size, powers, named), place = _product(text, item.end())
             place = text.index(")", place) + 1
         else:
-            (size, powers, named), place = _named(found["word"]), found.end()
+            (size, powers, named), place = _named(item["word"]), item.end()
         raised = _POWER.match(text, place)
         power = Fraction("".join((raised[1] or raised[2]).split())) if raised else Fraction(1)
-        power, place = -power if found["sign"] == "/" else power, raised.end() if raised else place
+        power, place = -power if item["sign"] == "/" else power, raised.end() if raised else place
         if abs(power) * (size.numerator.bit_length() + size.denominator.bit_length()) > MOST_DIGITS:
             raise ValueError(text)
         factor *= size ** int(power) if power.denominator == 1 else Fraction(float(size) ** float(power))
@@ -306,7 +306,7 @@ def root(text: str) -> Root:
         if end < len(written):
             raise ValueError(text)
     except (ValueError, LookupError, ArithmeticError):
-        word = next((one for one in _WORD.findall(written) if one not in _spellings()), "")
+        word = next((name for name in _WORD.findall(written) if name not in _spellings()), "")
         remedy = _remedy(text, word) or ("" if word else _FORMS)
         raise UnitError(f"the unit '{text[:60]}' is not known", remedy) from None
     return product

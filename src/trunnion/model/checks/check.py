@@ -16,18 +16,17 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.checks.drivers import driver_findings, gears
 from trunnion.model.checks.errors import errors, joint_errors
 from trunnion.model.checks.joints import joint_findings
-from trunnion.model.checks.loads import load_findings, motion_dimensions, springs, tables, unknown_name
+from trunnion.model.checks.loads import expression_name, load_findings, motion_dimensions, springs, tables, unknown_name
 from trunnion.model.checks.magnitudes import Bare, magnitudes, plain_dimensions, radians, unitless_angles
 from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.space import coordinates, loop, space
 from trunnion.model.checks.tolerances import cost_names, cost_values, stated_entries, tolerance_names, tolerance_values
 from trunnion.model.checks.values import check_values
-from trunnion.model.expression import MOTION, RESERVED
 from trunnion.model.joint_parts import motions
 from trunnion.model.names import ERRORS, nearest
 from trunnion.model.parameters import Numbers, ParameterSet, dimension_errors
 from trunnion.model.quantity import UNREADABLE, evaluation_order
-from trunnion.model.rules import InSpace, Refers, stated_findings
+from trunnion.model.rules import InSpace, Refers, key_findings
 from trunnion.model.units import ANY, Dimension, UnitError
 
 __all__ = ["check_model"]
@@ -44,7 +43,7 @@ def check_model(mechanism: Numbers, lost: Collection[str] = ()) -> list[Finding]
         return [Finding(what, "space", "state space: spatial")]
     findings = [
         *_quantities(mechanism, unreadable),
-        *stated_findings(mechanism),
+        *key_findings(mechanism),
         *space(mechanism),
         *_links(mechanism),
         *joint_findings(mechanism),
@@ -129,7 +128,7 @@ def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadab
         ring = " → ".join([*circle, circle[0]])
         yield Finding(f"is defined by itself: {ring}", f"dimensions.{circle[0]}", "give one of them a value")
     for name in order:
-        yield from _dimension_name(name)
+        yield from expression_name(name, f"dimensions.{name}")
         quantity, path = dimensions[name], f"dimensions.{name}"
         if set(quantity.names) <= known.keys() and path not in unreadable:
             try:
@@ -137,16 +136,6 @@ def _dimensions(mechanism: Numbers, known: dict[str, Dimension | None], unreadab
             except UnitError as error:
                 unreadable.add(path)
                 yield Finding(error.what, path, error.remedy)
-
-
-def _dimension_name(name: str) -> Iterator[Finding]:
-    where = f"dimensions.{name}"
-    if name in RESERVED or name in MOTION:
-        yield Finding(f"'{name}' is a reserved name of expressions", where, "rename the dimension")
-    elif not name.isidentifier() or name.startswith("_"):
-        yield Finding(
-            f"'{name}' cannot be used in an expression", where, "name it with letters, digits and _, a letter first"
-        )
 
 
 def _absent(mechanism: Numbers) -> Iterator[Finding]:

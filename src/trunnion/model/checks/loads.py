@@ -19,6 +19,7 @@ from trunnion.model.quantity import Quantity
 from trunnion.model.units import ANGLE, ANY, KINDS, Dimension, UnitError, dimension_text, fits
 
 __all__ = [
+    "expression_name",
     "load_findings",
     "motion_dimensions",
     "spring_values",
@@ -106,16 +107,22 @@ def unknown_name(mechanism: Numbers, name: str, path: str, source: object, known
 # ---- tables ---------------------------------------------------------------------------------------------------
 
 
+def expression_name(name: str, where: str) -> Iterator[Finding]:
+    """Whether a dimension or a table can be spoken of in an expression by its name."""
+    if name in RESERVED or name in MOTION:
+        yield Finding(f"'{name}' is a reserved name of expressions", where, "rename it")
+    elif not name.isidentifier() or name.startswith("_"):
+        remedy = "name it with letters, digits and _, a letter first"
+        yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
+
+
 def tables(mechanism: Numbers, known: Dimensions) -> Iterator[Finding]:
     """Names of the tables, and whether the values of each measure one thing."""
     for name, table in mechanism.tables.items():
         where = f"tables.{name}"
-        if name in RESERVED or name in MOTION or name in mechanism.dimensions:
-            other = "a dimension" if name in mechanism.dimensions else "a reserved name of expressions"
-            yield Finding(f"'{name}' is {other}", where, "rename the table")
-        elif not name.isidentifier() or name.startswith("_"):
-            remedy = "name it with letters, digits and _, a letter first"
-            yield Finding(f"'{name}' cannot be used in an expression", where, remedy)
+        yield from expression_name(name, where)
+        if name in mechanism.dimensions:
+            yield Finding(f"'{name}' is a dimension", where, "rename the table")
         if table.over == "drive" and not mechanism.drivers:
             yield Finding(
                 "is over the coordinate of the first driver, but the model has no driver", where, "state a driver"

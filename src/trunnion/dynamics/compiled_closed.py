@@ -38,8 +38,7 @@ __all__ = ["CompiledClosed", "compiled_closed"]
 def compiled_closed(motion: ClosedMotion) -> CompiledClosed | None:
     """The rates as machine code; None where they cannot be."""
     sure = motion.affine and not motion.sticking
-    found = CompiledClosed(motion) if sure and compilable(motion) else None
-    return found if found and found.works(None) else None
+    return CompiledClosed(motion) if sure and compilable(motion) else None
 
 
 class CompiledClosed(CompiledRates):
@@ -56,8 +55,9 @@ class CompiledClosed(CompiledRates):
 
     def touches(self, at: Moment) -> Seen | None:
         """The contacts with their forces, in many lanes, some of them closed; None where there is any doubt."""
-        found = self._program("rates", at).run(at)
-        if np.any(found[-1]) or not np.all(np.isfinite(found)):
+        program = self._program("rates", at)
+        found = None if program is None else program.run(at)
+        if found is None or np.any(found[-1]) or not np.all(np.isfinite(found)):
             return None
         return Seen(*found[self.last : -1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
@@ -65,8 +65,9 @@ class CompiledClosed(CompiledRates):
         """See `ClosedMotion.linear`; None where there is any doubt."""
         count, contacts = self.layout.coordinates, len(at.onsets)
         free = at._replace(onsets=(None,) * contacts)
-        found = self._program("linear", free).run(free)[:, 0]
-        if found[-1] or not np.all(np.isfinite(found)):
+        program = self._program("linear", free)
+        found = None if program is None else program.run(free)[:, 0]
+        if found is None or found[-1] or not np.all(np.isfinite(found)):
             return None
         mass, rest = found[: count * count].reshape(count, count).T, found[count * count : -1]
         ways = rest[: 2 * contacts * count].reshape(count, 2 * contacts).T

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import primal
 from trunnion.algebra.namespace import Number
 from trunnion.dynamics.state import FreeMotion, Moment
-from trunnion.dynamics.touching import Contacts, ContactState, Push
+from trunnion.dynamics.touching import Contacts, ContactState, Onset, Push
 from trunnion.solve.backward import Backward
 from trunnion.solve.system import law_of
 
@@ -147,6 +147,17 @@ class Walks:
         memory = _of_one_lane(bristle_rates(motion, at, found.back))
         works = _of_one_lane(works_of(found.back, at._replace(onsets=found.onsets), motion.contacts))
         return Rates(found.second[:, 0], integral[:, 0], memory, works, sound, locked)
+
+    def derivative(
+        self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
+    ) -> Array:
+        """The derivative of a row; NaN for no answer."""
+        layout = Layout.of(self.motion)
+        at = layout.moment(np.array([time]), row[:, None], now=now)._replace(onsets=tuple(onsets), senses=senses)
+        with np.errstate(all="ignore"):
+            rates = self(at)
+        n = layout.coordinates
+        return layout.row(row[n : 2 * n], rates) if rates.sound else np.full(len(row), np.nan)
 
     def seconds(self, at: Moment) -> Array:
         """The accelerations, (coordinate, lane)."""

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.closed import ClosedMotion, ClosedRates
 from trunnion.dynamics.compiled_closed import compiled_closed
+from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.contact_motion import ContactMotion
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
-from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
+from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
 from trunnion.dynamics.rates import Layout
 from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges

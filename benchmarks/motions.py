@@ -28,7 +28,7 @@ import trunnion
 from benchmarks import exudyn_pin
 from benchmarks.mutants import ROOT
 from benchmarks.side import version
-from trunnion.dynamics.batch import figures_in_time
+from trunnion.dynamics.measured import figures_in_time
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
 from trunnion.studies.tolerance.first_order import study
@@ -139,7 +139,7 @@ def rattled(console: Console) -> None:
     mechanism, turn, short = rattling(), 2 * math.pi / SPEED, 2.9e-4
 
     def walked() -> None:
-        with mock.patch("trunnion.dynamics.prepared.compiled_rates", return_value=None):
+        with mock.patch("trunnion.dynamics.compiled_rates.compilable", return_value=False):
             trunnion.simulate(mechanism, short, 10)
 
     trunnion.simulate(mechanism, short, 1)  # compiles

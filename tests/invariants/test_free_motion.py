@@ -14,7 +14,7 @@ from scipy.special import ellipk
 from playing import rattling
 from timed import LINEAR, slider_crank, wheel
 from trunnion import MechanismError, analyse, read, simulate
-from trunnion.dynamics.compiled_rates import compiled_rates
+from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.integrate import Integration
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.start import initial_row
@@ -46,10 +46,9 @@ def motored(name: str, driver: dict[str, Any]) -> Mechanism:
 def compared(mechanism: Mechanism, lanes: int = 5) -> None:
     """Machine code against walks at random states."""
     motion = FreeMotion.of(prepare(mechanism))
-    compiled = compiled_rates(motion)
-    assert compiled is not None
+    compiled = CompiledRates(motion)
     walks, rng, pace = Walks(motion), np.random.default_rng(7), float(motion.unit[0]) ** 0.5
-    compiled.walks = None  # type: ignore[assignment]  # they are not asked
+    compiled.walks = None  # they are not asked
     for _ in range(lanes):
         q, v = rng.uniform(-10, 10), rng.normal() * pace
         bristles = rng.normal(0, 1e-6, (len(motion.bristles), 1))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from timed import LINEAR, slider_crank, wheel
-from trunnion.dynamics.batch import figures_in_time
+from trunnion.dynamics.measured import figures_in_time
 from trunnion.dynamics.started import FIGURES, NODES, DriveCourse
 from trunnion.model.measure_table import MEASURES
 from trunnion.model.mechanism import Mechanism

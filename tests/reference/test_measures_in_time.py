@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import trunnion
 from timed import LINEAR, slider_crank, two_wheels, wheel
-from trunnion.dynamics.batch import figures_in_time
+from trunnion.dynamics.measured import figures_in_time
 from trunnion.errors import MechanismError
 from trunnion.model.mechanism import Mechanism
 from trunnion.solve.run import prepare
@@ -77,6 +77,18 @@ def test_samples_that_do_not_start_are_outside_every_limit() -> None:
     shares = found["yield"].values
     assert shares[0] == 1.0
     assert shares[1] < 0.7
+
+
+@pytest.mark.slow
+def test_samples_are_the_same_in_any_number_of_processes() -> None:
+    mechanism = stated(
+        wheel(LINEAR),
+        tolerances={"links.wheel.inertia": 0.001},
+        measures={"peak": {"peak_effort": "A", "duration": 0.1}},
+    )
+    one, two = (trunnion.tolerance(mechanism, methods=("monte-carlo",), samples=40, jobs=jobs) for jobs in (1, 2))
+    for name in ("mean", "deviation", "histogram"):
+        np.testing.assert_array_equal(one[name], two[name])
 
 
 def test_a_sweep_has_the_figures_of_each_point() -> None:

@@ -37,8 +37,7 @@ __all__ = ["CompiledClosed", "compiled_closed"]
 def compiled_closed(motion: FreeMotion) -> CompiledClosed | None:
     """The rates as machine code; None where they cannot be."""
     sure = motion.affine and not motion.sticking
-    found = CompiledClosed(motion) if sure and compilable(motion) else None
-    return found if found and found.works(None) else None
+    return CompiledClosed(motion) if sure and compilable(motion) else None
 
 
 class CompiledClosed(CompiledRates):
@@ -58,8 +57,9 @@ class CompiledClosed(CompiledRates):
 
     def touches(self, at: Moment) -> Seen:
         """See `rates.Rigid`; by walks where there is any doubt."""
-        found = self._program("rates", at).run(at)
-        if np.any(found[-1]) or not np.all(np.isfinite(found)):
+        program = self._program("rates", at)
+        found = None if program is None else program.run(at)
+        if found is None or np.any(found[-1]) or not np.all(np.isfinite(found)):
             return self.walks.touches(at)
         return Seen(*found[self.last : -1].reshape(len(Seen._fields), -1, at.q.shape[1]))
 
@@ -67,8 +67,9 @@ class CompiledClosed(CompiledRates):
         """See `rates.Rigid`; by walks where there is any doubt."""
         count, contacts = self.layout.coordinates, len(at.onsets)
         free = at._replace(onsets=(None,) * contacts)
-        found = self._program("linear", free).run(free)[:, 0]
-        if found[-1] or not np.all(np.isfinite(found)):
+        program = self._program("linear", free)
+        found = None if program is None else program.run(free)[:, 0]
+        if found is None or found[-1] or not np.all(np.isfinite(found)):
             return self.walks.linear(at)
         mass, rest = found[: count * count].reshape(count, count).T, found[count * count : -1]
         ways = rest[: 2 * contacts * count].reshape(count, 2 * contacts).T

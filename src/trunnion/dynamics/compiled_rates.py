@@ -37,10 +37,10 @@ __all__ = [
     "Kinds",
     "columns_of",
     "compilable",
-    "compiled_rates",
     "eliminated",
     "errors_of",
     "missing_of",
+    "rates_of",
 ]
 
 Array = NDArray[np.float64]
@@ -53,7 +53,8 @@ TOUCHES, SLIPS, STICKS = 1, 2, 3  # how a contact touches: by a law, or closed b
 TOLD = (TOUCHES, SLIPS)  # of which something is told
 TRIAL = "trial."  # in the path of an acceleration, see `FreeMotion.trial`
 Kinds = tuple[int | None, ...]
-Codes = dict[tuple[Any, ...], "Code"]  # by what it is for, with the numbers that are compiled in
+# by what it is for, with the numbers that are compiled in; None where something cannot be recorded
+Codes = dict[tuple[Any, ...], "Code | None"]
 
 
 def _kind(onset: Onset) -> int | None:
@@ -69,27 +70,22 @@ def _onset(kind: int | None, told: Iterator[Any]) -> Onset:
     return next(told) if kind == TOUCHES else Closed(0) if kind == STICKS else None
 
 
-def compiled_rates(
-    motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()
-) -> CompiledRates | None:
-    """The rates as machine code; None where they cannot be.
-
-    codes: of motions of mechanisms that differ in numbers alone, to be added to; varied: paths of those numbers, none
-    of which is compiled in.
-    """
-    if not compilable(motion):
-        return None
-    rates = CompiledRates(motion, codes, varied)
-    return rates if rates.works() else None
+def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> CompiledRates | Walks:
+    """The rates of a motion: by machine code where they may be, else by walks. codes, varied: see `CompiledRates`."""
+    return CompiledRates(motion, codes, varied) if compilable(motion) else Walks(motion)
 
 
 def compilable(motion: FreeMotion) -> bool:
-    """Whether it may be: without an assembly that is followed."""
+    """Whether its rates may be machine code: without an assembly that is followed."""
     return not motion.followed
 
 
 class CompiledRates:
-    """The rates of `motion`, one program for every set of contacts that touch, senses and switches."""
+    """The rates of `motion`, one program for every set of contacts that touch, senses and switches.
+
+    codes: of motions of mechanisms that differ in numbers alone, to be added to; varied: paths of those numbers, none
+    of which is compiled in. What cannot be recorded is told by walks.
+    """
 
     def __init__(self, motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> None:
         self.motion = motion
@@ -99,36 +95,22 @@ class CompiledRates:
         self.layout = Layout.of(motion)
         self._works = 2 * self.layout.coordinates + self.layout.bristles  # where they begin
         self.last = self._works + len(WORKS) + self.layout.touching  # of the numbers that are integrated
-        self._programs: dict[tuple[Any, ...], Program] = {}
-
-    def works(self, onset: Onset = 1.0) -> bool:
-        """Whether it can be recorded, with all contacts touching."""
-        n, contacts = self.layout.coordinates, len(self.motion.contacts.each)
-        q, rate, integral, bristles = (np.zeros((k, 1)) for k in (n, n, n, self.layout.bristles))
-        senses = (1,) * len(self.motion.resisted)
-        at = Moment(np.zeros(1), q, rate, integral, bristles, onsets=(onset,) * contacts, senses=senses)
-        try:
-            self._program("rates", at)
-        except UntraceableError:
-            return False
-        return True
+        self._programs: dict[tuple[Any, ...], Program | None] = {}
 
     def __call__(self, at: Moment) -> Rates:
         """The rates; one lane."""
-        if 0 in at.senses:
-            return self.walks(at)
-        state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
-        rates = self._program("rates", at).of_row(float(at.time[0]), state, at.onsets, at.sense)
-        if rates[-1] != 0.0 or not math.isfinite(rates.sum()):
-            return self.walks(at)
-        n, memory = 2 * self.layout.coordinates, self._works
-        second, integral, bristles = rates[: n // 2].copy(), rates[n // 2 : n].copy(), rates[n:memory].copy()
-        return Rates(second, integral, bristles, rates[memory : self.last].copy(), True)
+        if program := self._program("rates", at):
+            state = np.concatenate([at.q, at.rate, at.integral, at.bristles])[:, 0]
+            rates = program.of_row(float(at.time[0]), state, at.onsets, at.sense)
+            if rates[-1] == 0.0 and math.isfinite(rates.sum()):
+                n, memory, own = self.layout.coordinates, self._works, rates[: self.last].copy()
+                return Rates(own[:n], own[n : 2 * n], own[2 * n : memory], own[memory:], True)
+        return self.walks(at)
 
     def seconds(self, at: Moment) -> Array:
         """See `Walks.seconds`."""
-        if 0 not in at.senses:
-            numbers = self._program("rates", at).run(at)
+        if program := self._program("rates", at):
+            numbers = program.run(at)
             if np.all(numbers[-1] == 0.0) and np.all(np.isfinite(numbers)):
                 return numbers[: self.layout.coordinates]
         return self.walks.seconds(at)
@@ -137,35 +119,39 @@ class CompiledRates:
         self, time: float, row: Array, onsets: Sequence[Onset], now: float, senses: tuple[int, ...] = ()
     ) -> Array:
         """The derivative of a row, without ado: this is asked for some hundred thousand times. NaN for no answer."""
-        n, found = self.layout.coordinates, np.empty(len(row))
-        if 0 not in senses:
-            rates = self._program_of("rates", onsets, now, senses).of_row(time, row[: self.layout.slip], onsets)
+        if program := self._program_of("rates", onsets, now, senses):
+            n, found = self.layout.coordinates, np.empty(len(row))
+            rates = program.of_row(time, row[: self.layout.slip], onsets)
             found[:n], found[n:] = row[n : 2 * n], rates[: self.last]
             if rates[-1] == 0.0 and math.isfinite(found.sum()):
                 return found
-        at = self.layout.moment(np.array([time]), row[:, None], now=now)
-        at = at._replace(onsets=tuple(onsets), senses=senses)
-        told = self.walks(at)
-        return self.layout.row(row[n : 2 * n], told) if told.sound else np.full(len(row), np.nan)
+        return self.walks.derivative(time, row, onsets, now, senses)
 
     def margins(self, at: Moment) -> Array:
         """See `FreeMotion.margins`, (module, lane)."""
-        found = self._program("margins", at).run(at)
-        return self.walks.margins(at) if np.any(found[-1]) else found[:-1]
+        if program := self._program("margins", at):
+            numbers = program.run(at)
+            if not np.any(numbers[-1]):
+                return numbers[:-1]
+        return self.walks.margins(at)
 
     def look(self, at: Moment) -> Seen:
         """See `rates.Seeing`."""
-        found = self._program("look", at).run(at)
-        if np.any(found[-1]):
-            return self.walks.look(at)
-        return Seen(*found[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
+        if program := self._program("look", at):
+            numbers = program.run(at)
+            if not np.any(numbers[-1]):
+                return Seen(*numbers[:-1].reshape(len(Seen._fields), -1, at.q.shape[1]))
+        return self.walks.look(at)
 
-    def _program(self, what: str, at: Moment) -> Program:
+    def _program(self, what: str, at: Moment) -> Program | None:
         return self._program_of(what, at.onsets, at.now, at.senses if what == "rates" else (), at.slips)
 
     def _program_of(
         self, what: str, onsets: Sequence[Onset], now: float, senses: tuple[int, ...], slips: float = 0.0
-    ) -> Program:
+    ) -> Program | None:
+        """The program; None while a joint sticks, and where something cannot be recorded."""
+        if 0 in senses:
+            return None
         kinds, switches = tuple(map(_kind, onsets)), tuple(one.switches(now) for one in self.motion.drives.values())
         key = what, kinds, switches, senses, slips
         if key not in self._programs:
@@ -173,7 +159,8 @@ class CompiledRates:
             if whole not in self.codes:
                 figures = self.figures(what, kinds)
                 self.codes[whole] = _code(self.motion, figures, kinds, switches, senses, slips, self.constant)
-            self._programs[key] = Program(self.motion, self.codes[whole])
+            code = self.codes[whole]
+            self._programs[key] = None if code is None else Program(self.motion, code)
         return self._programs[key]
 
     def figures(self, what: str, kinds: Kinds) -> Figures:
@@ -198,8 +185,11 @@ class Code(NamedTuple):
 def _code(
     motion: FreeMotion, figures: Figures, kinds: Kinds, switches: Sequence[tuple[bool, bool, bool]],
     senses: tuple[int, ...], slips: float, constant: Mapping[str, Any],
-) -> Code:  # fmt: skip
-    """Record some numbers of a motion, and compile what is recorded. constant: numbers that are compiled in."""
+) -> Code | None:  # fmt: skip
+    """Record some numbers of a motion, and compile what is recorded; None where something cannot be recorded.
+
+    constant: numbers that are compiled in.
+    """
     from trunnion.engines.graph import POSITION, Graph
     from trunnion.engines.machine_code import MachineCode, vector_width
     from trunnion.engines.program import program
@@ -218,9 +208,12 @@ def _code(
     at = Moment(cast("Any", time), q, rate, integral, bristles, onsets=touching, senses=senses, slips=slips)
     if motion.rests:  # also where a speed is lost in rounding, it is known in which sense joints slide
         at = at._replace(sense=cast("Any", np.where(rate[0] != 0.0, np.sign(rate[0]), sense)))
-    bare = _recorded(motion, {**constant, **recorded}, switches)
-    with np.errstate(all="ignore"):
-        *wanted, doubt = [graph.as_float(number_of(graph, one)) for one in figures(bare, at)]
+    try:
+        with np.errstate(all="ignore"):
+            numbers = figures(_recorded(motion, {**constant, **recorded}, switches), at)
+    except UntraceableError:
+        return None
+    *wanted, doubt = [graph.as_float(number_of(graph, one)) for one in numbers]
     for one in graph.doubts:
         doubt = graph.apply("max", doubt, graph.as_float(one))
     outputs = [*wanted, graph.as_float(doubt)]

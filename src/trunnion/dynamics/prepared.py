@@ -1,26 +1,21 @@
-"""What integrates a free motion without play: how its rates are told, and where it stops for a force that jumps."""
+"""What integrates a free motion without play: and where it stops for a force that jumps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.clutch_motion import ClutchMotion
-from trunnion.dynamics.compiled_rates import Codes, CompiledRates, compiled_rates
+from trunnion.dynamics.compiled_rates import CompiledRates
 from trunnion.dynamics.integrate import MOST_EVALUATIONS, Integration
 from trunnion.dynamics.rates import Walks
 from trunnion.dynamics.start import Places, load_times, ranges
 from trunnion.dynamics.state import FreeMotion
 
-__all__ = ["CYCLES", "FINEST", "integration_of", "rates_of"]
+__all__ = ["CYCLES", "FINEST", "integration_of"]
 
 FINEST = 3e-14  # the least relative tolerance of SciPy's integrators
 CYCLES = 10  # of the nominal motion: the duration if none is stated
-
-
-def rates_of(motion: FreeMotion, codes: Codes | None = None, varied: Collection[str] = ()) -> CompiledRates | Walks:
-    """The rates of a motion: by machine code where they can be, else by walks. codes, varied: see `compiled_rates`."""
-    return compiled_rates(motion, codes, varied) or Walks(motion)
 
 
 def integration_of(

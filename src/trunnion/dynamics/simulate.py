@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from trunnion.dynamics.active_motion import ActiveMotion
 from trunnion.dynamics.checks import refuse, refuse_massless, refuse_undetermined
 from trunnion.dynamics.compiled_closed import compiled_closed
+from trunnion.dynamics.compiled_rates import rates_of
 from trunnion.dynamics.filling import Filling
 from trunnion.dynamics.impact_motion import ImpactMotion
 from trunnion.dynamics.integrate import MOST_EVALUATIONS
 from trunnion.dynamics.opened import in_play, is_rigid, opened
-from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of, rates_of
+from trunnion.dynamics.prepared import CYCLES, FINEST, integration_of
 from trunnion.dynamics.rates import Layout, Walks
 from trunnion.dynamics.result import Books, Found, result_of
 from trunnion.dynamics.start import Places, initial_row, load_times, places, ranges

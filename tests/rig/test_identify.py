@@ -470,7 +470,7 @@ def test_a_channel_without_a_course_is_refused(four_bar: trunnion.Mechanism, tor
     data = torque.measured(1)
     course = replace(data.conditions[0].courses["torque"], measures="locking_margin:mechanism")
     odd = Measurement("odd", (replace(data.conditions[0], courses={"torque": course}),))
-    with pytest.raises(MechanismError, match="no one number at each position"):
+    with pytest.raises(MechanismError, match="no number of a single position"):
         identify(four_bar, odd, [FRICTION])
 
 

@@ -34,7 +34,7 @@ from trunnion.rig.identification.result import dataset
 from trunnion.rig.identification.signals import Model, SeatedModel
 from trunnion.rig.identification.uncertainty import excess, spread_of
 from trunnion.rig.identification.unknowns import Parameters, described, unknowns
-from trunnion.rig.modelled import apart, check_settings, refuse_backwards, refuse_unit, told_at
+from trunnion.rig.modelled import apart, check_settings, measure_of, refuse_backwards, refuse_unit
 from trunnion.rig.reading.efficiency import efficiency_of, load_joints, pairs_of
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
@@ -105,7 +105,6 @@ def identify(
     """
     _check(sensors, guard, starts)
     check_settings(mechanism, measurement)
-    measurement = _finite(measurement)
     conditions = measurement.conditions
     paths = described(mechanism, parameters)
     mechanism = _stated(mechanism, measurement, paths, start or {})
@@ -156,18 +155,6 @@ def _check(sensors: str, guard: int | None, starts: int) -> None:
 # ---- the data -------------------------------------------------------------------------------------------------
 
 
-def _finite(measurement: Measurement) -> Measurement:
-    """The measurement with NaN for readings that are infinite."""
-    conditions = []
-    for condition in measurement.conditions:
-        courses = {
-            name: replace(one, turns=np.where(np.isinf(one.turns), np.nan, one.turns))
-            for name, one in condition.courses.items()
-        }
-        conditions.append(replace(condition, courses=courses))
-    return replace(measurement, conditions=tuple(conditions))
-
-
 def _channels(measurement: Measurement, channels: Sequence[str] | None, joints: Mapping[str, str]) -> list[str]:
     """Channels to fit, in the order of the data; all if none is named. MechanismError for one that is not there."""
     every = list(dict.fromkeys(name for one in measurement.conditions for name in one.courses))
@@ -196,7 +183,7 @@ def _blocks(
                 signal, effects = _efficiency(condition, joints)
             if signal is None:
                 continue
-            turns = np.atleast_2d(np.asarray(signal.turns, float))
+            turns = np.where(np.isinf(signal.turns), np.nan, signal.turns)
             fitted = len(turns) - (max(1, round(share * len(turns))) if share else 0)
             if fitted < 1:
                 what = f"has {len(turns)} turn{'s' * (len(turns) != 1)}: none would be left to fit"
@@ -336,18 +323,15 @@ def _settings(
 
 def _measures(mechanism: Mechanism, run: Run, blocks: Sequence[Block]) -> dict[str, Measure]:
     """What each channel measures; MechanismError for what has no course."""
-    texts: dict[str, str] = {}
+    measures: dict[str, Measure] = {}
     for block in blocks:
-        if texts.setdefault(block.channel, block.signal.measures) != block.signal.measures:
-            what = f"measures {texts[block.channel]} in one condition and {block.signal.measures} in another"
-            raise MechanismError(Finding(what, f"channel {block.channel}", "use separate channels"))
-    measures = {name: named(mechanism, [text], run.values)[0] for name, text in texts.items()}
-    for name, measure in measures.items():
-        if not measure.everywhere or not (measure.single(run.system) or measure.kind == EFFICIENCY):
-            what = f"measures {texts[name]}, which is no one number at each position{told_at(measure)}"
-            remedy = "effort:DRIVER, load:LOAD, rate:JOINT or link.point.x is"
-            raise MechanismError(Finding(what, f"channel {name}", remedy))
-        refuse_unit(run, measure, name, next(block.signal for block in blocks if block.channel == name))
+        channel, text = block.channel, block.signal.measures
+        of_turns = channel == EFFICIENCY and block.turns.shape[1] == 1  # one figure of each, made in `_efficiency`
+        measure = named(mechanism, [text], run.values)[0] if of_turns else measure_of(mechanism, run, channel, text)
+        refuse_unit(run, measure, channel, block.signal)
+        if measures.setdefault(channel, measure).name != measure.name:
+            what = f"measures {measures[channel].name} in one condition and {measure.name} in another"
+            raise MechanismError(Finding(what, f"channel {channel}", "use separate channels"))
     return measures
 
 

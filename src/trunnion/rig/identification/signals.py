@@ -27,14 +27,13 @@ from trunnion.solve.status import pose_status, status_of
 from trunnion.solve.switches import Mechanisms, bends
 from trunnion.solve.system import sticking
 
-__all__ = ["ConditionSaid", "Courses", "Model", "Said", "SeatedModel", "said_of"]
+__all__ = ["Courses", "Model", "Said", "SeatedModel"]
 
 Array = NDArray[np.float64]
 AT_ONCE = 20_000  # numbers in an array
 STILL = 1e-9  # of the largest speed in the cycle: rounding, whose sign says nothing
 STEP = 1e-6  # of a driver's number, for what it does to the duration of the cycle
 SEATED = 1e-4  # of an unknown, for derivatives by differences: seats are settled to some 1e-6 of their clearance
-Found = tuple[dict[str, Array], NDArray[np.int8], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -83,15 +82,10 @@ class Model:
 
     def courses(self, at: Array) -> Courses:
         """What the model says at these values of the unknowns, SI."""
-        count = len(self.phases)
-        said: list[Mapping[str, Said]] = [{}] * count
-        status: list[NDArray[np.int8]] = [np.zeros(0, np.int8)] * count
-        turned: list[NDArray[np.bool_]] = [np.zeros(0, bool)] * count
+        rows: dict[int, ConditionSaid] = {}
         for part in self._parts():
-            found = self._batch(part, at)
-            for k, condition in enumerate(part):
-                said[condition], status[condition], turned[condition] = found[k]
-        return Courses(tuple(said), tuple(status), tuple(turned))
+            rows.update(zip(part, self._batch(part, at), strict=True))
+        return Courses(*zip(*(rows[k] for k in range(len(self.phases))), strict=True))
 
     def _parts(self) -> Iterator[list[int]]:
         """Conditions with as many positions as each other, not too many at once."""
@@ -118,7 +112,7 @@ class Model:
         rows: list[ConditionSaid] = []
         for k in range(len(part)):
             own = slice(k * many, (k + 1) * many)
-            said = {name: said_of(number, shape, own) for name, number in courses.items()}
+            said = {name: _rows(number, shape, own) for name, number in courses.items()}
             rows.append((said, np.max(status[own], axis=0), np.any(turned[own], axis=0)))
         return rows
 
@@ -247,9 +241,9 @@ class Model:
         nominal = system.cycle(self.run.values).duration
         return float(cycle.duration * system.cycle(system.mechanism.parameters(overrides)).duration / nominal)
 
-    def _overrides(self, condition: int, at: Array) -> dict[str, Number]:
+    def _overrides(self, condition: int, at: Array) -> dict[str, float]:
         """What a condition sets, and the unknowns."""
-        overrides: dict[str, Number] = dict(self.settings[condition])
+        overrides = dict(self.settings[condition])
         for value, unknown in zip(at, self.unknowns, strict=True):
             overrides.update(dict.fromkeys(unknown.paths, float(value)))
         return overrides
@@ -285,14 +279,11 @@ class Model:
         return Dual(phase * duration, phase * slope)
 
 
-def said_of(number: Number, shape: tuple[int, ...], own: slice) -> Said:
+def _rows(number: Number, shape: tuple[int, ...], own: slice) -> Said:
     """The rows of one condition: the number itself, and one derivative a row."""
-    width = np.shape(primal(number))[-1:] or (1,)
-    full = (shape[0], width[0] if width != (1,) else shape[1])
-    if width == (1,) and np.ndim(primal(number)) == 2 and shape[1] > 1:
-        full = (shape[0], shape[1])
-    value = np.broadcast_to(np.asarray(primal(number), float), full)[own]
-    slope = np.broadcast_to(np.asarray(derivative(number), float), full)[own]
+    value, slope = (
+        np.broadcast_to(np.asarray(part, float), shape)[own] for part in (primal(number), derivative(number))
+    )
     return Said(value[0], slope)
 
 
@@ -305,28 +296,26 @@ class SeatedModel(Model):
 
     def courses(self, at: Array) -> Courses:
         """What the model says at these values of the unknowns, SI."""
-        found = [self._condition(k, at) for k in range(len(self.phases))]
-        said, status, turned = [], [], []
-        for values, codes, senses in found:
-            said.append({name: Said(row, row[None, :].repeat(len(at), 0) * np.nan) for name, row in values.items()})
-            status.append(codes)
-            turned.append(senses)
-        for p, unknown in enumerate(self.unknowns):
-            step = SEATED * (abs(at[p]) or unknown.size or 1.0)
-            low, high = (np.clip(at[p] + sign * step, unknown.lower, unknown.upper) for sign in (-1.0, 1.0))
-            for k in range(len(self.phases)):
-                ends = [self._condition(k, np.where(np.arange(len(at)) == p, end, at))[0] for end in (low, high)]
-                for name, one in said[k].items():
-                    one.slope[p] = (ends[1][name] - ends[0][name]) / (high - low)
-        return Courses(tuple(said), tuple(status), tuple(turned))
+        rows = []
+        for k in range(len(self.phases)):
+            values, status, turned = self._condition(k, at)
+            said = {name: Said(row, np.full((len(at), len(row)), np.nan)) for name, row in values.items()}
+            for p, unknown in enumerate(self.unknowns):
+                step = SEATED * (abs(at[p]) or unknown.size or 1.0)
+                low, high = (float(np.clip(at[p] + way, unknown.lower, unknown.upper)) for way in (-step, step))
+                below, above = (
+                    self._condition(k, np.where(np.arange(len(at)) == p, end, at))[0] for end in (low, high)
+                )
+                for name, one in said.items():
+                    one.slope[p] = (above[name] - below[name]) / (high - low)
+            rows.append((said, status, turned))
+        return Courses(*zip(*rows, strict=True))
 
-    def _condition(self, k: int, at: Array) -> Found:
+    def _condition(self, k: int, at: Array) -> tuple[dict[str, Array], NDArray[np.int8], NDArray[np.bool_]]:
         """One condition: courses, statuses, where a sense changes."""
-        values: dict[str, float | str] = dict(self.settings[k])
-        for value, unknown in zip(at, self.unknowns, strict=True):
-            values.update(dict.fromkeys(unknown.paths, float(value)))
         size = len(self.phases[k])
         try:
+            values: dict[str, float | str] = dict(self._overrides(k, at))
             run = prepare(self.run.system.mechanism.with_values(values))
         except MechanismError:
             lost = dict.fromkeys(self.measures, np.full(size, np.nan))
@@ -334,9 +323,10 @@ class SeatedModel(Model):
         with np.errstate(all="ignore"):
             seated = seating_of(run, self.friction).at(self.phases[k] * run.cycle.duration, self.friction)
             status = status_of(seated.back, (size,))
-            found = {
+            courses = {
                 name: np.array(np.broadcast_to(primal(self._course(measure, seated.back)), (size,)), float)
                 for name, measure in self.measures.items()
             }
             turned = self._turned(seated.back, (size,))
-        return found, np.where(seated.sticks, np.maximum(status, Status.ZERO_SLIP), status).astype(np.int8), turned
+        status = np.where(seated.sticks, np.maximum(status, Status.ZERO_SLIP), status).astype(np.int8)
+        return courses, status, turned

@@ -69,6 +69,11 @@ def test_machine_code_is_what_walks_find(law: str) -> None:
     )
 
 
+def test_near_locking_machine_code_is_what_walks_find() -> None:
+    """Much friction: weighted norms show that there is one solution where the sum of a row does not."""
+    compared(slider_crank(0.8))
+
+
 DRIVES: dict[str, dict[str, Any]] = {
     "constant": {"kind": "constant", "effort": 5.0},
     "geared": {

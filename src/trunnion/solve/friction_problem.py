@@ -25,6 +25,8 @@ from trunnion.joints.pairs import ContactLoad, Reaction
 
 __all__ = ["Contact", "FrictionProblem", "Rubbing", "State", "largest"]
 
+WEIGHTED, LIGHTEST = 6, 1e-3  # norms that are tried; least weight, of the largest row sum
+
 
 class Contact(NamedTuple):
     """A contact with friction in a joint, as its module sees it.
@@ -205,16 +207,24 @@ class FrictionProblem:
         return rows
 
     def bound(self, multiples: Sequence[float] | None = None) -> Number:
-        """Largest row sum of |A| over all reactions: below 1 the solution exists, alone, for any share of friction.
+        """At least a norm of |A| over all reactions: below 1 the solution exists, alone, for any share of friction.
 
+        The largest row sum; where that is not below 1, in norms weighted by rising powers of the sums, which come down
+        to the spectral radius: max (L x)_i/x_i of any x > 0 (L. Collatz, Math. Z. 48 (1942) 221-226).
         multiples: of the friction of each contact, 1 if not given.
         """
         factors = multiples or [1.0] * len(self.contacts)
         rows = [
-            np.abs(factor * contact.slope) * functools.reduce(operator.add, map(contact.load.bound, felt.columns))
+            [np.abs(factor * contact.slope) * contact.load.bound(column) for column in felt.columns]
             for contact, factor, felt in zip(self.contacts, factors, self.felt, strict=True)
         ]
-        return largest(rows)
+        sums = [functools.reduce(operator.add, row) for row in rows]
+        plain = bound = largest(sums)
+        for _ in range(WEIGHTED if len(rows) > 1 and np.any(plain >= 1.0) else 0):
+            weights = [total + LIGHTEST * plain for total in sums]
+            sums = [weighted(row, weights) for row in rows]
+            bound = np.minimum(bound, largest([a / b for a, b in zip(sums, weights, strict=True)]))
+        return np.where(plain >= 1.0, bound, plain)
 
 
 def largest(values: Sequence[Number]) -> Number:

@@ -27,6 +27,7 @@ __all__ = ["connected"]
 
 CONNECT = 10  # s to reach the scheduler
 ARRIVE = 60  # s for the first worker to be there
+RESTARTED = 10  # s for one that died to be there again
 LOST = "start it again: with a --checkpoint, the blocks that are done are not done again"
 
 
@@ -61,6 +62,8 @@ def connected(address: str, jobs: int) -> Iterator[tuple[Executor, int]]:
             if client.status == "running":
                 with suppress(OSError, TimeoutError):
                     executor.shutdown(wait=False)
+                    if address == "local":  # a worker that is being started again while the cluster closes complains
+                        client.wait_for_workers(jobs, timeout=RESTARTED)
 
 
 def _versions() -> dict[str, str]:

@@ -1,0 +1,17 @@
+"""Random mechanisms that are let go, against SciPy on the equations of all their links with multipliers."""
+
+from __future__ import annotations
+
+import pytest
+from benchmarks.free_motions import LIMIT, examine
+
+SEEDS = (1, 2, 12, 5, 10, 24, 34)
+
+
+@pytest.mark.spread(3, "1", "2", "12")
+@pytest.mark.parametrize("seed", SEEDS)
+def test_they_move_as_all_their_links_must(seed: int) -> None:
+    """Gravity, forces, springs, dampers, and friction in pins and guides by its law from the multipliers."""
+    what, off = examine(seed)
+    assert what.startswith("compared")
+    assert off < LIMIT

@@ -147,8 +147,7 @@ def parse(text: str) -> Expression:
         whole, over, under, unit_text = fraction.groups()
         literal(under, unit_text)  # UnitError for what is no unit
         size = int(whole or 0) + int(over) / int(under)
-        remedy = f"write {size:.12g} {unit_text}, or {over}/({under} {unit_text})"
-        raise UnitError(f"'{text}' divides by {under} {unit_text}", remedy)
+        raise UnitError(f"'{text}' divides by {under} {unit_text}", f"write {size:.12g} {unit_text}")
     source, operands = _tokens(normalise(text))
     try:
         tree = ast.parse(source, mode="eval").body

@@ -318,8 +318,7 @@ def unit(text: str) -> tuple[Fraction, Dimension]:
     try:
         factor, exponents, names = root(text)
     except UnitError as error:  # in a model the word may be a dimension's name
-        near = error.remedy.startswith("did you mean")
-        raise UnitError(error.what, f"{error.remedy} ({_PRODUCT})" if near else error.remedy or _PRODUCT) from None
+        raise UnitError(error.what, error.remedy or _PRODUCT) from None
     if exponents.keys() - set(BASES[:4]):
         raise UnitError(f"the unit '{text}' is not one of mechanics", "use units of length, mass, time and angle")
     length, mass, time, angle = (exponents.get(base, Fraction(0)) for base in BASES[:4])

@@ -195,18 +195,43 @@ def test_a_falling_slider_bounces_ever_lower_and_comes_to_rest(restitution: floa
     assert not codes(result)
 
 
+def with_friction_elsewhere(own: float, names: str = "OA", **more: Any) -> Mechanism:
+    """The guide with friction of its own in the contacts, and more of the pins of some names."""
+    data = {key: part for key, part in guide(own).data().items() if part and key not in ("trunnion", "space")}
+    joints = {name: dict(one) for name, one in data["joints"].items()}
+    for name in names:
+        joints[name] |= more
+    return Mechanism(**{**data, "joints": joints})
+
+
 @pytest.mark.slow
 def test_friction_of_other_joints_beside_rigid_impacts() -> None:
     """Coulomb's, at rest and sliding: the account is right, and less of the speed is left than without."""
-    data = {key: part for key, part in guide().data().items() if part and key not in ("trunnion", "space")}
-    joints = {name: dict(one) for name, one in data["joints"].items()}
-    for name in ("O", "A"):
-        joints[name] |= {"pin": {"radius": 0.01}, "friction": 0.3}
-    found, bare = (simulate(model, 6e-3, 6) for model in (Mechanism(**{**data, "joints": joints}), guide()))
+    pins = {"pin": {"radius": 0.01}, "friction": 0.3}
+    found, bare = (simulate(model, 6e-3, 6) for model in (with_friction_elsewhere(0.0, **pins), guide(0.0)))
     assert {of for kind, of, *_ in attribute(found, "events") if kind == "impact"} >= {"S.1", "S.2"}
     assert float(found["work_friction"][-1]) > 0
     assert abs(found["drive_rate"].values[0, -1]) < abs(bare["drive_rate"].values[0, -1])
     assert balanced(found)
+
+
+def test_an_impact_that_closes_a_contact_tears_a_joint_loose() -> None:
+    """The crank sticks until the slider, which falls, has landed; nothing of its energy is lost but in friction."""
+    data = with_friction_elsewhere(0.0, "O", losses={"constant": 0.5}).data()
+    data["joints"]["S"]["contact"]["restitution"] = 0.0
+    data["drivers"]["O"]["initial"] = {"coordinate": 0.5, "speed": 0.0}
+    found = simulate(Mechanism(**data), 0.0165, 2)
+    kinds = [kind for kind, *_ in attribute(found, "events")]
+    assert kinds == ["stick", "impact", "impact", "break-away", "closes", "closes", "stick"]
+    assert balanced(found)
+
+
+def test_friction_in_contacts_and_what_may_hold_a_joint_are_refused_together() -> None:
+    """At rest both could take the load, and how they share it is not solved."""
+    with pytest.raises(MechanismError) as caught:
+        simulate(with_friction_elsewhere(0.01, losses={"constant": 0.5}), 1e-3)
+    assert {one.where for one in caught.value.findings} == {"joints.O.losses.constant", "joints.A.losses.constant"}
+    assert "beside friction between rigid bodies in S" in caught.value.findings[0].what
 
 
 # ---- closed, stuck and jammed -----------------------------------------------------------------------------------

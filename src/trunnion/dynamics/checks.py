@@ -116,11 +116,18 @@ def _findings(mechanism: Mechanism) -> Iterator[Finding]:
         return
     yield from _clutches(mechanism, free)
     yield from _contacts(mechanism, playing)
+    rough = _rough(mechanism)
     for where, joint, what in _resisting(mechanism, free):
         if joint in playing:
             yield Finding(
                 f"{what} joint {joint}, which is in play", where, "remove it, or let another joint be in play"
             )
+        elif rough:
+            why = f"{what} joint {joint} beside friction between rigid bodies in {rough}; how they share is not solved"
+            remedy = (
+                f"leave out the friction in {rough}, use another law of contact, or one here that is smooth at rest"
+            )
+            yield Finding(why, where, remedy)
         elif PAIRS[mechanism.effective_joints[joint].type].count != 1:
             why = f"{what} joint {joint}, which has more than one freedom, and {len(free)} coordinates are free"
             remedy = f"use a law that is smooth at rest: {', '.join(_smooth())}; or one free driver"
@@ -137,6 +144,16 @@ def _clutches(mechanism: Mechanism, free: list[str]) -> Iterator[Finding]:
         if motor is not None and motor.clutch is not None:
             what = f"a clutch that may slip is solved with one free coordinate, and {beside}"
             yield Finding(what, f"drivers.{name}.motor.clutch", remedy)
+
+
+def _rough(mechanism: Mechanism) -> str:
+    """A joint in play between rigid bodies with friction; empty without one."""
+    values = mechanism.parameter_set.nominal
+    for name, joint in mechanism.effective_joints.items():
+        rigid = joint.contact is not None and joint.contact.of.rigid
+        if rigid and values.get(f"joints.{name}.friction.coefficient", 0.0) != 0.0:
+            return name
+    return ""
 
 
 def _smooth() -> list[str]:

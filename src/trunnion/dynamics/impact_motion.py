@@ -229,10 +229,10 @@ class ImpactMotion(ActiveMotion):
                 self.impacts.append(Impact(label, time, time, approach, rate, np.nan, 0.0, wear, normal))
                 self._say(time, "impact", k, approach)
         self._set({k: closed.get(k) for k in places})
-        self._project(time, row, places)
-        self.pauses = dict(pauses)
         if self.senses:
             self._torn(time, row)
+        self._project(time, row, places)
+        self.pauses = dict(pauses)
 
     def _torn(self, time: float, row: Array) -> None:
         """Joints that stuck until an impact slide on with the speeds that it leaves them."""

@@ -23,6 +23,14 @@ def test_moments_are_those_of_scipy(middle: float) -> None:
         assert found.kurtosis[i] == pytest.approx(stats.kurtosis(x, fisher=False), rel=1e-8)
 
 
+@pytest.mark.parametrize("size", [1e-150, 1e150])
+def test_powers_stay_within_the_floats(size: float) -> None:
+    values = np.random.default_rng(5).gamma(2.0, size=(1, 200))
+    plain, scaled = moments_of(values), moments_of(size * values)
+    np.testing.assert_allclose(scaled.deviation / size, plain.deviation, rtol=1e-12)
+    np.testing.assert_allclose(scaled[3:], plain[3:], rtol=1e-9)
+
+
 def test_what_does_not_exist_is_nan() -> None:
     found = moments_of(np.array([[np.nan, np.nan], [np.nan, 2.0], [2.0, 2.0], [np.inf, 1.0]]))
     np.testing.assert_array_equal(found.number, [0, 1, 2, 2])

@@ -29,7 +29,6 @@ from trunnion.dynamics.touching import Closed, Onset
 __all__ = ["ImpactMotion"]
 
 Array = NDArray[np.float64]
-Onsets = tuple[Onset, ...]
 
 LOW, ROUNDED = 1e-11, 1e-14  # of the clearance, of the size: a rebound as low is none
 MEET = 1e-8  # of the clearance: gaps that differ by less close at one time, as far as the integration can tell

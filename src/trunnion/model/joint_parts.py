@@ -166,9 +166,7 @@ class Contact(Part):
     the pin if not stated); exponent: n. With law: rigid the restitution alone.
     """
 
-    law: Annotated[
-        str, _check_contact, _schema_contact, Selects("contact law", CONTACT_LAWS, {"restitution": "0.8"})
-    ] = "restitution"
+    law: Annotated[str, _check_contact, _schema_contact, LAW] = "restitution"
     restitution: Dimensionless | None = None
     stiffness: Annotated[AnyQuantity | None, Positive] = None
     exponent: Annotated[Dimensionless | None, Within(1, 10)] = None

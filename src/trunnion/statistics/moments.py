@@ -15,7 +15,8 @@ Floats = NDArray[np.float64]
 class Moments(NamedTuple):
     """Number of values, mean, standard deviation by n − 1, skewness and kurtosis (3 of a normal distribution).
 
-    Those that do not exist are NaN: the deviation of one value, skewness and kurtosis where nothing varies.
+    Those that do not exist are NaN: the deviation of one value, skewness and kurtosis where nothing varies, and all but
+    the mean, which is infinite, of values some of which are.
     """
 
     number: Floats
@@ -36,13 +37,15 @@ def _moments_of(values: Floats) -> tuple[float, ...]:
     if not number:
         return 0.0, np.nan, np.nan, np.nan, np.nan
     with np.errstate(all="ignore"):
-        mean = float(np.mean(values))
+        mean = np.mean(values)
         apart = values - mean
         if np.isfinite(mean):
-            mean += float(np.mean(apart))  # what rounding left in the mean
+            mean += np.mean(apart)  # what rounding left in the mean
             apart = values - mean
-        square = apart * apart
-        second, third, fourth = (float(np.mean(one)) for one in (square, square * apart, square * square))
-    deviation = np.sqrt(second * number / (number - 1)) if number > 1 else np.nan
-    shape = (third / second**1.5, fourth / second**2) if second > 0 else (np.nan, np.nan)
-    return float(number), mean, float(deviation), *shape
+        size = np.max(np.abs(apart))
+        scaled = apart / size if size > 0.0 else apart  # so that no power leaves the range of floats
+        square = scaled * scaled
+        second, third, fourth = (np.mean(one) for one in (square, square * scaled, square * square))
+        deviation = size * np.sqrt(second * number / (number - 1)) if number > 1 else np.nan
+        shape = (third / second**1.5, fourth / second**2) if second > 0 else (np.nan, np.nan)
+    return float(number), float(mean), float(deviation), *map(float, shape)

@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-__all__ = ["MOST_DIMENSIONS", "MOST_POINTS", "SobolStream", "correlated", "factor", "mixed", "uniforms"]
+__all__ = ["MOST_POINTS", "SobolStream", "correlated", "factor", "mixed", "uniforms"]
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
 
-MOST_DIMENSIONS = 21201
-"""Dimensions for which Joe and Kuo give direction numbers."""
 MOST_POINTS = 1 << 32
 """Points of one Sobol sequence."""
 _BITS = 52

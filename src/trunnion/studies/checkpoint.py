@@ -31,6 +31,7 @@ __all__ = ["Checkpoint", "settings"]
 HEAD = struct.Struct("<4sQI")  # of a record: mark, length, CRC-32
 MARK = b"trnc"
 BLOCK = "block number"  # its name among the arrays of a part
+SHORT = 1 << 20  # bytes, which what is said of a job never has
 
 
 class Checkpoint:
@@ -80,12 +81,14 @@ class Checkpoint:
     def _open(self, path: Path, job: Job) -> None:
         """Read the file and go on at its end, or begin it. MechanismError if it is of another job, or no checkpoint."""
         try:
-            self._file = path.open("r+b" if path.exists() else "x+b", buffering=0)
+            self._file = path.open("a+b", buffering=0)
+            self._file.seek(0)
             records = _records(self._file)
-            if not path.stat().st_size:
+            head = next(records, None)
+            if head is None and _begun(self._file):
+                self._file.truncate(0)
                 self._write(json.dumps(settings(job)).encode())
                 return
-            head = next(records, None)
             if head is None:
                 remedy = "name the file that the run was begun with, or another for a new run"
                 raise MechanismError(Finding("is no checkpoint", str(path), remedy))
@@ -98,8 +101,7 @@ class Checkpoint:
                     part = dict(file)
                 self.parts[int(part.pop(BLOCK))] = part
                 end = self._file.tell()
-            self._file.seek(end)
-            self._file.truncate()
+            self._file.truncate(end)
         except OSError as error:
             what = f"cannot be used as a checkpoint: {error.strerror or error}"
             raise MechanismError(Finding(what, str(path), "name another file")) from None
@@ -113,6 +115,16 @@ def _records(file: FileIO) -> Iterator[bytes]:
         if len(raw) != length or zlib.crc32(raw) != check:
             return
         yield raw
+
+
+def _begun(file: FileIO) -> bool:
+    """Whether a file holds nothing, or the beginning of its first record and no more."""
+    file.seek(0)
+    head, size = file.read(HEAD.size), os.fstat(file.fileno()).st_size
+    if len(head) < HEAD.size:
+        return head[: len(MARK)] == MARK[: len(head)]
+    mark, length, _ = HEAD.unpack(head)
+    return bool(mark == MARK and size < HEAD.size + length < SHORT)
 
 
 def settings(job: Job) -> dict[str, Any]:
@@ -139,5 +151,6 @@ def _differences(before: Mapping[str, Any], job: Job) -> str:
     for key in sorted({*before, *now}):
         if before.get(key) != now.get(key):
             several = isinstance(identity.get(key), (Mapping, list, tuple, np.ndarray))
-            texts.append(f"{key} differs" if several else f"{key} is {before.get(key)} there and {now.get(key)} here")
+            other = f"{key} not the same"
+            texts.append(other if several else f"{key} is {before.get(key)} there and {now.get(key)} here")
     return "; ".join(texts)

@@ -16,6 +16,7 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from rich.console import Console
 from scipy.integrate import solve_ivp
 
@@ -24,7 +25,7 @@ from benchmarks.drawn.planar import drawn
 from benchmarks.judged.planar import cross, quarter, turned
 from benchmarks.judged.verdict import Array, Data, friction_of, slope
 
-LIMIT = 1e-6  # of the size of the mechanism, and of its largest speed
+LIMIT = 1e-6  # rad, and of the largest rate
 TOLERANCE = 1e-10
 STEPS = 60
 ROUNDS = 60  # of friction and multipliers at one moment
@@ -240,36 +241,28 @@ class AllLinks:
         return np.full(count, np.nan)
 
 
-def examine(seed: int) -> tuple[str, float]:
-    """What a seed came to, and the largest difference: of places by the mechanism's size, of speeds by the largest."""
-    data = free(seed)
-    if data is None:
-        return "not of these equations", 0.0
-    ((name, driver),) = data["drivers"].items()
-    speed, duration = float(driver["initial"]["speed"]), 2.0 / abs(float(driver["speed"]))
-    try:
-        mechanism = trunnion.Mechanism(**data)
-        first = trunnion.simulate(mechanism, duration * 1e-3, 1, tolerance=TOLERANCE)
-    except trunnion.MechanismError as error:
-        return f"refused: {error.findings[0].what}"[:60], 0.0
-    places = {link: next(iter(data["links"][link]["points"])) for link in data["links"] if link != "ground"}
-    angle = {link: float(first["link_angle"].sel(link=link)[0]) for link in places}
+def _posed(data: Data, result: xr.Dataset) -> AllLinks:
+    """The equations in the pose in which a result begins."""
     pose = {}
-    for link, point in places.items():
-        stated = data["links"][link]["points"][point]
-        local = np.asarray(stated["at"] if isinstance(stated, dict) else stated, float)
-        at = first["point_position"].sel(point=f"{link}.{point}").values[..., 0]
-        pose[link] = np.ravel(at)[:2] - turned(angle[link], local), angle[link]
-    system = AllLinks(data, pose)
-    x, count = system.begin, len(system.begin)
-    jacobian = system.joints(x, np.zeros(count))[0]
-    one, two = data["joints"][name]["links"]
+    for link in data["links"]:
+        if link != "ground":
+            point, stated = next(iter(data["links"][link]["points"].items()))
+            local = np.asarray(stated["at"] if isinstance(stated, dict) else stated, float)
+            angle = float(result["link_angle"].sel(link=link)[0])
+            at = np.ravel(result["point_position"].sel(point=f"{link}.{point}").values[..., 0])[:2]
+            pose[link] = at - turned(angle, local), angle
+    return AllLinks(data, pose)
+
+
+def _integrated(system: AllLinks, name: str, speed: float, duration: float) -> Any:
+    """SciPy's solution, to where the crank comes to rest at most; TimeoutError for a stiff motion."""
+    x, count, evaluations = system.begin, len(system.begin), itertools.count()
+    one, two = system.data["joints"][name]["links"]
     drive = np.zeros(count)
     system.put(drive, two, np.array([0.0, 0.0, 1.0]))
     system.put(drive, one, np.array([0.0, 0.0, -1.0]))
+    jacobian = system.joints(x, np.zeros(count))[0]
     v, *_ = np.linalg.lstsq(np.vstack([jacobian, drive]), np.append(np.zeros(len(jacobian)), speed), rcond=None)
-
-    evaluations = itertools.count()
 
     def derivative(_: float, row: Array) -> Array:
         if next(evaluations) > MOST:
@@ -280,29 +273,50 @@ def examine(seed: int) -> tuple[str, float]:
         return float(drive @ row[count:]) * np.sign(speed)
 
     rate.terminal = True  # type: ignore[attr-defined]
-    row, allowed = np.concatenate([x, v]), np.concatenate([np.abs(x) + 1e-3, np.abs(v) + 1e-3])
-    options: Any = {"rtol": TOLERANCE, "atol": TOLERANCE * allowed, "events": rate, "dense_output": True}
+    allowed = TOLERANCE * np.concatenate([np.abs(x) + 1e-3, np.abs(v) + 1e-3])
+    options: Any = {"rtol": TOLERANCE, "atol": allowed, "events": rate, "dense_output": True}
+    with np.errstate(all="ignore"):
+        return solve_ivp(derivative, (0.0, duration), np.concatenate([x, v]), "DOP853", **options)
+
+
+def _off(system: AllLinks, solution: Any, result: xr.Dataset) -> float:
+    """The largest difference of angles, rad, and of rates by the largest rate, as far as the result goes."""
+    rows, count, worst = solution.sol(result["time"].values), len(system.begin), 0.0
+    solved = np.isfinite(result["link_angle"].values[0])
+    most = float(np.max(np.abs(rows[count + 2 :: 3])))
+    for k, link in enumerate(system.links):
+        turn = np.angle(np.exp(1j * (result["link_angle"].sel(link=link).values - rows[3 * k + 2])))
+        spin = (result["link_angle_velocity"].sel(link=link).values - rows[count + 3 * k + 2]) / most
+        worst = max(worst, float(np.max(np.abs(turn[solved]))), float(np.max(np.abs(spin[solved]))))
+    return worst
+
+
+def examine(seed: int) -> tuple[str, float]:
+    """What a seed came to, and the largest difference: see `_off`."""
+    data = free(seed)
+    if data is None:
+        return "not of these equations", 0.0
+    ((name, driver),) = data["drivers"].items()
+    duration = 2.0 / abs(float(driver["speed"]))
     try:
-        with np.errstate(all="ignore"):
-            own = solve_ivp(derivative, (0.0, duration), row, "DOP853", **options)
-    except TimeoutError:
-        return "stiff", 0.0
+        mechanism = trunnion.Mechanism(**data)
+        first = trunnion.simulate(mechanism, duration * 1e-3, 1, tolerance=TOLERANCE)
+        if not np.all(np.isfinite(first["link_angle"].values[:, 0])):
+            return "does not begin: " + ", ".join(one.code for one in first.trunnion.findings), 0.0
+        system = _posed(data, first)
+        own = _integrated(system, name, float(driver["initial"]["speed"]), duration)
+    except trunnion.MechanismError as error:
+        return f"refused: {error.findings[0].what}"[:60], 0.0
+    except (TimeoutError, np.linalg.LinAlgError):
+        return "stiff, or friction and multipliers do not settle", 0.0
     end = 0.9 * own.t[-1]
     if not end > 1e-3 * duration:
         return "ends at once", 0.0
     found = trunnion.simulate(mechanism, end, STEPS, tolerance=TOLERANCE)
-    rows = own.sol(found["time"].values)
     solved = np.isfinite(found["link_angle"].values[0])
     if not np.any(solved[1:]):
         return "ends at once", 0.0
-    worst = 0.0
-    for link in places:
-        i = 3 * system.links.index(link)
-        turn = np.abs(np.angle(np.exp(1j * (found["link_angle"].sel(link=link).values - rows[i + 2]))))
-        spin = np.abs(found["link_angle_velocity"].sel(link=link).values - rows[count + i + 2])
-        most = float(np.max(np.abs(rows[count + 2 :: 3])))
-        worst = max(worst, float(np.max(turn[solved])), float(np.max(spin[solved])) / most)
-    return ("compared" if np.all(solved) else "compared up to its end"), worst
+    return "compared" if np.all(solved) else "compared up to its end", _off(system, own, found)
 
 
 def main() -> int:

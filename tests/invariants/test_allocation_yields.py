@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from trunnion.errors import Severity
+from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution, Option
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contribution
 from trunnion.studies.allocation.solve import Choice, solve
 from trunnion.studies.allocation.yields import Verify, normal_yield
 
@@ -42,7 +43,11 @@ def press(room: float, discrete: bool = False) -> AllocationProblem:
 def _play(discrete: bool) -> Contribution:
     if not discrete:
         return Contribution("play", cost=Cost("power", {"B": 0.8, "k": 0.6, "unit": 1.0}), least=0.01, most=0.06)
-    options = (Option("fine", 0.015, 14.0), Option("usual", 0.025, 8.0), Option("coarse", 0.045, 5.0))
+    options = (
+        ProcessChoice("fine", 0.015, 14.0),
+        ProcessChoice("usual", 0.025, 8.0),
+        ProcessChoice("coarse", 0.045, 5.0),
+    )
     return Contribution("play", options=options)
 
 

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trunnion.model.tolerances import ProcessChoice
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, Option, RowEffects
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, RowEffects
 
 Array = NDArray[np.float64]
 FOUR_BAR = (100.0, 30.0, 90.0, 70.0)  # ground, crank, coupler, rocker, mm
@@ -67,7 +68,7 @@ def random_costs(rng: np.random.Generator, count: int) -> list[Cost]:
     ]
 
 
-def random_options(rng: np.random.Generator, count: int) -> tuple[Option, ...]:
+def random_options(rng: np.random.Generator, count: int) -> tuple[ProcessChoice, ...]:
     """Processes: the narrower, the dearer."""
     widths, prices = np.sort(rng.uniform(0.01, 0.1, count)), np.sort(rng.uniform(1, 20, count))[::-1]
-    return tuple(Option(f"p{k}", t, c) for k, (t, c) in enumerate(zip(widths, prices, strict=True)))
+    return tuple(ProcessChoice(f"p{k}", t, c) for k, (t, c) in enumerate(zip(widths, prices, strict=True)))

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from allocations import random_costs, random_options, rows
 
-from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion, Option
+from trunnion.model.tolerances import ProcessChoice
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution, Criterion
 from trunnion.studies.allocation.solve import solve
 
 
@@ -70,8 +71,8 @@ def test_a_mixture_equals_the_best_of_all_choices(criterion: Criterion, seed: in
 
 
 def test_a_group_takes_the_option_of_one_name() -> None:
-    grades = (Option("IT7", 0.01, 9.0), Option("IT8", 0.02, 5.0), Option("IT9", 0.03, 2.0))
-    larger = tuple(Option(one.name, 1.5 * one.tolerance, one.cost + 1) for one in grades)
+    grades = (ProcessChoice("IT7", 0.01, 9.0), ProcessChoice("IT8", 0.02, 5.0), ProcessChoice("IT9", 0.03, 2.0))
+    larger = tuple(ProcessChoice(one.name, 1.5 * one.tolerance, one.cost + 1) for one in grades)
     parts = (Contribution("a", options=grades, group="g"), Contribution("b", options=larger, group="g"))
     answer = solve(AllocationProblem(parts, rows(np.ones((1, 2)), 0.05)), "discrete")
     assert answer.choices == {"a": "IT8", "b": "IT8"}
@@ -80,7 +81,7 @@ def test_a_group_takes_the_option_of_one_name() -> None:
 
 
 def test_no_choice_says_what_the_finest_take() -> None:
-    parts = (Contribution("a", options=(Option("fine", 0.01, 9.0), Option("rough", 0.1, 1.0))),)
+    parts = (Contribution("a", options=(ProcessChoice("fine", 0.01, 9.0), ProcessChoice("rough", 0.1, 1.0))),)
     answer = solve(AllocationProblem(parts, rows(np.ones((1, 1)), 0.005)), "discrete")
     assert not answer.found
     assert "+0.01, 2 times the limit" in str(answer.findings[0])

@@ -28,7 +28,6 @@ from trunnion.studies.allocation.problem import (
     Answer,
     Contribution,
     Criterion,
-    Option,
     none,
 )
 from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
@@ -256,8 +255,7 @@ def _contributions(found: ToleranceStudy, prices: Mapping[str, Price]) -> tuple[
 
 def _contribution(one: Price) -> Contribution:
     cost = Cost(one.model, one.parameters) if one.model else None
-    options = tuple(Option(each.name, each.tolerance, each.cost) for each in one.choices)
-    return Contribution(one.path, 0.0, cost, options, one.group, one.least, one.most)
+    return Contribution(one.path, 0.0, cost, one.choices, one.group, one.least, one.most)
 
 
 # ---- rounds ---------------------------------------------------------------------------------------------------

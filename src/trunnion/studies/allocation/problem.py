@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from trunnion.errors import Finding, MechanismError, agreeing
+from trunnion.model.tolerances import ProcessChoice
 from trunnion.results.quantities import drawn_in, signed
 from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import Cost
@@ -31,7 +32,6 @@ __all__ = [
     "Answer",
     "Contribution",
     "Criterion",
-    "Option",
     "RowEffects",
     "SampledYield",
     "Trial",
@@ -42,15 +42,6 @@ Criterion = Literal["worst-case", "rss", "yield"]
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
 PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
-
-
-@dataclass(frozen=True)
-class Option:
-    """One process that a tolerance can be made by: the half width t it holds, m or rad, and what it costs."""
-
-    name: str
-    tolerance: float
-    cost: float
 
 
 @dataclass(frozen=True)
@@ -65,7 +56,7 @@ class Contribution:
     name: str
     value: float = 0.0
     cost: Cost | None = None
-    options: tuple[Option, ...] = ()
+    options: tuple[ProcessChoice, ...] = ()
     group: str = ""
     least: float = 0.0
     most: float = np.inf
@@ -287,7 +278,7 @@ class Answer:
         return f"cost {self.cost:.8g}, {word} (lower bound {self.bound:.8g}, gap {self.gap:.1e})"
 
 
-def common_options(members: Sequence[Contribution]) -> dict[str, list[Option]]:
+def common_options(members: Sequence[Contribution]) -> dict[str, list[ProcessChoice]]:
     """Options by name that all members of a group have within the bounds of all, one for each member."""
     least, most = max(one.least for one in members), min(one.most for one in members)
     fit = [{each.name: each for each in one.options if least <= each.tolerance <= most} for one in members]

@@ -323,3 +323,36 @@ def test_a_table_over_time_by_the_time_of_a_turn(tmp_path: Path) -> None:
     (tmp_path / "gas.csv").write_text(points.format(end=41), encoding="utf-8")
     path.write_text(path.read_text("utf-8").replace(over, f"{over}, period: 41 ms"), encoding="utf-8")
     assert read_mechanism(path)
+
+
+# ---- files with more columns ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("names", ["[pressure, turn]", "[turn, pressure]", "['turn [deg]', pressure]"])
+def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Path) -> None:
+    """In any order of the file, with and without the unit; a text in a third column does not matter."""
+    rows = [line.split(";") for line in CSV.splitlines()[1:]]
+    text = "note;pressure [bar];turn [deg]\n" + "".join(f"x;{value};{place}\n" for place, value in rows)
+    path = model(tmp_path, f"file: gas.csv, columns: {names}", text)
+    if names.startswith("[pressure"):
+        assert "its unit is that of a pressure" in "\n".join(refused(path))
+        return
+    found = read_mechanism(path)
+    assert found == read_mechanism(EXAMPLE)
+    changed = found.with_values({"tables.pressure.points.2.value": 1.0e5})
+    rewrite_mechanism(changed, path, tmp_path / "again.yaml")
+    assert "columns" not in (tmp_path / "again.yaml").read_text("utf-8")
+    assert read_mechanism(tmp_path / "again.yaml") == changed
+
+
+@pytest.mark.parametrize(
+    ("stated", "text", "words"),
+    [
+        ("file: gas.csv, columns: [angle, pressur]", CSV, "gas.csv:1: error: has no column 'pressur'"),
+        ("file: gas.csv, columns: [a, p]", "a;p;p\n0;1;1\n1;2;2\n", "has 2 columns 'p'"),
+        ("file: gas.csv, columns: [angle]", CSV, "tables.pressure.columns"),
+        ("points: [[0 deg, 1 bar], [90 deg, 2 bar]], columns: [angle, pressure]", None, "has no effect without file"),
+    ],
+)
+def test_columns_that_are_not_there(stated: str, text: str | None, words: str, tmp_path: Path) -> None:
+    assert words in "\n".join(refused(model(tmp_path, stated, text)))

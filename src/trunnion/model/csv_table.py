@@ -5,7 +5,7 @@ A model may name a file in its own folder only, see `text.in_folder`.
 Two columns, first time or drive coordinate, then value; separated by semicolon, tab or comma, the first of these that
 the first line has. With semicolon or tab a number may have a decimal comma. A first row of texts is a header, whose
 units stand in brackets: `time [ms], angle [deg]`; numbers without a unit are SI. Empty lines and lines with # are
-passed over.
+passed over. Of a file with more columns a model names two by their headers, see `_named_columns`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from trunnion.joints.pairs import PAIRS
 from trunnion.model.expression import literal
 from trunnion.model.names import nearest
 from trunnion.model.quantity import Quantity
-from trunnion.model.text import MOST_FILES, in_folder, read_text, stated_files
+from trunnion.model.text import MOST_FILES, OF_A_FILE, in_folder, read_text, stated_files
 from trunnion.model.units import ANY, KINDS, Kind, UnitError, dimension_text, unit
 
 __all__ = ["TableFiles", "TablePoints", "column", "place_findings", "with_own_points", "with_points"]
@@ -75,7 +75,7 @@ def with_points(data: Mapping[str, Any], files: TableFiles) -> tuple[dict[str, A
 def _put(data: dict[str, Any], section: str, key: str, points: TablePoints) -> None:
     """Points in place of those that a driver or table states, or of the file that it names."""
     entry = data[section][key]
-    kept = {one: value for one, value in entry.items() if one != "file"} if isinstance(entry, Mapping) else {}
+    kept = {key: value for key, value in entry.items() if key not in OF_A_FILE} if isinstance(entry, Mapping) else {}
     if section == "drivers" and kept.get("law") != "table":
         kept = {"law": "table"}
     data[section] = {**data[section], key: {**kept, "points": points.rows}}
@@ -90,7 +90,11 @@ def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any
     findings: list[Finding] = []
     size = rows = 0
     for count, (section, key, name) in enumerate(stated_files(data), start=1):
-        where = f"{section}.{key}"
+        where, names = f"{section}.{key}", data[section][key].get("columns")
+        if names is not None and not (isinstance(names, list) and list(map(type, names)) == [str, str]):
+            what = "is not the headers of two columns"
+            findings.append(Finding(what, f"{where}.columns", "write two texts: columns: [time, pressure]"))
+            continue
         if count > MOST_FILES:
             what = f"the model names more than {MOST_FILES} files"
             findings.append(Finding(what, f"{where}.file", "state some of the points in the model"))
@@ -109,7 +113,7 @@ def with_own_points(data: Mapping[str, Any], model: Path) -> tuple[dict[str, Any
                     Finding(what, f"{where}.file", "use fewer points: values between them are interpolated")
                 )
                 break
-            points = _points(path, f"{where}.points", _kinds(data, section, key), str(model.parent / name))
+            points = _points(path, f"{where}.points", _kinds(data, section, key), str(model.parent / name), names)
         except MechanismError as error:
             findings += error.findings
             continue
@@ -188,12 +192,14 @@ def _coordinate(data: Mapping[str, Any], joint: str) -> Kind:
 # ---- the file -------------------------------------------------------------------------------------------------
 
 
-def _points(path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "") -> TablePoints:
+def _points(
+    path: Path, where: str, kinds: tuple[Kind, Kind], shown: str = "", names: Sequence[str] | None = None
+) -> TablePoints:
     """The points of a file; MechanismError with file and line of every finding, a few of each file.
 
-    shown: what the file is called in findings.
+    shown: what the file is called in findings; names: the headers of the two columns, of a file that has more.
     """
-    units, rows = _columns(path, kinds, shown or str(path))
+    units, rows = _columns(path, kinds, shown or str(path), names)
     points: list[list[float | str]] = []
     for _, cells in rows:
         points.append([f"{cell} {one}" if one else float(cell) for cell, one in zip(cells, units, strict=True)])
@@ -214,7 +220,9 @@ _TABLE = ("table", "a row for each point", "0; 12.5", "use fewer points: values 
 _SAMPLE = ("sample", "a deviation in each line", "0.012", "use a random subset")
 
 
-def _columns(path: Path, kinds: Sequence[Kind], shown: str) -> tuple[list[str], list[Row]]:
+def _columns(
+    path: Path, kinds: Sequence[Kind], shown: str, names: Sequence[str] | None = None
+) -> tuple[list[str], list[Row]]:
     """The units of one or two columns, and their rows of plain numbers; MechanismError as `_points`."""
     noun, each, example, fewer = _TABLE if len(kinds) == 2 else _SAMPLE
     try:
@@ -227,6 +235,8 @@ def _columns(path: Path, kinds: Sequence[Kind], shown: str) -> tuple[list[str], 
             raise MechanismError(Finding(f"has {len(stated)} rows, a {noun} at most {MAX_ROWS}", remedy=fewer))
         separator = next((one for one in ";\t" if one in stated[0][1]), "," if len(kinds) == 2 else ";")
         rows = [(number, _cells(line, separator)) for number, line in stated]
+        if names:
+            rows = _named_columns(rows, names)
         if len(rows[0][1]) != len(kinds):
             what = f"has {len(rows[0][1])} column{'s' * (len(rows[0][1]) > 1)}, a {noun} has {len(kinds)}"
             raise MechanismError(Finding(what, remedy=_OTHER_COLUMNS[len(kinds)], line=rows[0][0]))
@@ -249,8 +259,32 @@ def _columns(path: Path, kinds: Sequence[Kind], shown: str) -> tuple[list[str], 
 
 _OTHER_COLUMNS = {
     1: "keep the column of the deviations; a table of two columns is given by --table",
-    2: "write time or drive coordinate, then value, and between them a comma, or beside decimal commas ; or a tab",
+    2: "write time or drive coordinate, then value, and between them a comma, or beside decimal commas ; or a tab; of "
+    "more columns name two: columns: [time, pressure]",
 }
+
+
+def _named_columns(rows: Sequence[Row], names: Sequence[str]) -> list[Row]:
+    """The rows with two of their cells: below the headers that are these names, which may leave out the unit.
+
+    MechanismError if none or several have a name.
+    """
+    line, header = rows[0]
+    plain = [re.sub(_IN_BRACKETS, "", cell).strip() for cell in header]
+    places: list[int] = []
+    findings: list[Finding] = []
+    for name in names:
+        fitting = [i for i, cell in enumerate(header) if cell == name] or [
+            i for i, cell in enumerate(plain) if cell == name
+        ]
+        if len(fitting) != 1:
+            what = f"{'has no column' if not fitting else f'has {len(fitting)} columns'} '{name[:60]}'"
+            remedy = nearest(name, plain) if not fitting else "give each column a name of its own"
+            findings.append(Finding(what, remedy=remedy, line=line))
+        places += fitting[:1]
+    if findings:
+        raise MechanismError(findings)
+    return [(number, [cells[i] if i < len(cells) else "" for i in places]) for number, cells in rows]
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -233,13 +233,18 @@ class Initial(Part):
     speed: Rate | None = None
 
 
+_Columns = Annotated[tuple[str, str] | None, OnlyWith("file", "name the file: file: motion.csv")]
 _MOTION_EXAMPLES = {
     "speed": "60 rpm", "amplitude": "20 deg", "period": "0.5 s", "range": "[0 deg, 90 deg]", "duration": "0.2 s",
     "points": "[[0 s, 0 deg], [0.1 s, 20 deg]], or file: motion.csv, or give a file by --table",
 }  # fmt: skip
 _FREE = "a motion that is found"
 _LAW = Selects(
-    "motion law", MOTION_LAWS, _MOTION_EXAMPLES, also=("free", "motor", "initial"), instead={"file": "points"}
+    "motion law",
+    MOTION_LAWS,
+    _MOTION_EXAMPLES,
+    also=("free", "motor", "initial", "columns"),
+    instead={"file": "points"},
 )
 
 
@@ -263,6 +268,7 @@ class Driver(Part):
     returns: bool = True
     points: Annotated[tuple[tuple[Time, AngleOrLength], ...], Field(min_length=2), Rising("time")] | None = None
     file: str | None = None
+    columns: _Columns = None
     periodic: bool = False
     ends: Literal["clamped", "natural"] = "clamped"
     delay: Annotated[Time | None, NotNegative] = None
@@ -337,12 +343,13 @@ class Load(Part):
 class Table(Part):
     """A quantity stated by points (coordinate of the first driver or time, value), for the expressions of loads.
 
-    file: instead of the points; they take its place when a model file is read.
+    file: instead of the points; they take its place when a model file is read. columns: the headers of its two columns.
     """
 
     over: Literal["drive", "time"] = "drive"
     points: Annotated[tuple[tuple[AnyQuantity, AnyQuantity], ...], Field(min_length=2), Rising("at")] = ()
     file: str | None = None
+    columns: _Columns = None
     interpolation: Literal["linear", "spline"] = "linear"
     periodic: bool = False
     period: AnyQuantity | None = None

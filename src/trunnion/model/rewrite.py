@@ -19,7 +19,7 @@ from trunnion.errors import Finding, MechanismError
 from trunnion.files import whole
 from trunnion.model.file import composed, entries_of, read_entries, text_of
 from trunnion.model.mechanism import Mechanism, read_mechanism
-from trunnion.model.text import stated_files
+from trunnion.model.text import OF_A_FILE, stated_files
 
 __all__ = ["changed_text", "rewrite_mechanism"]
 
@@ -102,10 +102,12 @@ def _texts(mechanism: Mechanism, source: Path, beside: bool) -> Iterator[str]:
 
 def _name_files(before: dict[str, Any], after: Mapping[str, Any], source: Path, beside: bool) -> None:
     """Let the data of the source name the files again whose points are to be written out: others, or elsewhere."""
-    for section, name, file in stated_files(read_entries(source)[0]):
+    entries = read_entries(source)[0]
+    for section, name, _ in stated_files(entries):
         stated = before[section][name]
         if not beside or after.get(section, {}).get(name, {}).get("points") != stated.get("points"):
-            before[section][name] = {key: value for key, value in stated.items() if key != "points"} | {"file": file}
+            of_the_file = {key: value for key, value in entries[section][name].items() if key in OF_A_FILE}
+            before[section][name] = {key: value for key, value in stated.items() if key != "points"} | of_the_file
 
 
 # ---- values alone ---------------------------------------------------------------------------------------------

@@ -51,6 +51,7 @@ def read_text(path: Path, kind: str, limit: int, start_from: str) -> str:
 
 MOST_FILES = 50
 MOST_SIGNS = 200  # of a name
+OF_A_FILE = ("file", "columns")  # the keys of a table or driver whose points are in a file
 _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(10))}  # of Windows
 
 

@@ -4,21 +4,34 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from mechanisms import Array
 from mechanisms_parts import Data
 from trunnion import Mechanism
+from trunnion.algebra.dual import Dual, derivative
 from trunnion.joints.clearance import CLEARANCE_MODELS, Vector
-from trunnion.measures.curves import value
+from trunnion.measures import curves
+from trunnion.measures.curves import MOTIONS, value
 from trunnion.measures.measures import Measure
-from trunnion.solve.forward import forward
+from trunnion.solve import shifts
+from trunnion.solve.backward import Backward, pass_on, unloaded
+from trunnion.solve.forward import Forward, forward
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.gears import gears_of
 from trunnion.solve.run import Run
-from trunnion.solve.shifts import Play
+from trunnion.solve.shifts import HOLE, Play
+from trunnion.solve.system import System, Values
 
-__all__ = ["changes", "four_bar", "measures_of", "offsets_of", "pressed_to", "rssr", "with_play"]
+__all__ = [
+    "by_duals", "by_virtual_load", "changes", "four_bar", "measures_of", "offsets_of", "plays", "pressed_to",
+    "rssr", "with_play",
+]  # fmt: skip
 
+Loads = dict[str, list[Vector]]  # load at each end, by joint
 RSSR = {"a": 0.03, "b": 0.12, "c": 0.07, "d": 0.1, "alpha": np.pi / 3, "s1": 0.01, "s4": 0.02}
 
 
@@ -125,3 +138,66 @@ def rssr(clearance: float = 2e-5, float_: float = 0.0, hole_on: str = "rocker") 
         drivers={"A": {"speed": 1.0, "start": np.radians(60)}},
         assembly={"D": np.radians(74) * (1 if hole_on == "rocker" else -1)},
     )
+
+
+# ---- what an offset does, two ways beside the batch of the study ------------------------------------------------
+
+
+def plays(system: System, values: Values) -> dict[str, Play]:
+    """The play of every joint that states some, by joint; where it is less than none, the fit presses: none."""
+    space, found = system.mechanism.space, {}
+    for name, (kind, _) in system.joints.items():
+        one = shifts.play_of(space, kind, values, name)
+        if one is not None:
+            found[name] = one._replace(radii=tuple(np.where(radius > 0, radius, 0.0) for radius in one.radii))
+    return found
+
+
+def by_virtual_load(walk: Forward, measure: Measure, known: Mapping[str, Play]) -> Loads:
+    """Qᵢ of a measure of the motion at each end of each joint: ∂y/∂cᵢ, in its unit a metre, hole's frame."""
+    loads = curves.loads(measure, walk)
+    back = under(walk, loads)
+    return {name: play.model.loads(*back.on_hole(name), play.length) for name, play in known.items()}
+
+
+def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
+    """Reactions to these loads alone, each about what those of its link are, without friction; the drivers hold still.
+
+    They are what moves with the play of joints, so gear pairs pass torques alone.
+    """
+    back = Backward(walk, unloaded(walk) | dict(loads))
+    for number in reversed(range(len(walk.poses))):
+        module, group = walk.system.plan.modules[number], walk.system.groups[number]
+        if gears := gears_of(group):
+            group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears))
+        reactions = walk.reactions(number, [back.loads[link] for link in module.links], group)
+        pass_on(back, number, reactions, (), (), toothed=False)
+    return back
+
+
+def by_duals(run: Run, measure: Measure, known: Mapping[str, Play], time: Array, method: FrictionMethod) -> Loads:
+    """The same by derivatives through the whole analysis, of any measure that is one number at each position.
+
+    Seats stay on the hole.
+    """
+    rows = _offsets(known)
+    offsets = {path: Dual(0.0, row) for path, row in rows.items()}
+    with np.errstate(all="ignore"):
+        if measure.kind in MOTIONS:
+            number = curves.value(measure, forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))
+        elif measure.of_motion:
+            number = measure.curve(forward(run.system, {**run.values, **offsets}, run.chosen.assembly, time))[0]
+        else:
+            number = measure.curve(run.at(time, offsets, method))[0]
+    return _by_end(known, np.broadcast_to(derivative(number), (len(rows), len(time))))
+
+
+def _offsets(known: Mapping[str, Play]) -> dict[str, Array]:
+    """Paths of the offsets with a row each, (sample, 1), in which it is 1 in a sample of its own."""
+    paths = [f"{HOLE}.{name}.{key}" for name, play in known.items() for end in play.model.ends for key in end]
+    return dict(zip(paths, np.eye(len(paths))[:, :, None], strict=True))
+
+
+def _by_end(known: Mapping[str, Play], slopes: Array) -> Loads:
+    each = iter(slopes)
+    return {name: [tuple(next(each) for _ in end) for end in play.model.ends] for name, play in known.items()}

@@ -61,9 +61,9 @@ _STUDIES = (
     ),
     Fault(
         "play-scatter-of-another-dimension",
-        "studies/play/study.py",
-        "total = total + radius * radius * square / (len(load) + 2)",
-        "total = total + radius * radius * square / (len(load) + 1)",
+        "studies/tolerance/effects.py",
+        "(most, square * len(end) / (len(end) + 2))",
+        "(most, square * len(end) / (len(end) + 1))",
         ("tests/reference/test_play.py", "-k", "one_rule"),
     ),
     Fault(

@@ -74,7 +74,7 @@ def sweeps_table() -> str:
 
 def plays_table() -> str:
     """Every variable of the play of joints."""
-    from trunnion.studies.play.result import VARIABLES
+    from trunnion.studies.play import VARIABLES
 
     return _described("dimension", VARIABLES)
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from trunnion.studies.allocation.allocate import allocate
     from trunnion.studies.assembly.study import assemble
     from trunnion.studies.design import design
-    from trunnion.studies.play.study import play
+    from trunnion.studies.play import play
     from trunnion.studies.sweep.study import sweep
     from trunnion.studies.tolerance.study import tolerance
     from trunnion.views.shown import plot, report
@@ -44,7 +44,7 @@ _PLACES = {
     "check": ("trunnion.cycle.inspect", "check"),
     "design": ("trunnion.studies.design", "design"),
     "locking": ("trunnion.cycle.locking", "locking"),
-    "play": ("trunnion.studies.play.study", "play"),
+    "play": ("trunnion.studies.play", "play"),
     "plot": ("trunnion.views.shown", "plot"),
     "read": ("trunnion.model.mechanism", "read_mechanism"),
     "report": ("trunnion.views.shown", "report"),

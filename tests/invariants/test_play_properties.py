@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 import mechanisms
 import trunnion
 from mechanisms_parts import Data
-from played import four_bar, rssr, with_play
+from played import by_duals, four_bar, plays, rssr, with_play
 from trunnion import Mechanism
 from trunnion.measures.measures import named
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.studies.play.study import by_duals, plays
 
 STEPS = 8
 clearances = st.floats(1e-7, 1e-4)

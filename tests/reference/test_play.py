@@ -15,7 +15,18 @@ from scipy import optimize
 import mechanisms
 import mechanisms_space
 import trunnion
-from played import changes, four_bar, measures_of, offsets_of, pressed_to, rssr, with_play
+from played import (
+    by_duals,
+    by_virtual_load,
+    changes,
+    four_bar,
+    measures_of,
+    offsets_of,
+    plays,
+    pressed_to,
+    rssr,
+    with_play,
+)
 from trunnion import MechanismError, Status
 from trunnion.joints.clearance import worst_case
 from trunnion.measures.measures import named, outputs
@@ -23,7 +34,6 @@ from trunnion.results.attributes import summary_of
 from trunnion.solve.forward import forward
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
-from trunnion.studies.play.study import by_duals, by_virtual_load, plays, variance
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NOW = np.zeros(1)
@@ -98,15 +108,21 @@ def _largest_change(run: Run, measure: trunnion.measures.measures.Measure, sign:
 
 
 def test_ends_and_dimensions_of_a_play_scatter_by_one_rule() -> None:
-    """Uniform in an interval, a disc, a ball: ρ²/3, ρ²/4, ρ²/5 for a unit load; by samples too."""
-    rng = np.random.default_rng(5)
+    """Uniform in an interval, a disc, a ball: ρ²/3, ρ²/4, ρ²/5 for a unit load, by samples and in every joint."""
+    rng, seen = np.random.default_rng(5), set()
     for count in (1, 2, 3):
         direction = rng.normal(size=count)
         points = rng.normal(size=(400_000, count))
         points *= (rng.uniform(size=400_000) ** (1 / count) / np.linalg.norm(points, axis=1))[:, None]
-        expected = variance([tuple(direction)], [0.3])
-        assert expected == pytest.approx(0.09 * direction @ direction / (count + 2), rel=1e-12)
-        assert np.var(0.3 * points @ direction) == pytest.approx(expected, rel=0.01)
+        assert np.var(0.3 * points @ direction) == pytest.approx(0.09 * direction @ direction / (count + 2), rel=0.01)
+    for data in (mechanisms.MODELS["slider-crank"](), mechanisms_space.MODELS["RSSR"]().data):
+        result = trunnion.play(with_play(data, 1e-5, 3e-5), steps=1).isel(measure=0, position=0)
+        loads, radius = result["sensitivity"].values, result["radius"].values
+        count = np.sum(np.isfinite(loads), axis=-1)
+        parts = radius**2 * np.nansum(loads**2, axis=-1) / (count + 2)
+        seen |= set(count[np.isfinite(radius)].tolist())
+        np.testing.assert_allclose(result["deviation"] ** 2, np.nansum(parts, axis=-1), rtol=1e-12)
+    assert seen == {1, 2, 3}
 
 
 # ---- virtual load, derivatives, brute force -------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -9,12 +11,11 @@ from scipy.stats import norm
 import trunnion
 from mechanisms import Array, four_bar
 from mechanisms_parts import revolute
-from played import changes, offsets_of, with_play
+from played import changes, offsets_of, plays, with_play
 from trunnion import Mechanism
 from trunnion.measures.measures import named
 from trunnion.results.attributes import findings_of
 from trunnion.solve.run import prepare
-from trunnion.studies.play.study import plays
 
 STEPS, TRIALS = 24, 4000
 LARGE, SMALL = 9.5e-3, 1e-7  # m: play at which the second order shows, and at which it does not
@@ -28,7 +29,7 @@ def test_exact_figure_bounds_pins_at_the_rims_of_their_holes() -> None:
     (found,) = [one.figures for one in findings_of(result) if one.code == "play.beyond_first_order"]
     first, exact = found["first"], max(-found["low"], found["high"])
     assert first == pytest.approx(float(result["extreme_worst_case"].sum()))
-    assert first >= float(result["worst_case_total"].max())
+    assert first >= float(result["worst_case_total"].max()) * (1 - 1e-14)  # the place lies beside one of the positions
     assert 1e-2 < exact / first - 1 < 0.2
     run, rng = prepare(mechanism), np.random.default_rng(7)
     measure = named(mechanism, [f"angle:{link}"], run.values)[0]
@@ -131,18 +132,22 @@ def test_pins_move_the_corner_of_a_largest_effort(play: float) -> None:
     found = [one.figures for one in findings_of(result) if one.code.endswith("_first_order")]
     off = np.abs(reached - moment(*PRESSED)) / np.sum(effects) - 1
     assert bool(found) == (np.max(np.abs(off)) > 0.01)
-    assert all(max(-one["low"], one["high"]) == pytest.approx(exact, rel=1e-4) for one in found)
+    angle, to = np.linspace(0, 2 * np.pi, 3601), np.array([[1], [-1]])
+    rims = play * np.cos(angle), to * play * np.sin(angle)
+    anywhere = [moment(PRESSED[0] + way * 2 * play, PRESSED[1] + rims[0], rims[1]).max(axis=0) for way in (1, -1)]
+    most = np.max(np.abs(np.array(anywhere) - moment(*PRESSED)))
+    assert all(exact * (1 - 1e-4) <= max(-one["low"], one["high"]) <= most * (1 + 1e-9) for one in found)
 
 
 PRESSED = (0.03, 0.115, 0.0)  # m: crank, and where the force begins
 
 
-def moment(crank: float, x: float, y: float, rod: float = 0.1, force: float = 1000.0) -> float:
+def moment(crank: float, x: Any, y: Any, rod: float = 0.1, force: float = 1000.0) -> Any:
     """Drive moment, N m, of a slider-crank whose slider is pressed on, with the end of its rod at (x, y)."""
     away = np.hypot(x, y)
     angle = np.arctan2(y, x) + np.arccos((crank**2 + away**2 - rod**2) / (2 * crank * away))
     lean = np.arcsin((crank * np.sin(angle) - y) / rod)
-    return float(force * crank * np.sin(angle + lean) / np.cos(lean))
+    return force * crank * np.sin(angle + lean) / np.cos(lean)
 
 
 def press(play: float) -> Mechanism:

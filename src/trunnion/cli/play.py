@@ -22,7 +22,6 @@ from trunnion.cli.options import (
     UnitsRow,
 )
 from trunnion.cli.result import Shown, check_files, show_tables
-from trunnion.cli.terminal import bar
 from trunnion.errors import Finding, MechanismError
 
 __all__ = ["play"]
@@ -46,12 +45,12 @@ def play(
 
     Worst case, share of each joint, standard deviation.
     """
-    from trunnion.studies.play.study import play as run
+    from trunnion.studies.play import play as run
 
     check_files(out or [], report)
     mechanism = stated(file, set_, table, friction)
-    with lines_of(file), bar("positions", steps, least=20_000) as progress:
-        result = run(mechanism, measure, steps, progress, at)
+    with lines_of(file):
+        result = run(mechanism, measure, steps, at)
 
     def draw(path: Path) -> Any:
         from trunnion.views.common.peaks import whole_peaks

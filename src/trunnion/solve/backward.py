@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, cast
 
@@ -21,13 +21,12 @@ from trunnion.solve.forward import Assembly, Forward, Travel, forward
 from trunnion.solve.friction import Contact, Settled, settle
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.friction_problem import Rubbing
-from trunnion.solve.gears import GearLoad, acting, gear_load, gears_of, power_of, teeth
+from trunnion.solve.gears import GearLoad, acting, gear_load, power_of, teeth
 from trunnion.solve.loads import LoadAction, Share, SpringState, losses, springs, stated_loads
 from trunnion.solve.system import Place, System, Values, law_of, rubbing
 
 __all__ = [
-    "Backward", "Given", "Sense", "backward", "pass_on", "sense_of", "solve",
-    "under", "unloaded",
+    "Backward", "Given", "Sense", "backward", "pass_on", "sense_of", "solve", "unloaded",
 ]  # fmt: skip
 
 
@@ -156,21 +155,6 @@ def backward(walk: Forward, method: FrictionMethod, given: Given) -> Backward:
     back.stated = dict(back.loads)
     for number in reversed(range(len(system.plan.modules))):
         _settle_module(back, number, method, given)
-    return back
-
-
-def under(walk: Forward, loads: Mapping[str, Any]) -> Backward:
-    """Reactions to these loads alone, each about what those of its link are, without friction; the drivers hold still.
-
-    They are what moves with the play of joints, so gear pairs pass torques alone.
-    """
-    back = Backward(walk, unloaded(walk) | dict(loads))
-    for number in reversed(range(len(walk.poses))):
-        module, group = walk.system.plan.modules[number], walk.system.groups[number]
-        if gears := gears_of(group):
-            group = replace(group, gears=tuple(gear._replace(carriers=None) for gear in gears))
-        reactions = walk.reactions(number, [back.loads[link] for link in module.links], group)
-        pass_on(back, number, reactions, (), (), toothed=False)
     return back
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from trunnion.errors import agreeing
 from trunnion.results.sentences.sentence import ERROR, NOTE, WARNING, Sentence
 
 __all__ = ["STUDIES"]
@@ -57,15 +56,9 @@ PLAY = {
     ),
     "play.no_effect": Sentence(
         NOTE,
-        "the play of {joints} has no effect on {measure} while {drivers} {count:#is/are} driven",
-        "drive the joint that is driven in the machine",
-    ),
-    "play.no_effect_there": Sentence(NOTE, "the play of {joints} has no effect on {measure} at {at}"),
-    "play.held": Sentence(
-        NOTE,
-        lambda joints, measure, holding: (
-            f"the play of {', '.join(joints)} has no effect on {measure}, which does not change over the cycle"
-            + (f": {', '.join(holding)} {agreeing(len(holding), 'holds', 'hold')} it" if holding else "")
+        "the play of {joints} has no effect on {measure}",
+        lambda drivers, moves, **_: (
+            f"drive the joint that the machine drives, now {', '.join(drivers)}" if moves else ""
         ),
     ),
     "play.left_out": Sentence(

@@ -238,7 +238,7 @@ class FirstOrder:
 
     def _sensitivity(self, i: int) -> Array:
         if i >= len(self.inputs.tolerances):
-            reach: Array = np.max([zones.reach(loads) for loads, _ in self._plays(i)], axis=0)
+            reach: Array = np.max([zones.reach(loads) for loads, _ in self.plays(i)], axis=0)
             return reach
         if self.effects.tolerance(i).direction:
             return zones.size(self._harmonic(i, SIZE))
@@ -252,7 +252,7 @@ class FirstOrder:
 
     def _spread(self, i: int) -> Spread:
         if i >= len(self.inputs.tolerances):
-            return zones.play(self._plays(i))
+            return zones.play(self.plays(i))
         one, mean, deviation = self.effects.tolerance(i), self.effects.deviations[1][i], self.effects.deviations[0][i]
         if one.direction:
             circle, ring = (self._harmonic(i, part) for part in (ANGLE, SIZE))
@@ -339,7 +339,7 @@ class FirstOrder:
             found[tolerance.direction or tolerance.path] = zones.angle(circle, sign)
         for k, joint in enumerate(self.inputs.loose):
             i = len(self.inputs.tolerances) + k
-            carriers = self._plays(i)
+            carriers = self.plays(i)
             best = int(np.argmax([float(zones.worst(*one)) for one in carriers]))
             for c, (carrier, (loads, _)) in enumerate(zip(self.inputs.carriers(joint), carriers, strict=True)):
                 for end, load in zip(self.inputs.ends(joint), loads, strict=True):
@@ -390,7 +390,7 @@ class FirstOrder:
             found = found - zones.along(self._harmonic(i, SIZE), (at or {}).get(path, self.effects.nominal_angle(path)))
         return found
 
-    def _plays(self, i: int) -> list[tuple[list[Vector], list[tuple[float, float]]]]:
+    def plays(self, i: int) -> list[tuple[list[Vector], list[tuple[float, float]]]]:
         """For each link that may carry the seat: Q at every end, (component, …); largest radius and E|c|² of each."""
         joint = self.effects.joint(i)
         ends = self.inputs.ends(joint)

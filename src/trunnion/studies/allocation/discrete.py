@@ -23,8 +23,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
-from trunnion.studies.allocation.cones import Optimum
-from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
+from trunnion.studies.allocation.cones import Optimum, allocate_continuous, minimise, unbounded
 from trunnion.studies.allocation.problem import (
     ALLOWED,
     PROVEN,

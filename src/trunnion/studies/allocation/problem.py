@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
 FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
-PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
+PROVEN = 1e-6  # of the cost that tolerances change: up to this gap of the solver an optimum is claimed
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 from trunnion.errors import Finding, MechanismError
-from trunnion.studies.allocation.continuous import allocate_continuous
+from trunnion.studies.allocation.cones import allocate_continuous
 from trunnion.studies.allocation.discrete import allocate_discrete
 from trunnion.studies.allocation.problem import AllocationProblem, Answer
 from trunnion.studies.allocation.yields import Check, Verify, meet

@@ -14,6 +14,7 @@ from trunnion.statistics.costs import Cost
 from trunnion.studies.allocation.problem import AllocationProblem, Criterion
 from trunnion.studies.allocation.solve import solve
 
+COST, HALF_WIDTH = 1e-6, 1e-3  # the gap that is claimed, and its root: the cost is flat at its least
 SEEDS = st.integers(0, 10**6)
 CRITERIA = st.sampled_from(["worst-case", "rss", "yield"])
 
@@ -42,8 +43,8 @@ def test_units(seed: int, criterion: Criterion, length: float, money: float) -> 
     assert problem.effects.half is not None
     effects = rows(own * problem.effects.half / a, own[:, 0] * problem.effects.upper)
     second = solve(replace(problem, contributions=tuple(parts), effects=effects))
-    assert second.tolerances == pytest.approx(a * first.tolerances, rel=1e-7)
-    assert second.cost == pytest.approx(c * first.cost, rel=1e-9)
+    assert second.tolerances == pytest.approx(a * first.tolerances, rel=HALF_WIDTH)
+    assert second.cost == pytest.approx(c * first.cost, rel=COST)
     assert second.proven
 
 
@@ -57,8 +58,8 @@ def test_order_and_rows_that_do_not_bind(seed: int, criterion: Criterion) -> Non
     more = rows(np.concatenate([effect, effect, 0.5 * effect]), np.tile(limit, 3))
     parts = tuple(problem.contributions[i] for i in order)
     second = solve(replace(problem, contributions=parts, effects=more))
-    assert second.tolerances == pytest.approx(first.tolerances[order], rel=1e-7)
-    assert second.cost == pytest.approx(first.cost, rel=1e-10)
+    assert second.tolerances == pytest.approx(first.tolerances[order], rel=HALF_WIDTH)
+    assert second.cost == pytest.approx(first.cost, rel=COST)
     assert first.proven
     assert second.proven
 
@@ -68,6 +69,6 @@ def test_order_and_rows_that_do_not_bind(seed: int, criterion: Criterion) -> Non
 def test_the_criteria_are_in_order(seed: int) -> None:
     """Worst case costs most; a yield at z = 3 of independent deviations without shift is RSS."""
     worst, rss, share = (solve(case(seed, criterion)) for criterion in ("worst-case", "rss", "yield"))
-    assert worst.cost >= rss.cost - 1e-12
-    assert share.cost == pytest.approx(rss.cost, rel=1e-9)
-    assert share.tolerances == pytest.approx(rss.tolerances, rel=1e-9)
+    assert worst.cost >= rss.cost * (1 - COST)
+    assert share.cost == pytest.approx(rss.cost, rel=COST)
+    assert share.tolerances == pytest.approx(rss.tolerances, rel=HALF_WIDTH)

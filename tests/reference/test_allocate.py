@@ -49,12 +49,6 @@ def findings(result: Any, severity: str) -> list[str]:
     ]
 
 
-def one_finding(result: Any, code: str) -> Any:
-    """The figures of the one finding with a code."""
-    (found,) = [row["figures"] for row in json.loads(result.attrs["findings"]) if row["code"] == code]
-    return found
-
-
 def dimensions(result: Any, key: str = "tolerance") -> Any:
     """Of l1 … l4, half widths in mm."""
     return 1e3 * result[key].sel(parameter=[f"dimensions.l{i}" for i in range(1, 5)]).values
@@ -134,7 +128,8 @@ def test_plays_are_bought() -> None:
     model = trunnion.read(EXAMPLES / "piston-by-cost.yaml")
     result = trunnion.allocate(model, samples=0)
     expected = [0.0567249, 0.03482455, 0.01382013, 0.01382013, 0.0181095]
-    assert 1e3 * result["tolerance"].values == pytest.approx(expected, rel=1e-6)
+    # a gap of 1e-6 leaves half widths open by 1e-3; the solver comes to some 1e-6
+    assert 1e3 * result["tolerance"].values == pytest.approx(expected, rel=1e-5)
     none = model.with_values({f"joints.{joint}.pin.clearance": 0.0 for joint in "OPQ"})
     again = trunnion.allocate(none, samples=0)
     assert again["tolerance"].values == pytest.approx(result["tolerance"].values, rel=1e-9)
@@ -159,7 +154,7 @@ def test_yield() -> None:
     result = trunnion.allocate(model, criterion="yield", target=0.95, steps=36, samples=4000)
     low, share, high = (float(result[f"yield_all{end}"]) for end in ("_low", "", "_high"))
     assert low <= 0.95 <= high
-    assert share == float(result["trial_yield"][-1])
+    assert share == float(result["trial_yield"][result["trial_cost"] == result["cost_total"]][0])
     assert float(result["cost_total"]) < 12.0
     t = dimensions(result) * 1e-3
     drawn = np.random.default_rng(4).standard_normal((20_000, 4)) * t / 3
@@ -191,11 +186,8 @@ def test_options_as_stated_cost_what_keeps_them() -> None:
         assert float(result["cost_total_before"]) == pytest.approx(cost + grades + 4 * 1.6, nan_ok=True)
 
 
-def test_failures_are_split_by_cost() -> None:
-    """Two limits near their least cost, and cheaper than one margin for both.
-
-    Both by scipy in the half widths, with the probability of both rows by its normal distribution.
-    """
+def test_several_limits_have_one_margin() -> None:
+    """Room over standard deviation is the same for both; the yield is that of their normal distribution."""
     places, halves, target = (300, 140), np.radians([0.1, 0.08]), 0.95
     measures = {
         f"at{place}": {"angle": "rocker", "at": f"{place} deg", "limit": f"±{np.degrees(half)} deg"}
@@ -205,46 +197,36 @@ def test_failures_are_split_by_cost() -> None:
     costs = {f"l{i + 1}": {"model": "power", "B": float(price), "k": 0.45, "unit": "mm", "most": "1 mm"}
              for i, price in enumerate(b)}  # fmt: skip
     result = trunnion.allocate(fourbar(measures=measures, costs=costs), criterion="yield", target=target, samples=0)
-    s = slopes(360)[list(places)]
+    s = slopes(360)[list(places)] * 1e-3 / halves[:, None]
 
     def cost(t: Any) -> float:
         return float(np.sum(b / t**0.45))
 
-    def kept(t: Any) -> float:
-        sigma = s * 1e-3 * t / 3 / halves[:, None]
-        both = multivariate_normal(np.zeros(2), sigma @ sigma.T)
-        return float(both.cdf(np.ones(2), lower_limit=-np.ones(2)))
-
     def margins(t: Any) -> Any:
-        return halves / np.linalg.norm(s * 1e-3 * t / 3, axis=1)
+        return 1 / np.linalg.norm(s * t / 3, axis=1)
 
-    def least(*constraints: Any) -> Any:
-        start = dimensions(result) * 0.9
-        return minimize(cost, start, constraints=constraints, bounds=[(1e-4, 1.0)] * 4, method="SLSQP", tol=1e-12)
-
-    found = dimensions(result)
-    assert kept(found) == pytest.approx(target, abs=3e-4)
-    within = {"type": "ineq", "fun": lambda t: kept(t) - kept(found)}
-    best = least(within)
-    equal = least(within, {"type": "ineq", "fun": lambda t: margins(t)[0] - margins(t)[1]},
-                  {"type": "ineq", "fun": lambda t: margins(t)[1] - margins(t)[0]})  # fmt: skip
-    assert best.success
-    assert cost(found) == pytest.approx(best.fun, rel=1e-3)  # the margins alone do not turn the rows
-    assert equal.fun > 1.015 * cost(found)
-    assert result["yield_margin"].values == pytest.approx(margins(found), rel=1e-6)
-    figures = one_finding(result, "allocation.split_margin")
-    assert figures["saved"] == pytest.approx(1 - best.fun / equal.fun, abs=1e-3)
-    assert cost(found) / (1 + figures["excess"]) <= best.fun
+    found, margin = dimensions(result), float(result["yield_margin"][0])
+    assert result["yield_margin"].values[1] == margin
+    assert np.min(margins(found)) == pytest.approx(margin, rel=1e-6)
+    sigma = s * found / 3
+    both = multivariate_normal(np.zeros(2), sigma @ sigma.T)
+    assert float(both.cdf(np.ones(2), lower_limit=-np.ones(2))) == pytest.approx(target, abs=3e-4)
+    room = {"type": "ineq", "fun": lambda t: margins(t) - margin}
+    best = minimize(cost, found * 0.9, constraints=room, bounds=[(1e-4, 1.0)] * 4, method="SLSQP", tol=1e-10)
+    assert cost(found) == pytest.approx(best.fun, rel=1e-6)
 
 
-def test_processes_have_one_margin_for_all_limits() -> None:
-    """Of processes the failures are not split by cost, and a finding says so."""
-    measures = {f"at{place}": {"angle": "rocker", "at": f"{place} deg", "limit": "±0.2 deg"} for place in (40, 140)}
-    model = Mechanism(**{**trunnion.read(EXAMPLES / "fourbar-by-grades.yaml").data(), "measures": measures})
-    result = trunnion.allocate(model, criterion="yield", target=0.95, steps=36, samples=0)
-    assert one_finding(result, "allocation.same_margin")["count"] == 2
-    margins = result["yield_margin"].values
-    assert margins[0] == margins[1]
+def test_a_yield_that_is_to_be_sure_has_it_at_the_lower_end_of_fresh_samples() -> None:
+    model = trunnion.read(EXAMPLES / "piston-by-cost.yaml")
+    plain, sure = (
+        trunnion.allocate(model, criterion="yield", target=0.95, steps=12, samples=2000, sure=each)
+        for each in (False, True)
+    )
+    assert float(plain["yield_checked_low"]) < 0.95 <= float(plain["yield_checked_high"])
+    assert float(sure["yield_checked_low"]) >= 0.95
+    assert float(sure["cost_total"]) > float(plain["cost_total"])
+    with pytest.raises(MechanismError, match="only a yield can be sure"):
+        trunnion.allocate(model, sure=True)
 
 
 def test_written_and_read_again(tmp_path: Path) -> None:

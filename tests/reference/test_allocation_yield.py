@@ -11,24 +11,25 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import multivariate_normal
 
+from trunnion.errors import Severity
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation.problem import AllocationProblem, Contribution
+from trunnion.studies.allocation.problem import AllocationProblem, Contribution, SampledYield
 from trunnion.studies.allocation.solve import solve, trade_off
-from trunnion.studies.allocation.yields import normal_yield
+from trunnion.studies.allocation.yields import Verify, normal_yield
 
 Array = NDArray[np.float64]
 PLAIN = Cost("power", {"B": 1.0, "k": 1.0, "unit": 1.0})
 
 
-def sampled(problem: AllocationProblem, wider: float = 1.0, count: int = 400_000) -> object:
+def sampled(problem: AllocationProblem, wider: float = 1.0, count: int = 400_000) -> Verify:
     """A yield of normal deviations by plain samples, with standard deviations `wider` than reckoned."""
 
-    def verify(t: Array) -> tuple[float, float, float]:
-        rng = np.random.default_rng(5)
+    def verify(t: Array, number: int) -> SampledYield:
+        rng = np.random.default_rng(5 + number)
         draws = rng.normal(size=(count, len(t))) @ (wider * problem.effects.sigma() * t).T
         share = float(np.mean(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1)))
         half = 1.96 * float(np.sqrt(share * (1 - share) / count))
-        return share, share - half, share + half
+        return SampledYield(share, share - half, share + half)
 
     return verify
 
@@ -63,10 +64,12 @@ def test_dependent_shifted_rows_agree_with_scipy() -> None:
 def test_four_bar_meets_its_yield_when_sampled() -> None:
     problem = four_bar("yield")
     reckoned = solve(problem, target=0.9973)
-    answer = solve(problem, target=0.9973, verify=sampled(problem))  # type: ignore[arg-type]
+    answer = solve(problem, target=0.9973, verify=sampled(problem))
     assert answer.sampled is not None
     assert answer.sampled.low <= 0.9973 <= answer.sampled.high
-    assert len(answer.trials) <= 3
+    assert answer.checked is not None
+    assert answer.checked.high >= 0.9973
+    assert len(answer.trials) <= 8
     assert answer.cost == pytest.approx(reckoned.cost, rel=5e-3)
     assert solve(four_bar("rss")).cost < reckoned.cost < solve(four_bar()).cost
 
@@ -76,56 +79,59 @@ def test_four_bar_meets_its_yield_when_sampled() -> None:
 def test_what_is_sampled_tightens_and_loosens(wider: float) -> None:
     """Deviations wider than reckoned by a factor need half widths narrower by it."""
     problem = four_bar("yield")
-    answer = solve(problem, target=0.99, verify=sampled(problem, wider))  # type: ignore[arg-type]
+    answer = solve(problem, target=0.99, verify=sampled(problem, wider))
     assert answer.sampled is not None
     assert answer.sampled.low <= 0.99 <= answer.sampled.high
-    assert 2 <= len(answer.trials) <= 6
+    assert 2 <= len(answer.trials) <= 10
     assert answer.tolerances == pytest.approx(solve(problem, target=0.99).tolerances / wider, rel=2e-2)
 
 
 @pytest.mark.slow
-def test_fresh_samples_correct_those_that_chose() -> None:
+@pytest.mark.parametrize("sure", [False, True])
+def test_fresh_samples_correct_those_that_chose(sure: bool) -> None:
     """Samples that chose flatter the answer (here by 3 % of its deviations): fresh ones raise the margin."""
     problem = four_bar("yield")
-    chosen = solve(problem, target=0.99, verify=sampled(problem, 0.97))  # type: ignore[arg-type]
-    fresh, streams = sampled(problem), []
+    flattering, honest, numbers = sampled(problem, 0.97), sampled(problem), []
 
-    def check(t: Array, stream: int) -> tuple[float, float, float]:
-        streams.append(stream)
-        return fresh(t)  # type: ignore[operator,no-any-return]
+    def verify(t: Array, number: int) -> SampledYield:
+        if number:
+            numbers.append(number)
+        return (honest if number else flattering)(t, number)
 
-    answer = solve(problem, "continuous", 0.99, sampled(problem, 0.97), check)  # type: ignore[arg-type]
+    answer = solve(problem, target=0.99, verify=verify, sure=sure)
+    plain = solve(problem, target=0.99, verify=flattering)
     assert answer.checked is not None
     assert answer.sampled is not None
-    assert chosen.sampled is not None
-    assert chosen.sampled.share >= 0.99
-    assert chosen.sampled.share < answer.sampled.share
-    assert answer.checked.high >= 0.99 > fresh(chosen.tolerances)[2]  # type: ignore[operator]
-    assert answer.cost > chosen.cost
-    assert streams == [*range(1, len(streams) + 1)]
-    assert not answer.findings
+    assert plain.sampled is not None
+    assert 0.99 <= plain.sampled.share < answer.sampled.share
+    assert (answer.checked.low if sure else answer.checked.high) >= 0.99 > honest(plain.tolerances, 1).high
+    assert answer.cost > plain.cost
+    assert numbers == [*range(1, len(numbers) + 1)]
+    assert all(finding.severity is Severity.NOTE for finding in answer.findings)
 
 
-@pytest.mark.parametrize(("check", "code"), [((0.5, 0.45, 0.55), "yield.check_missed"),
-                                             ((0.89, 0.87, 0.91), "yield.check_uncertain")])  # fmt: skip
-def test_a_yield_that_fresh_samples_never_have_is_told(check: tuple[float, float, float], code: str) -> None:
-    problem = four_bar("yield", positions=12)
-    answer = solve(problem, "continuous", 0.9, lambda t: (0.901, 0.88, 0.92), lambda t, stream: check)
+@pytest.mark.parametrize("sure", [False, True])
+@pytest.mark.parametrize("low_and_high", [(0.45, 0.55), (0.87, 0.91)])
+def test_a_yield_that_fresh_samples_never_have_is_told(low_and_high: tuple[float, float], sure: bool) -> None:
+    """An error, but a note if it may be chance and nobody asks to be sure."""
+    problem, fresh = four_bar("yield", positions=12), SampledYield(sum(low_and_high) / 2, *low_and_high)
+    chosen = SampledYield(0.901, 0.9005, 0.92)
+    answer = solve(problem, target=0.9, verify=lambda t, number: fresh if number else chosen, sure=sure)
     (finding,) = answer.findings
-    assert finding.code == code
-    assert finding.figures["share"] == check[0]
-    assert finding.figures["chosen"] == 0.901
+    assert finding.code == "yield.missed"
+    assert finding.figures["share"] == fresh.share
+    assert finding.severity is (Severity.NOTE if fresh.high >= 0.9 and not sure else Severity.ERROR)
 
 
-def bounded(problem: AllocationProblem, count: int = 20_000) -> object:
+def bounded(problem: AllocationProblem, count: int = 20_000) -> Verify:
     """A yield with every contribution at either end of its tolerance, half and half: no tail at all."""
 
-    def verify(t: Array) -> tuple[float, float, float]:
-        rng = np.random.default_rng(5)
+    def verify(t: Array, number: int) -> SampledYield:
+        rng = np.random.default_rng(5 + number)
         draws = rng.choice([-1.0, 1.0], size=(count, len(t))) @ (problem.effects.sigma() * t).T
         share = float(np.mean(np.all((draws <= problem.effects.upper) & (draws >= problem.effects.lower), axis=1)))
         half = 1.96 * float(np.sqrt(max(share * (1 - share), 1e-9) / count))
-        return share, share - half, share + half
+        return SampledYield(share, share - half, share + half)
 
     return verify
 
@@ -138,32 +144,31 @@ def test_samples_decide_where_the_distribution_has_no_tail(room: float, kept: bo
         rows(np.array([[0.3, 0.0, 0.0], [0.0, 1.0, 1.0]]), np.array([room, 0.1])), labels=("measures.a", "measures.b")
     )
     problem = AllocationProblem(parts, effects, "yield")
-    assert not solve(problem, target=0.99).found
-    answer = solve(problem, target=0.99, verify=bounded(problem))  # type: ignore[arg-type]
-    assert answer.found == kept
-    (finding,) = answer.findings
+    assert [finding.code for finding in solve(problem, target=0.99).findings] == ["yield.missed"]
+    answer = solve(problem, target=0.99, verify=bounded(problem))
     if kept:
-        assert finding.code == "yield.not_normal"
-        assert finding.figures["measures"] == ["a"]
+        assert not answer.findings
         assert answer.sampled is not None
         assert answer.sampled.share >= 0.99
         assert answer.expected < 0.99
-        costs = [one.cost for one in trade_off(answer.problem, [0.9, 1.0, 1.2], target=answer.expected)]
-        assert costs[1] == pytest.approx(answer.cost, rel=1e-3)
+        assert answer.tolerances[1:] == pytest.approx([0.15, 0.15], rel=0.01)  # two of a third at once are 0.1
+        costs = [one.cost for one in trade_off(answer.problem, [1.0, 1.2])]
+        assert costs[0] == pytest.approx(answer.cost, rel=1e-6)
+        assert costs[1] < costs[0]
     else:
-        assert finding.code == "allocation.impossible"
+        assert [finding.severity for finding in answer.findings] == [Severity.ERROR]
 
 
 PLAY = 0.038  # of two pins in the direction of the limit, of ±0.08 m: within it, though normal deviations are not
 
 
-def with_pins(t: Array, seed: int, count: int = 100_000) -> tuple[float, float, float]:
+def with_pins(t: Array, seed: int, count: int = 100_000) -> SampledYield:
     """A yield with two pins anywhere in their holes, and three lengths that are normal."""
     rng = np.random.default_rng(seed)
     holes = PLAY * np.sqrt(rng.random((2, count))) * np.cos(2 * np.pi * rng.random((2, count)))
     share = float(np.mean(np.abs(np.sum(holes, axis=0) + rng.normal(size=(count, 3)) @ t[2:] / 3) <= 0.08))
     half = 1.96 * float(np.sqrt(share * (1 - share) / count))
-    return share, share - half, share + half
+    return SampledYield(share, share - half, share + half)
 
 
 def test_plays_that_nearly_fill_a_limit_leave_the_others_what_samples_say() -> None:
@@ -172,7 +177,7 @@ def test_plays_that_nearly_fill_a_limit_leave_the_others_what_samples_say() -> N
     effects = rows(np.array([[1.5 * PLAY, 1.5 * PLAY, 1.0, 1.0, 1.0]]), 0.08)
     problem = AllocationProblem((*pins, *bought([PLAIN] * 3, least=0.002)), effects, "yield")
     assert solve(problem, target=0.998).findings
-    answer = solve(problem, "continuous", 0.998, lambda t: with_pins(t, 1), lambda t, stream: with_pins(t, 1 + stream))
+    answer = solve(problem, target=0.998, verify=lambda t, number: with_pins(t, 1 + number))
     low, high = 0.002, 0.08
     while high - low > 1e-6:
         half = (low + high) / 2
@@ -180,8 +185,8 @@ def test_plays_that_nearly_fill_a_limit_leave_the_others_what_samples_say() -> N
         low, high = (half, high) if enough else (low, half)
     assert answer.cost == pytest.approx(3 / low, rel=0.05)
     assert answer.cost < 0.2 * 3 / 0.002
-    assert len(answer.trials) <= 8
-    assert [one.code for one in answer.findings] == ["yield.not_normal"]
+    assert len(answer.trials) <= 12
+    assert all(finding.severity is Severity.NOTE for finding in answer.findings)
 
 
 @pytest.mark.slow
@@ -189,9 +194,9 @@ def test_processes_meet_a_yield_at_least_cost() -> None:
     rng = np.random.default_rng(2)
     parts = tuple(Contribution(f"p{i}", options=random_options(rng, 6)) for i in range(4))
     problem = AllocationProblem(parts, rows(rng.normal(size=(5, 4)), 0.12), "yield")
-    answer = solve(problem, "discrete", 0.95, sampled(problem, count=100_000))  # type: ignore[arg-type]
+    answer = solve(problem, "discrete", 0.95, sampled(problem, count=100_000))
     assert answer.sampled is not None
-    assert answer.sampled.high >= 0.95
+    assert answer.sampled.share >= 0.95
     assert not answer.findings
 
 
@@ -204,7 +209,7 @@ def test_a_yield_out_of_reach_is_told() -> None:
 
 
 def test_cost_falls_along_the_curve() -> None:
-    costs = [one.cost for one in trade_off(four_bar("yield", positions=36), [0.5, 1.0, 2.0], target=0.9973)]
+    costs = [one.cost for one in trade_off(four_bar("yield", positions=36), [0.5, 1.0, 2.0])]
     assert costs == sorted(costs, reverse=True)
 
 

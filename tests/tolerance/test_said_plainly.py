@@ -175,8 +175,7 @@ def test_fresh_samples_of_an_allocation_are_told() -> None:
         costs={"k": {"options": options}}, measures={"tip": {"point": "ram.T", "axis": "x", "limit": "±0.25 mm"}}
     )
     result = trunnion.allocate(model, criterion="yield", target=0.9, samples=400, steps=12)
-    (found,) = coded(result, "yield.spare")
-    assert found.figures["low"] == float(result["yield_checked_low"]) > 0.9
+    assert float(result["yield_checked_low"]) > 0.9
     assert "yield of fresh samples" in headed(result)
 
 

@@ -65,6 +65,9 @@ Way = Annotated[Choice, typer.Option("--choice", help="continuous, discrete, or 
 Exact = Annotated[
     bool, typer.Option("--exact", help="Exact worst case of the mechanism instead of the first-order one.")
 ]
+Sure = Annotated[
+    bool, typer.Option("--sure", help="The lower end of the 95 % interval of fresh samples has to meet the yield.")
+]
 Curve = Annotated[int, typer.Option("--curve", help="Number of points of the cost-accuracy curve; 0: no curve.")]
 Samples = Annotated[int, typer.Option("--samples", help="Number of random mechanisms for the verification; 0: none.")]
 Figures = Annotated[str | None, typer.Option("--kind", help="Which figure: cost, trade-off, or one of `tolerance`.")]
@@ -85,6 +88,7 @@ def allocate(
     ] = None,
     choice: Way = Choice.AUTO,
     exact: Exact = False,
+    sure: Sure = False,
     curve: Curve = 0,
     at: At = None,
     steps: Steps = 360,
@@ -116,7 +120,7 @@ def allocate(
     with lines_of(file), bar("samples", samples, least=1000) as progress:
         result = run(
             mechanism, measure, by.value, target, choice.value, steps, at, samples,
-            seed, curve, exact=exact, jobs=jobs, progress=progress,
+            seed, curve, exact=exact, sure=sure, jobs=jobs, progress=progress,
         )  # fmt: skip
     draw = partial(_draw, result, kind)
     shown = Shown(result, file, SECTIONS, out or [], report, units_row, draw=draw, show=partial(_show, result))

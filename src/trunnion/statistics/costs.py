@@ -109,17 +109,18 @@ class Cost:
     model: str
     parameters: Mapping[str, float] = field(default_factory=dict)
 
-    def _values(self) -> dict[str, float]:
+    def numbers(self) -> dict[str, float]:
+        """The parameters by name, those that are not stated with their defaults."""
         stated = COST_MODELS[self.model].parameters
         return {name: self.parameters.get(name, one.default or 0.0) for name, one in stated.items()}
 
     def value(self, t: float) -> float:
         """Cost of a half width t, m or rad."""
-        return COST_MODELS[self.model].value(t, **self._values())
+        return COST_MODELS[self.model].value(t, **self.numbers())
 
     def slope(self, t: float) -> float:
         """Rise of the cost with t: never above zero."""
-        return COST_MODELS[self.model].slope(t, **self._values())
+        return COST_MODELS[self.model].slope(t, **self.numbers())
 
     def findings(self, where: str = "") -> list[Finding]:
         """What is missing or out of range."""

@@ -17,10 +17,6 @@ def _curve(points: int, lost: int, least: float | None) -> str:
     return f"limits of at least {least:.3g} times the stated ones are feasible" if least is not None else ""
 
 
-def _below(excess: float | None) -> str:
-    return "" if excess is None else f"; no tolerances can cost less than {1 / (1 + excess):.2%} of this"
-
-
 PLAY = {
     "play.measures_left_out": Sentence(
         NOTE,
@@ -223,35 +219,11 @@ TOLERANCE = {
 }
 
 ALLOCATION = {
-    "allocation.proven": Sentence(NOTE, "minimum cost to first order (relative optimality gap {gap:.0e})", quiet=True),
-    "allocation.proven_margin": Sentence(NOTE, "minimum cost to first order, for these margins of the limits"),
-    "allocation.same_margin": Sentence(
-        WARNING,
-        lambda count, excess: (
-            f"all {count} limits get the same margin in standard deviations: processes are not "
-            f"chosen for margins that differ, which may cost less{_below(excess)}"
-        ),
-        "compare with the cost without one of the limits",
-    ),
-    "allocation.split_margin": Sentence(
-        NOTE,
-        lambda count, saved, excess: (
-            f"the permitted failures are split over {count} limits by cost"
-            f"{f', which saves {saved:.2%} against the same margin for all' if saved > 0 else ''}{_below(excess)}"
-        ),
-    ),
     "allocation.proven_roughly": Sentence(
         WARNING, "the optimality gap is {gap:.1e} of the cost of the tolerances", MAGNITUDES
     ),
-    "allocation.choice_proven_roughly": Sentence(WARNING, "the optimality gap is {gap:.1e} of the cost"),
     "allocation.not_found": Sentence(
         ERROR, "the solver found no allocation, although the limits may be feasible", MAGNITUDES
-    ),
-    "allocation.no_choice": Sentence(
-        ERROR, "no choice of processes meets the limits", "widen a limit or add a finer process"
-    ),
-    "allocation.no_common_option": Sentence(
-        ERROR, "no option of the group lies within the bounds of all its members", "widen the bounds"
     ),
     "allocation.unbounded": Sentence(ERROR, "no limit bounds this tolerance, and wider is cheaper", "state `most`"),
     "allocation.impossible": Sentence(
@@ -293,60 +265,22 @@ ALLOCATION = {
     "allocation.curve_short": Sentence(
         NOTE, "{lost} of the {points} points of the curve {lost:#is/are} infeasible", _curve
     ),
-    "allocation.not_linear": Sentence(
-        ERROR,
-        "first order does not describe this measure: {told}; the tolerances found are no optimum",
-        "choose them by `trunnion tolerance` with samples and --method sobol",
-    ),
-    "allocation.dearer": Sentence(
-        ERROR,
-        "the tolerances as stated cost {before:.6g}, less than the {cost:.6g} of those found, and meet the limits too",
-        "keep them as stated",
-    ),
     "allocation.worst_case_beyond": Sentence(
         WARNING,
         "the worst case of the mechanism, {worst:~{unit}}, exceeds the limit {limit:~{unit}} by {percent:.2g} %; to "
         "first order it is met (up to {accepted:g} % beyond is accepted)",
         "use --exact (in Python exact=True), which narrows the tolerances",
     ),
-    "yield.short": Sentence(
+    "yield.missed": Sentence(
         ERROR,
-        "the yield of the samples is {share:.6g}, below the required {target:g}",
-        "require a higher yield, or allow narrower tolerances",
-    ),
-    "yield.uncertain": Sentence(
-        NOTE,
-        "the yield of the samples is {share:.6g}, below {target:g}, which is within its confidence interval "
-        "{low:.6g} to {high:.6g}",
-        "take more samples, or require a higher yield",
-    ),
-    "yield.by_estimate": Sentence(
-        NOTE,
-        "accepted by its estimate, not by the lower end of the interval: fresh samples have {share:.6g}, 95 % "
-        "confidence interval {low:.6g} to {high:.6g}, required are {target:g}",
-        "to be surer take more samples, or require a higher yield",
-    ),
-    "yield.spare": Sentence(
-        NOTE,
-        "fresh samples have {share:.6g}, 95 % confidence interval {low:.6g} to {high:.6g}, more than the required "
-        "{target:g}",
-        "more samples may lower the cost",
-    ),
-    "yield.unresolved": Sentence(
-        WARNING,
-        "even with all tolerances at their least the samples have a yield of {share:.6g} (95 % confidence interval "
-        "{low:.6g} to {high:.6g}), too close to {target:g} to tell from it; the choice rests on first order and normal "
-        "deviations, which have {normal:.6g}",
-        "take more samples, widen a limit, or ask for a lower yield",
-    ),
-    "yield.alone": Sentence(
-        WARNING,
-        lambda fails, permitted, largest: (
-            f"with all tolerances that have a cost at their least {fails:.3%} of normal deviations still break this "
-            f"limit, {fails / permitted:.0%} of the {permitted:.3%} that may break any"
+        lambda share, low, high, target: (
+            f"the yield found is {share:.6g}{f' (95 % interval {low:.6g} to {high:.6g})' if low < high else ''}, "
+            f"the required one {target:g}"
         ),
-        lambda fails, permitted, largest: (
-            "widen the limit" + (f", or first narrow '{largest}', which has no cost" if largest else "")
+        lambda high, target, **_: (
+            WIDER
+            if high < target
+            else "take more samples; --sure (in Python sure=True) asks the lower end of the interval to meet it"
         ),
     ),
     "yield.below_rss": Sentence(
@@ -354,27 +288,6 @@ ALLOCATION = {
         "the yield of the samples is {share:.6g}; an RSS within the limits implies {target:g}",
         "require that yield instead, which uses distributions, means and correlations as stated",
     ),
-    "yield.narrowest": Sentence(
-        ERROR, "with all tolerances at their least the yield {of} is {share:.6g}, below {target:g}", WIDER
-    ),
-    "yield.not_normal": Sentence(
-        NOTE,
-        "normal deviations would break the limits of {measures} too often whatever the tolerances, and these have a "
-        "yield of {normal:.4g} by them; the samples decide, with {share:.6g}",
-    ),
-    "yield.check_missed": Sentence(
-        ERROR,
-        "samples that had no part in the choice have a yield of {share:.6g} (95 % confidence interval {low:.6g} to "
-        "{high:.6g}), below {target:g}; those that chose have {chosen:.6g}",
-        WIDER,
-    ),
-    "yield.check_uncertain": Sentence(
-        NOTE,
-        "samples that had no part in the choice have a yield of {share:.6g}, below {target:g}, which is within its "
-        "confidence interval {low:.6g} to {high:.6g}",
-        "take more samples, or require a higher yield",
-    ),
-    "yield.best": Sentence(ERROR, "the best yield found is {share:.6g}, below {target:g}", WIDER),
 }
 
 STUDIES: dict[str, Sentence] = {**PLAY, **SWEEP, **ASSEMBLY, **TOLERANCE, **ALLOCATION}

@@ -8,7 +8,7 @@ they stay the same. Then the mechanism is analysed with the tolerances found: wo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,7 @@ from trunnion.studies.allocation.problem import (
     Answer,
     Contribution,
     Criterion,
+    SampledYield,
     none,
 )
 from trunnion.studies.allocation.rows import Rows, joined, part_of, rows_of
@@ -40,8 +41,15 @@ from trunnion.studies.tolerance.targets import limits
 if TYPE_CHECKING:
     import xarray as xr
 
-from trunnion.studies.allocation.outcome import CLOSE, DEFAULT_YIELD, Allocated, AllocationRequest, Choice, share_of
-from trunnion.studies.allocation.result import dataset, stated_cost
+from trunnion.studies.allocation.result import (
+    CLOSE,
+    DEFAULT_YIELD,
+    Allocated,
+    AllocationRequest,
+    Choice,
+    dataset,
+    share_of,
+)
 
 __all__ = ["allocate", "half_widths"]
 
@@ -69,6 +77,7 @@ def allocate(
     curve: int = 0,
     *,
     exact: bool = False,
+    sure: bool = False,
     friction_method: FrictionMethod | None = None,
     jobs: int | None = None,
     progress: Callable[[int], None] | None = None,
@@ -83,6 +92,7 @@ def allocate(
     of the samples that verify it, none if 0; jobs: processes for them. curve: how many points of cost over accuracy,
     all limits being multiplied by 0.5 to 2. friction_method: how friction and reactions are settled; Newton's method if
     not given. progress: called with the samples done.
+    sure: of a yield, that the lower end of the 95 % interval of fresh samples meets the target, not its estimate.
     exact: take limits narrower until the worst case found on the mechanism keeps them, and not first order alone.
     Returns the Dataset of `tolerance` for the mechanism with the tolerances found (`half_widths`), and over
     (parameter), (measure), (offer) those of `result.VARIABLES`.
@@ -92,14 +102,15 @@ def allocate(
     if target is not None and criterion != "yield":
         what = f"the criterion {criterion} does not use a yield of {target:g}"
         raise MechanismError(Finding(what, "yield", "leave it out, or use the criterion yield"))
+    if sure and criterion != "yield":
+        raise MechanismError(Finding("only a yield can be sure", "sure", "leave it out, or use the criterion yield"))
     share = DEFAULT_YIELD if target is None else target
     _check(share, samples, curve)
     asked = AllocationRequest(
         mechanism, _limited(mechanism, measures), criterion, share, choice, steps, at, samples, seed, friction_method,
-        jobs, curve, exact,
+        jobs, curve, exact, sure,
     )  # fmt: skip
     found = _found(asked)
-    found = replace(found, findings=(*found.findings, *_dearer(found)))
     with_them = mechanism.with_tolerances(found.bought) if found.answer.found else mechanism
     names = [of.measure.name for of in found.study.linear.measures]
     methods: list[Method] = ["linear", "worst-case"] if found.answer.found else ["linear"]
@@ -169,14 +180,9 @@ def _found(asked: AllocationRequest) -> Allocated:
 
 
 def _curve(answer: Answer, way: Way, asked: AllocationRequest) -> list[tuple[float, Answer]]:
-    """Factors of all limits with the answers of least cost.
-
-    Of a yield they have that of normal deviations which the answer has: what samples have shown the target to take.
-    """
+    """Factors of all limits with the answers of least cost; of a yield they have the margin that the answer has."""
     factors: list[float] = np.geomspace(*RANGE, asked.curve).tolist()
-    sampled = answer.sampled is not None and 0 < answer.expected < 1
-    target = answer.expected if sampled else asked.target
-    offers = trade_off(answer.problem, factors, way, target)
+    offers = trade_off(answer.problem, factors, way)
     return [(factor, answer if abs(factor - 1) < SAME else one) for factor, one in zip(factors, offers, strict=True)]
 
 
@@ -320,17 +326,15 @@ class _Search:
         """The answer of a problem; of a yield that of the samples."""
         asked, names = self.asked, [one.name for one in problem.contributions]
 
-        def verify(tolerances: Array, stream: int = 0) -> tuple[float, float, float]:
+        def verify(tolerances: Array, number: int) -> SampledYield:
             bought = {name: float(t) for name, t in zip(names, tolerances, strict=True) if name in self.prices}
             sampled = tolerance(
                 asked.mechanism.with_tolerances(bought), asked.measures, ["monte-carlo"], asked.samples,
-                asked.seed + FRESH * stream, asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
+                asked.seed + FRESH * number, asked.steps, asked.at, friction_method=asked.friction, jobs=asked.jobs,
             )  # fmt: skip
-            share, low, high = (float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high"))
-            return share, low, high
+            return SampledYield(*(float(sampled[f"yield_all{end}"]) for end in ("", "_low", "_high")))
 
-        judges = (verify, verify) if asked.samples else (None, None)
-        return solve(problem, self.way, asked.target, *judges)
+        return solve(problem, self.way, asked.target, verify if asked.samples else None, asked.sure)
 
 
 def _same(problem: AllocationProblem, tolerances: Array, rows: Rows, ahead: Rows) -> bool:
@@ -349,26 +353,6 @@ def _beyond(now: ToleranceStudy) -> list[float]:
         lower, upper = limits(of)
         found.append(max(share_of(least.value, lower), share_of(most.value, upper)))
     return found
-
-
-def _dearer(found: Allocated) -> list[Finding]:
-    """That the tolerances as stated cost less and keep the limits too: by search, or the yield by samples."""
-    asked, before = found.asked, stated_cost(found)
-    if not found.answer.cost > before * (1 + SAME):
-        return []
-    if asked.criterion == "worst-case":
-        now = asked.studied({})
-        known = all(np.isfinite(corner.value) for ends in now.worst() for corner in ends)
-        kept = known and max(_beyond(now)) <= 1 + CLOSE
-    elif asked.criterion == "yield" and asked.samples:
-        sampled = tolerance(
-            asked.mechanism, asked.measures, ["monte-carlo"], asked.samples, asked.seed, asked.steps, asked.at,
-            friction_method=asked.friction, jobs=asked.jobs,
-        )  # fmt: skip
-        kept = float(sampled["yield_all_low"]) >= asked.target
-    else:
-        return []
-    return [finding_for("allocation.dearer", "costs", cost=found.answer.cost, before=before)] if kept else []
 
 
 def _off(now: ToleranceStudy) -> list[Finding]:

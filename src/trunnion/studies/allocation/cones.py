@@ -1,4 +1,7 @@
-"""An allocation as a conic program: power and exponential cones for costs, second-order cones for RSS rows.
+"""Least cost over half widths that may be anything between bounds: a conic program, solved by Clarabel.
+
+Costs are power and exponential cones, rows with a root of squares are second-order cones. The solver also finds a
+point of the dual problem, whose value no allocation undercuts: that is the lower bound of the cost.
 
 P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives,
 arXiv:2405.12762
@@ -6,7 +9,7 @@ arXiv:2405.12762
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import clarabel
@@ -14,18 +17,107 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from trunnion.errors import Finding
+from trunnion.results.sentences import finding_for
 from trunnion.statistics.costs import COST_MODELS
-from trunnion.studies.allocation.task import Task
+from trunnion.studies.allocation.problem import PROVEN, AllocationProblem, Answer, none, shortfalls
+from trunnion.studies.allocation.task import Task, sides, task_of
 
-__all__ = ["Optimum", "Rows", "settled", "solver"]
+__all__ = ["Optimum", "allocate_continuous", "minimise", "unbounded"]
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
-SOUND = ("Solved", "AlmostSolved", "InsufficientProgress")
-CLOSE = 1e-4  # residuals of an answer that goes into Newton's method; the proof is of what comes out
-BROKEN = 1e-7  # of a limit: a row to add
+ACCEPTED = ("Solved", "AlmostSolved", "InsufficientProgress")
+TOLERANCE = 1e-12  # of the solver, far below what its own gap is held to
+RESIDUAL = 1e-4  # of the solver's equations: above it its point is none; the gap is that of the point brought back
+BROKEN = 1e-9  # of a limit: a side to add
 ACTIVE = 1e-6  # of the largest multiplier: a side that limits
-AT_ONCE = 16  # rows added in one round
+ADDED = 16  # sides that one round adds
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Unknowns u, the sides that hold them, with their multipliers, and the lower bound of the cost.
+
+    gap: cost minus bound, as a share of the cost that tolerances change; wider: the share by which all limits had to
+    be widened; rounds: how often the solver was called.
+    """
+
+    u: Array
+    rows: Rows
+    multipliers: Array
+    bound: float
+    gap: float
+    wider: float = 0.0
+    rounds: int = 0
+
+
+def allocate_continuous(problem: AllocationProblem) -> Answer:
+    """The half widths of least cost, or why there are none."""
+    problem.check()
+    chosen = [contribution.name for contribution in problem.contributions if contribution.options]
+    if chosen:
+        what = "has a table of processes, which is no continuous choice"
+        return none(problem, [Finding(what, f"costs.{chosen[0]}", "choose discrete, or give it a cost model")])
+    task = task_of(problem, sides(problem))
+    early = shortfalls(problem, task.tolerances(task.low)) if np.any(task.sides.room < 0) else []
+    trouble = early or unbounded(task) or _unmet(problem, task)
+    if trouble:
+        return none(problem, trouble)
+    point = minimise(task)
+    if point is None:
+        return none(problem, [finding_for("allocation.not_found", "costs")])
+    tolerances = task.tolerances(point.u)
+    pairs = zip(problem.contributions, tolerances.tolist(), strict=True)
+    costs = np.array([contribution.cost.value(t) if contribution.cost else 0.0 for contribution, t in pairs])
+    price = np.zeros(len(problem.effects.worst))
+    np.add.at(price, task.sides.row[point.rows], point.multipliers / task.sides.room[point.rows])
+    proven = point.gap <= PROVEN
+    doubt = finding_for("allocation.proven_roughly", "costs", gap=point.gap)
+    return Answer(
+        problem, tolerances, costs, float(np.sum(costs)), point.bound, point.gap, proven,
+        price=price, findings=() if proven else (doubt,), rounds=point.rounds,
+    )  # fmt: skip
+
+
+def unbounded(task: Task) -> list[Finding]:
+    """Tolerances that neither a limit nor a bound holds."""
+    free = np.flatnonzero(~np.isfinite(task.most))
+    return [finding_for("allocation.unbounded", f"costs.{task.names[g]}") for g in free]
+
+
+def _unmet(problem: AllocationProblem, task: Task) -> list[Finding]:
+    """Why no half widths keep the limits; empty if some do."""
+    least = task.tolerances(task.low)
+    if task.sides.rising or not np.all(task.sides.room > 0):
+        return shortfalls(problem, least)
+    if np.all(task.sides.value(least) <= 1):
+        return []
+    nearest = minimise(task, relaxed=True)
+    return shortfalls(problem, task.tolerances(nearest.u)) if nearest else []
+
+
+def minimise(task: Task, relaxed: bool = False) -> Optimum | None:
+    """The point of least cost; None if the solver did not come to an end.
+
+    Sides that the point breaks are added until there is none: so thousands of rows cost little.
+    relaxed: the least share by which all limits have to be widened, in place of the least cost.
+    """
+    start = task.tolerances(np.ones(len(task.unit)))
+    steep = task.sides.gradient(start) @ task.spans
+    nearest = np.argsort(-task.sides.value(start), kind="stable")[:4]
+    rows = np.union1d(np.argmax(steep, axis=0) if len(steep) else nearest, nearest).astype(np.intp)
+    for rounds in range(1, len(task.sides) + 2):
+        point = _solved(task, rows, relaxed, rounds)
+        if point is None:
+            return None
+        value = task.sides.value(task.tolerances(point.u)) - point.wider
+        value[rows] = 0.0
+        broken = np.flatnonzero(value > 1 + BROKEN)
+        if not len(broken):
+            break
+        rows = np.concatenate([rows, broken[np.argsort(-value[broken], kind="stable")[:ADDED]]])
+    return point
 
 
 @dataclass
@@ -40,63 +132,17 @@ class _Cones:
 
     def add(self, cone: Any, block: Array, right: Array) -> int:
         """One block of rows, its last columns 0 where it is narrow; the number of its first row."""
-        whole = np.zeros((len(right), self.columns))
-        whole[:, : block.shape[1]] = block
-        self.blocks.append(whole)
+        padded = np.zeros((len(right), self.columns))
+        padded[:, : block.shape[1]] = block
+        self.blocks.append(padded)
         self.right.append(right)
         self.cones.append(cone)
         self.rows += len(right)
         return self.rows - len(right)
 
 
-@dataclass(frozen=True)
-class Optimum:
-    """Unknowns u, the sides that hold them with their multipliers, and how good they are.
-
-    gap: cost from its lower bound, in units of the cost that tolerances change; wider: the share by which all limits
-    had to be widened; rounds: of the solver.
-    """
-
-    u: Array
-    rows: Rows
-    weights: Array
-    wider: float = 0.0
-    gap: float = np.nan
-    rounds: int = 0
-
-
-def settled(task: Task, relaxed: bool = False) -> Optimum | None:
-    """The point of least cost; None if the solver did not come to an end.
-
-    Sides that the answer breaks are added until there is none: thousands of rows cost little.
-    relaxed: the least share by which all limits have to be widened, in place of the least cost.
-    """
-    rows, rounds = _first(task), 0
-    while True:
-        point = _solved(task, rows, relaxed)
-        rounds += 1
-        if point is None:
-            return None
-        value = task.sides.value(task.tolerances(point.u)) - point.wider
-        value[rows] = 0.0
-        broken = np.flatnonzero(value > 1 + BROKEN)
-        if not len(broken):
-            break
-        rows = np.concatenate([rows, broken[np.argsort(-value[broken], kind="stable")[:AT_ONCE]]])
-    return replace(point, rounds=rounds)
-
-
-def _first(task: Task) -> Rows:
-    """Sides to begin with: for each unknown the one that bounds it most, and the nearest at the start."""
-    t = task.tolerances(np.ones(len(task.unit)))
-    steep = task.sides.gradient(t) @ task.spans
-    picked = {int(np.argmax(column)) for column in steep.T} if len(steep) else set()
-    picked |= {int(k) for k in np.argsort(-task.sides.value(t), kind="stable")[:4]}
-    return np.array(sorted(picked), np.intp)
-
-
-def _solved(task: Task, rows: Rows, relaxed: bool) -> Optimum | None:
-    """What the solver finds with these sides alone."""
+def _solved(task: Task, rows: Rows, relaxed: bool, rounds: int) -> Optimum | None:
+    """The solver's point with these sides alone, brought back within them."""
     count, priced = len(task.unit), [] if relaxed else task.costs
     cones = _Cones(count + len(priced) + int(relaxed))
     bounds, right = np.concatenate([-np.eye(count), np.eye(count)]), np.concatenate([-task.low, task.high])
@@ -112,14 +158,31 @@ def _solved(task: Task, rows: Rows, relaxed: bool) -> Optimum | None:
         shares = [_epigraph(task, place, cones) for place in range(len(priced))]
         scale = sum(shares) or 1.0
         aim[count:] = np.array(shares) / scale
-    nothing, whole = np.zeros((cones.columns, cones.columns)), np.vstack(cones.blocks)
-    found = solver(nothing, aim, whole, np.concatenate(cones.right), cones.cones).solve()
-    if str(found.status) not in SOUND or found.r_prim > CLOSE or found.r_dual > CLOSE:
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    square, matrix = sparse.csc_matrix((cones.columns, cones.columns)), sparse.csc_matrix(np.vstack(cones.blocks))
+    found = clarabel.DefaultSolver(square, aim, matrix, np.concatenate(cones.right), cones.cones, settings).solve()
+    if str(found.status) not in ACCEPTED or max(found.r_prim, found.r_dual) > RESIDUAL:
         return None
-    x, weights = np.asarray(found.x), scale * np.maximum(np.asarray(found.z)[firsts], 0.0)
-    active = weights > ACTIVE * np.max(weights, initial=0.0)
-    wider = float(x[-1]) if relaxed else 0.0
-    return Optimum(np.clip(x[:count], task.low, task.high), rows[active], weights[active], wider)
+    x, multipliers = np.asarray(found.x), scale * np.maximum(np.asarray(found.z)[firsts], 0.0)
+    active = multipliers > ACTIVE * np.max(multipliers, initial=0.0)
+    u = np.clip(x[:count], task.low, task.high)
+    if relaxed:
+        return Optimum(u, rows[active], multipliers[active], np.nan, np.nan, float(x[-1]), rounds)
+    u = _within(task, u, rows)
+    varying, bound = task.cost(u) - task.constant, scale * float(found.obj_val_dual)
+    gap = max(varying - bound, 0.0) / (varying or 1.0)
+    bound = task.constant + min(bound, varying)
+    return Optimum(u, rows[active], multipliers[active], bound, gap, 0.0, rounds)
+
+
+def _within(task: Task, u: Array, rows: Rows) -> Array:
+    """The same brought back within the limits, which a solver keeps to its tolerance only."""
+    over, least = (np.max(task.sides.value(task.tolerances(each), rows), initial=0.0) for each in (u, task.low))
+    if over <= 1 or least >= 1:
+        return u
+    return task.low + (1 - least) / (over - least) * (u - task.low)  # on a line to the least the sides are convex
 
 
 def _side(task: Task, k: int, cones: _Cones, relaxed: bool) -> int:
@@ -144,24 +207,15 @@ def _side(task: Task, k: int, cones: _Cones, relaxed: bool) -> int:
 def _epigraph(task: Task, place: int, cones: _Cones) -> float:
     """The cone of one cost, z ≥ u^−k or z ≥ exp(−k u), and what z costs."""
     g, cost = task.costs[place]
-    given = {name: one.default for name, one in COST_MODELS[cost.model].parameters.items()} | dict(cost.parameters)
-    k, ratio = float(given["k"] or 0.0), float(task.unit[g] / (given["unit"] or 1.0))
+    numbers = cost.numbers()
+    k, ratio = numbers["k"], float(task.unit[g] / numbers["unit"])
     column = len(task.unit) + place
     block, right = np.zeros((3, cones.columns)), np.zeros(3)
     if COST_MODELS[cost.model].cone == "power":  # z^α u^(1−α) ≥ 1 with α = 1/(1 + k)
         block[0, column] = block[1, g] = -1.0
         right[2] = 1.0
         cones.add(clarabel.PowerConeT(1 / (1 + k)), block, right)
-        return float((given["B"] or 0.0) * ratio**-k)
+        return numbers["B"] * float(ratio**-k)
     block[0, g], block[2, column], right[1] = k * ratio, -1.0, 1.0  # 1 · exp(−k u / 1) ≤ z
     cones.add(clarabel.ExponentialConeT(), block, right)
-    return float(given["B"] or 0.0)
-
-
-def solver(square: Array, aim: Array, whole: Array, right: Array, cones: list[Any], **settings: float) -> Any:
-    """Least ½ x·square·x + aim·x with right − whole x in the cones; settings: other than Clarabel's own."""
-    chosen = clarabel.DefaultSettings()
-    for name, value in ({"verbose": False} | settings).items():
-        setattr(chosen, name, value)
-    upper, rows = sparse.csc_matrix(np.triu(square)), sparse.csc_matrix(whole)
-    return clarabel.DefaultSolver(upper, aim, rows, right, cones, chosen)
+    return numbers["B"]

@@ -23,8 +23,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from trunnion.errors import Finding
 from trunnion.results.sentences import finding_for
-from trunnion.studies.allocation.cones import Optimum
-from trunnion.studies.allocation.continuous import allocate_continuous, minimise, unbounded
+from trunnion.studies.allocation.cones import Optimum, allocate_continuous, minimise, unbounded
 from trunnion.studies.allocation.problem import (
     ALLOWED,
     PROVEN,
@@ -108,7 +107,13 @@ class _Search:
         if any(not names for names in self.names):
             which = next(k for k, names in enumerate(self.names) if not names)
             one = self.problem.contributions[self.members[which][0]]
-            return [finding_for("allocation.no_common_option", f"costs.{one.name}")]
+            return [
+                Finding(
+                    "no option of the group lies within the bounds of all its members",
+                    f"costs.{one.name}",
+                    "widen the bounds",
+                )
+            ]
         if not self.limits.rising and np.all(self.limits.room > 0):
             return []
         return shortfalls(self.problem, self.narrowest())
@@ -246,7 +251,9 @@ class _Search:
     def _answer(self, best: _Best, bound: float, rounds: int) -> Answer:
         problem = self.problem
         if not np.isfinite(best.cost):
-            doubt = finding_for("allocation.no_choice", "processes")
+            doubt = Finding(
+                "no choice of processes meets the limits", "processes", "widen a limit or add a finer process"
+            )
             return none(problem, shortfalls(problem, self.narrowest()) or [doubt])
         u = best.point.u if best.point else np.zeros(0)
         gap = max(best.cost - bound, 0.0) / self.scale + (best.point.gap if best.point else 0.0)
@@ -260,7 +267,7 @@ class _Search:
             for i in members
         }
         proven = gap <= PROVEN
-        doubt = finding_for("allocation.choice_proven_roughly", "processes", gap=gap)
+        doubt = finding_for("allocation.proven_roughly", "processes", gap=gap)
         nothing = np.full(len(problem.effects.worst), np.nan)
         return Answer(
             problem,

@@ -19,7 +19,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from trunnion.errors import Finding, MechanismError, agreeing
 from trunnion.model.tolerances import ProcessChoice
@@ -40,8 +39,8 @@ __all__ = [
 Array = NDArray[np.float64]
 Criterion = Literal["worst-case", "rss", "yield"]
 ALLOWED = 1e-9  # of a limit: how far a row may lie beyond it
-FAR = 6.0  # standard deviations: a cap beyond it is none, and no row with a cap is asked for more
-PROVEN = 1e-9  # of the cost that tolerances change: a gap below it proves the optimum
+BENT = 8.0  # n, how late margins bend to their cap
+PROVEN = 1e-6  # of the cost that tolerances change: up to this gap of the solver an optimum is claimed
 
 
 @dataclass(frozen=True)
@@ -128,31 +127,27 @@ class RowEffects:
 class AllocationProblem:
     """Contributions, their effects, the criterion; z: how many standard deviations of room `yield` asks for.
 
-    ratios: what z is multiplied by for each row, (row,); all 1 if None. caps: the largest margin that each row can have
-    beside all others, (row,), infinite or None where there is no end to it: see `margins`.
+    caps: the largest margin that each row can have, (row,), infinite where there is no end to it; None: not looked at.
     """
 
     contributions: tuple[Contribution, ...]
     effects: RowEffects
     criterion: Criterion = "worst-case"
     z: float = 3.0
-    ratios: Array | None = None
     caps: Array | None = None
 
     def margins(self) -> Array:
         """Standard deviations of room that `yield` asks of each row, (row,).
 
-        What a row fails at its cap nobody can mend, so it is permitted beside what z and its ratio permit:
-        Q(margin) = Q(z · ratio) + Q(cap), Q the normal tail. However large z, there are half widths with such margins.
+        They are z, but where a row cannot have z, as what is not bought takes up most of its room, they stay below
+        its cap: (z⁻ⁿ + cap⁻ⁿ)^(−1/n). However large z, there are half widths with such margins.
         """
-        asked = self.z * (np.ones(len(self.effects.worst)) if self.ratios is None else self.ratios)
-        return asked if self.caps is None else beside(asked, self.caps)
+        asked = np.full(len(self.effects.worst), self.z)
+        return asked if self.caps is None else asked * (1 + (asked / self.caps) ** BENT) ** (-1 / BENT)
 
     def with_effects(self, effects: RowEffects) -> AllocationProblem:
         """The same with other effects of its rows, or of the first ones of them alone."""
-        count = len(effects.worst)
-        ratios, caps = (None if one is None else one[:count] for one in (self.ratios, self.caps))
-        return replace(self, effects=effects, ratios=ratios, caps=caps)
+        return replace(self, effects=effects, caps=None if self.caps is None else self.caps[: len(effects.worst)])
 
     def check(self) -> None:
         """Raise `MechanismError` with all that makes it no problem."""
@@ -223,11 +218,8 @@ class Answer:
     proven: whether the gap proves a global optimum.
     price: what one more unit (rad, m, …) of a row's room would save, (row,); NaN for a discrete choice.
     active: rows that limit; used: share of its room each row takes. rounds: of the solver.
-    Of a yield: expected, of normal deviations, linearly; sampled, by `verify`; checked, by samples that had no
-    part in the choice; trials: all that were sampled. There the
-    optimum is that of the margins of the problem, one for each measure. saved: share of the cost that their split
-    saves against one margin for all measures, NaN where nothing was split. floor: no half widths whose yield of normal
-    deviations meets the target cost less, linearly; excess: share of it by which the cost before sampling is above it.
+    Of a yield: expected, of normal deviations, linearly; sampled, by those samples that chose the margin; checked, by
+    fresh ones, which had no part in it; trials: all margins that were tried.
     """
 
     problem: AllocationProblem
@@ -245,10 +237,6 @@ class Answer:
     sampled: SampledYield | None = None
     checked: SampledYield | None = None
     trials: tuple[Trial, ...] = ()
-    saved: float = np.nan
-    floor: float = np.nan
-    excess: float = np.nan
-    alone: dict[str, float] = field(default_factory=dict)
 
     @property
     def found(self) -> bool:
@@ -345,13 +333,6 @@ def _shortfall(problem: AllocationProblem, least: Array, row: int, more: str) ->
     return finding_for(
         "allocation.impossible", effects.label(row), phrases=phrases, limit=limit, takes=over, largest=largest.name
     )
-
-
-def beside(asked: Array, caps: Array) -> Array:
-    """Margins that fail as often as the margins asked for and the caps do together; those asked for without a cap."""
-    near = caps < FAR
-    both = ndtr(-np.clip(asked, 0.0, FAR)) + ndtr(-np.where(near, caps, FAR))
-    return np.where(near, np.minimum(np.maximum(-ndtri(np.minimum(both, 0.5)), 0.0), asked), asked)
 
 
 def _norm(parts: Array, correlation: Array | None) -> Array:

@@ -1,30 +1,52 @@
-"""The Dataset of `allocate`: that of `tolerance` with the tolerances found, what they cost, and what accuracy costs."""
+"""What `allocate` was asked for and found, and its Dataset: that of `tolerance` with the tolerances and their cost."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.errors import Severity
+from trunnion.errors import Finding, Severity
+from trunnion.model.mechanism import Mechanism
 from trunnion.model.tolerances import Price
 from trunnion.results.attributes import encoded, finding_rows, findings_of, summary_of
 from trunnion.results.dataset import MemberUnits, Variable, described, units_along, with_variables
+from trunnion.results.figure import Figure
 from trunnion.results.scales import scales_in
+from trunnion.results.sentences import finding_for
+from trunnion.solve.friction_method import FrictionMethod
 from trunnion.statistics.costs import Cost
-from trunnion.studies.allocation import findings
-from trunnion.studies.allocation.outcome import Allocated
-from trunnion.studies.tolerance.targets import MISSED
+from trunnion.studies.allocation.problem import Answer, Criterion
+from trunnion.studies.allocation.rows import Rows
+from trunnion.studies.allocation.solve import Choice as Way
+from trunnion.studies.tolerance.first_order import ToleranceStudy, study
+from trunnion.studies.tolerance.targets import MISSED, limits
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["VARIABLES", "cost_of", "dataset"]
+__all__ = [
+    "CLOSE",
+    "DEFAULT_YIELD",
+    "VARIABLES",
+    "Allocated",
+    "AllocationRequest",
+    "Choice",
+    "cost_of",
+    "dataset",
+    "share_of",
+]
 
 Array = NDArray[np.float64]
+Choice = Literal["auto", "continuous", "discrete"]
+DEFAULT_YIELD = 0.9973
+CLOSE = 1e-6  # of a limit: how close to it the worst case found is brought
+TWICE = 2.0  # so many rejects as an RSS stands for are an error
+SHOWN = {"rad": (180 / np.pi, "deg"), "m": (1e3, "mm")}
+ROUGH, SLIGHT = 0.01, 0.001  # of a limit: what first order may leave out before it is an error, and a warning
 M, P, T = ("measure",), ("parameter",), ("trial",)
 VARIABLES: dict[str, Variable] = {
     "tolerance": Variable(P, "parameter", "half width found; of a clearance the radial clearance; else as stated"),
@@ -63,6 +85,61 @@ VARIABLES: dict[str, Variable] = {
 }
 
 
+@dataclass(frozen=True)
+class AllocationRequest:
+    """What was asked for; see `allocate`. measures: those with limits; target: the yield, for that criterion."""
+
+    mechanism: Mechanism
+    measures: Sequence[str]
+    criterion: Criterion
+    target: float
+    choice: Choice
+    steps: int
+    at: float | str | None
+    samples: int
+    seed: int
+    friction: FrictionMethod | None
+    jobs: int | None
+    curve: int
+    exact: bool
+    sure: bool
+
+    def studied(self, bought: Mapping[str, float]) -> ToleranceStudy:
+        """First order of the mechanism with these half widths and clearances, by path."""
+        mechanism = self.mechanism.with_tolerances(bought)
+        return study(mechanism, self.measures, self.steps, self.at, self.friction)
+
+
+@dataclass(frozen=True, eq=False)
+class Allocated:
+    """What was found. study: of the tolerances that the rows of the answer belong to; way: how it was solved.
+
+    prices: of what could be bought, by path; before: half widths as stated; tight: what limits were multiplied by, by
+    measure, so that the mechanism itself keeps them; offers: factors of all limits with their answers.
+    """
+
+    asked: AllocationRequest
+    study: ToleranceStudy
+    rows: Rows
+    answer: Answer
+    way: Way
+    prices: Mapping[str, Price]
+    before: Mapping[str, float]
+    findings: tuple[Finding, ...]
+    tight: Mapping[str, float] = field(default_factory=dict)
+    offers: tuple[tuple[float, Answer], ...] = field(default=())
+
+    @property
+    def bought(self) -> dict[str, float]:
+        """Half widths that were found, and radial clearances, by path, SI."""
+        return {name: t for name, t in self.answer.by_name.items() if name in self.prices}
+
+
+def share_of(value: float, limit: float) -> float:
+    """A deviation as a share of a limit to the same side; 0 of another side, or without a limit."""
+    return max(value / limit, 0.0) if np.isfinite(limit) and limit != 0 and np.isfinite(value) else 0.0
+
+
 def cost_of(price: Price, t: float) -> float:
     """Cost of a half width, SI; of options, of the cheapest that keeps it, NaN if none does."""
     if price.model:
@@ -83,16 +160,16 @@ def dataset(found: Allocated, known: xr.Dataset) -> xr.Dataset:
     variables = described(arrays, VARIABLES, {"parameter": parameters, "saving": saving})
     # the criterion says what is to be kept
     kept = [one for one in findings_of(known) if not one.code.startswith(MISSED)]
-    own = list(findings.findings_of(found, known))
+    own = list(_findings(found, known))
     attributes: dict[str, Any] = {
         "kind": "allocation",
         "found": int(found.answer.found),
         "criterion": found.asked.criterion,
         "target": found.asked.target,
         "choices": found.way,
-        "proven": int(found.answer.proven and not findings.contradicted(found, known)),
+        "proven": int(found.answer.proven),
         "prices": [_plain(price) for price in found.prices.values()],
-        **scales_in(known).summary([*findings.summary(found, known, arrays), *summary_of(known)]),
+        **scales_in(known).summary([*_summary(found, known, arrays), *summary_of(known)]),
         "findings": finding_rows([*own, *kept]),
         "missed": [f"{one.where}: {one.what}".lstrip(": ") for one in own if one.severity is Severity.ERROR],
     }
@@ -202,3 +279,91 @@ def _whole(found: Allocated, count: int) -> Mapping[str, Any]:
         arrays["trade_off_factor"] = np.array([factor for factor, _ in found.offers])
         arrays["trade_off_cost"] = np.array([answer.cost for _, answer in found.offers])
     return arrays
+
+
+# ---- summary and findings --------------------------------------------------------------------------------------
+
+
+def _summary(found: Allocated, known: xr.Dataset, arrays: Mapping[str, Any]) -> Iterator[Figure]:
+    """What all costs, and before; what of the room is taken."""
+    answer = found.answer
+    yield Figure("cost", "cost", answer.cost if answer.found else None, aspect="least")
+    if np.isfinite(arrays["cost_total_before"]):
+        yield Figure("cost_before", "cost as stated", arrays["cost_total_before"])
+    if answer.found:
+        yield Figure("cost_bound", "lower bound of the cost", answer.bound)
+    if answer.sampled is not None:
+        yield Figure("yield_asked", "required yield", found.asked.target)
+        yield Figure("yield", "yield of the samples", answer.sampled.share)
+    if answer.checked is not None:
+        yield Figure("yield_checked", "yield of fresh samples", answer.checked.share)
+    for name, used in zip(known["measure"].values.tolist(), arrays["used"].tolist(), strict=True):
+        if answer.found and np.isfinite(used):
+            yield Figure(f"{name}.used", f"{name}, share of the limits used", used)
+
+
+def _findings(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """Why there is no allocation; limits that are not kept on the mechanism itself; what the criterion leaves out."""
+    answer, criterion = found.answer, found.asked.criterion
+    yield from found.findings
+    yield from answer.findings
+    if not answer.found:
+        return
+    yield from _plays(found)
+    for name, share in found.tight.items():
+        yield finding_for("allocation.narrowed", f"measures.{name}", percent=100 * (1 - share))
+    if criterion != "yield" and found.study.effects.correlated:
+        yield finding_for("allocation.correlations_left_out", "correlations", criterion=criterion)
+    if criterion == "worst-case":
+        yield from _searched(found, known)
+    if criterion == "rss" and "yield" in known:
+        yield from _promised(known)
+    kept = [factor for factor, offer in found.offers if offer.found]
+    if len(kept) < len(found.offers):
+        points, least = len(found.offers), min(kept, default=None)
+        yield finding_for("allocation.curve_short", points=points, lost=points - len(kept), least=least)
+
+
+def _plays(found: Allocated) -> Iterator[Finding]:
+    """Allocated plays whose clearance has a tolerance of its own, which no cost is of."""
+    for path in found.prices:
+        joint = path.split(".")[1]
+        sizes = [f"joints.{joint}.{part}.clearance" for part in ("pin", "guide")]
+        for one in found.study.inputs.tolerances:
+            if path == f"joints.{joint}.clearance" and one.path in sizes:
+                ends: dict[str, Any] = {"lower_um": 1e6 * one.lower, "upper_um": 1e6 * one.upper}
+                yield finding_for("allocation.play_tolerance", f"costs.{joint}.clearance", number=one.path, **ends)
+
+
+def _promised(known: xr.Dataset) -> Iterator[Finding]:
+    """Measures of whose samples fewer keep the limits than three deviations of a normal one would.
+
+    That is what RSS means where the tolerances are three deviations of theirs; other distributions, means off the
+    middle, and correlations make it another.
+    """
+    for name, share, high in zip(
+        *(known[key].values.tolist() for key in ("measure", "yield", "yield_high")), strict=True
+    ):
+        if not high < DEFAULT_YIELD:
+            continue
+        severity = Severity.ERROR if 1 - high > TWICE * (1 - DEFAULT_YIELD) else Severity.WARNING
+        yield finding_for("yield.below_rss", f"measures.{name}", severity=severity, share=share, target=DEFAULT_YIELD)
+
+
+def _searched(found: Allocated, known: xr.Dataset) -> Iterator[Finding]:
+    """Measures whose worst case, as found on the mechanism, is beyond a limit that first order keeps."""
+    units = units_along(known["nominal"], "measure")
+    for k, of in enumerate(found.study.linear.measures):
+        lower, upper = limits(of)
+        low, high = float(known["searched_lower"][k]), float(known["searched_upper"][k])
+        shares = share_of(low, lower), share_of(high, upper)
+        beyond = max(shares) - 1
+        if not beyond > CLOSE:
+            continue
+        factor, unit = SHOWN.get(units[k], (1.0, units[k]))
+        value, limit = (high, upper) if shares[1] >= shares[0] else (low, lower)
+        severity = Severity.ERROR if beyond > ROUGH else Severity.WARNING if beyond > SLIGHT else Severity.NOTE
+        yield finding_for(
+            "allocation.worst_case_beyond", f"measures.{of.measure.name}", severity=severity, worst=factor * value,
+            unit=unit, percent=100 * beyond, limit=factor * limit, accepted=100 * ROUGH,
+        )  # fmt: skip

@@ -124,16 +124,10 @@ class Task:
         """What the unknowns cost."""
         return sum(cost.value(float(self.unit[g] * u[g])) for g, cost in self.costs)
 
-    def slope(self, u: Array) -> Array:
-        """∂cost/∂u, (unknown,)."""
-        total = np.zeros(len(u))
-        for g, cost in self.costs:
-            total[g] += self.unit[g] * cost.slope(float(self.unit[g] * u[g]))
-        return total
-
-    def scale(self, u: Array) -> float:
-        """The part of the cost that tolerances change at u, but for what is lost in the rounding of the whole."""
-        return max(float(np.sum(np.abs(self.slope(u) * u))), 1e-9 * abs(self.cost(u))) or 1.0
+    @property
+    def constant(self) -> float:
+        """The part of the cost that no half width changes."""
+        return sum(cost.numbers()["A"] for _, cost in self.costs)
 
     @property
     def low(self) -> Array:

@@ -1,207 +1,245 @@
-"""Least cost that keeps a yield: the margin z of all rows, first for normal deviations, then as sampled.
+"""Least cost that keeps a yield: one margin of all limits, in standard deviations, found by bisection.
 
-The yield of all rows together, linearly and with normal deviations, is that of `normal`; the sum of their failures
-(Bonferroni) bounds z from above. The margins stay below what each row can have at all (`narrowest`), so that a yield is
-found wherever the narrowest half widths have it. They are split over the measures by cost (`splits`), and corrected
-until the yield that the caller samples meets the target (`sampled`).
+With a margin z of every limit the cheapest half widths are a convex or a mixed-integer problem. What share of
+mechanisms they keep within all limits rises with z, as it is counted on the same samples each time; without samples
+it is that of normal deviations and linear rows. Samples that chose flatter what they chose, so fresh ones check it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import ndtri
+from scipy.special import chdtr, ndtr, ndtri
 
 from trunnion.errors import Severity
 from trunnion.results.sentences import finding_for
-from trunnion.studies.allocation.narrowest import bought_at, freed, with_caps
-from trunnion.studies.allocation.normal import by_measure, failing, normal_yield, plain_yield
-from trunnion.studies.allocation.problem import FAR, AllocationProblem, Answer
-from trunnion.studies.allocation.sampled import HIGHEST, Check, Samples, Verify, corrected, furthest, score
-from trunnion.studies.allocation.splits import split
+from trunnion.statistics.streams import SobolStream, factor
+from trunnion.studies.allocation.problem import AllocationProblem, Answer, SampledYield, Trial, common_options
 
-__all__ = ["Check", "Verify", "meet", "normal_yield"]
+__all__ = ["Verify", "meet", "normal_yield"]
 
 Array = NDArray[np.float64]
 Solve = Callable[[AllocationProblem], Answer]
-NEAR = 1e-6  # of z: how close splits of the margins are settled
-AROUND = 0.1  # of z: how far a split of the margins moves their mean
-SURE = 1e-9  # of the target, in standard scores
-EVEN = 1e-3  # of z: margins that differ less are the same
-LEAST = 1e-3  # of z: how far beside the limit of what can be it is looked for
-CLOSELY = 0.25  # of the permitted failures: if the narrowest half widths have more, samples of these are looked at
-EASED = (0.0, 0.5, 1.0)  # of what a limit can have with the narrowest half widths: margins asked of one that is short
-FEW = 0.5  # of the permitted failures: what measures fail together that are judged as normal ones
+Verify = Callable[[Array, int], SampledYield]
+DIRECTIONS = 2048
+ROWS = 128  # rows that are multiplied by all directions at once
+FAR = 6.0  # standard deviations: a row with more room than that never fails
+LEAST, MOST = 0.05, 8.0  # standard deviations: margins that are looked at
+NEAR = 0.25  # standard deviations: how far normal deviations are usually off
+CLOSE, CLOSE_SAMPLED = 1e-7, 5e-3  # standard deviations: where the bisection ends, by normal deviations and samples
+CHECKS = 4  # by fresh samples, each with a margin that the one before has raised
+RAISED = 1e-3  # in standard scores: how much more is asked at least after fresh samples have missed the target
+ROUNDING = 1e-9  # of a yield and of its standard score
+UNKNOWN = SampledYield(np.nan, np.nan, np.nan)
 
 
 def meet(
-    problem: AllocationProblem, target: float, solve: Solve, verify: Verify | None = None, check: Check | None = None
+    problem: AllocationProblem, target: float, solve: Solve, verify: Verify | None = None, sure: bool = False
 ) -> Answer:
-    """The allocation of least cost whose yield meets the target.
+    """The allocation of least cost whose yield meets a target.
 
-    solve: of a problem with z given; verify: half widths (contribution,) → yield, and its interval, low and high;
-    check: the same of other samples, with the number of their stream, from 1.
+    Parameters
+    ----------
+    problem : its criterion is `yield`; its margin z is replaced
+    target : share of mechanisms within all limits
+    solve : the allocation of least cost of a problem with its margin
+    verify : the sampled yield of half widths (contribution,), from samples of a number: 0 for those that choose,
+        1, 2, … for fresh ones; without it the yield is that of normal deviations and linear rows
+    sure : whether the lower end of the interval of the fresh samples has to meet the target, and not only not miss it
+
+    Returns
+    -------
+    The answer, with a finding `yield.missed` where no margin meets the target or fresh samples speak against it.
     """
-    low, most = _ends(problem, target)
-    problem, best = with_caps(problem, most, solve)
-    fails = failing(problem, best) if best is not None else {}
-    alone = None  # each row alone has to fail less than all may together
-    if problem.ratios is None and ndtri(target) > LEAST:
-        alone = solve(replace(problem, z=low, caps=None))
-    floor = alone.bound if alone else np.nan
-    reserve = bought_at(replace(problem, z=furthest(problem)), best, floor) if best is not None else None
-    if alone and not alone.found:
-        first = alone
-    else:
-        first = replace(_expected(problem, target, solve, reserve=reserve), floor=floor)
-    if not first.found or _refused(first):
-        sure = None if verify is None else Samples(target, solve, verify, check, reserve)
-        answer = first if sure is None else _beyond_normal(first, problem, fails, sure)
-        return replace(answer, alone=fails)
-    found = first
-    if not first.findings and (problem.ratios is None or np.all(problem.ratios > 0)):
-        found = split(freed(first), lambda one: _expected(one, target, solve, AROUND), plain_yield)
-    answer = found if verify is None else _sampled(found, Samples(target, solve, verify, check, reserve), fails)
-    even = np.ptp(first.problem.margins()) < EVEN * first.problem.z
-    saved = 1 - found.cost / first.cost if found is not first and even else np.nan
-    excess = found.cost / floor - 1 if floor > 0 else np.nan
-    return replace(answer, saved=saved, excess=excess, alone=fails, floor=floor)
+    problem = replace(problem, caps=_largest_margins(problem))
 
+    def normal(tolerances: Array) -> SampledYield:
+        share = normal_yield(problem, tolerances)
+        return SampledYield(share, share, share)
 
-def _sampled(answer: Answer, samples: Samples, fails: dict[str, float]) -> Answer:
-    """The answer corrected by samples; where these cannot tell that any half widths meet the target, hardly.
-
-    With the narrowest ones next to the target, luck of the samples would decide between the half widths of first order
-    and the dearest of all. They stay those of first order then, unless the samples speak against them.
-    fails: what each measure fails with the narrowest half widths.
-    """
-    if samples.reserve is None or sum(fails.values()) < CLOSELY * (1 - samples.target):
-        return corrected(answer, samples)
-    reserve = samples.verified(samples.reserve)
-    samples, ends = replace(samples, reserve=reserve), reserve.sampled
-    if ends is None or not ends.low < samples.target <= ends.high:
-        return corrected(answer, samples)
-    found = corrected(answer, replace(samples, by="high"))
-    if _refused(found):
-        return found
-    doubt = finding_for("yield.unresolved", "yield", **ends._asdict(), target=samples.target, normal=found.expected)
-    return replace(found, findings=(*found.findings, doubt))
-
-
-def _refused(answer: Answer) -> bool:
-    return any(one.severity is Severity.ERROR for one in answer.findings)
-
-
-def _ends(problem: AllocationProblem, target: float) -> tuple[float, float]:
-    """Margins between which the one is that all rows together need: of one row alone, and if no two fail together."""
-    rows = len(problem.effects.worst)
-    least, most = float(ndtri(target)) - LEAST, float(ndtri(1 - (1 - target) / (2 * rows))) + LEAST
-    return max(least, LEAST), most
-
-
-def _expected(
-    problem: AllocationProblem, target: float, solve: Solve, around: float = np.inf, reserve: Answer | None = None
-) -> Answer:
-    """The cheapest allocation that meets the target for normal deviations, the margins being in the stated ratios.
-
-    around: how far from the z of the problem it is looked for, before it is looked for everywhere; reserve: the
-    narrowest half widths, where no others meet it.
-    """
-    tried: list[Answer] = []
-
-    def over(z: float) -> float:
-        answer = solve(replace(problem, z=z))
-        if not answer.found:
-            return HIGHEST
-        answer = replace(answer, expected=normal_yield(problem, answer.tolerances))
-        tried.append(answer)
-        return score(answer.expected) - score(target)
-
-    least, most = _ends(problem, target)
-    ratios = np.ones(1) if problem.ratios is None else problem.ratios
-    if not np.all(ratios > 0):  # rows that samples alone decide over: what they fail is no matter of the margin
-        ratios, most = np.where(ratios > 0, ratios, 1.0), HIGHEST
-    ends = (least / float(np.max(ratios)), most / float(np.min(ratios)))
-    near = (max(ends[0], problem.z - around), min(ends[1], problem.z + around))
-    tries = [near, ends] if problem.caps is None else [near, ends, (ends[0], max(ends[1], furthest(problem)))]
-    for low, high in dict.fromkeys(tries):
-        if over(low) < 0 and over(high) > 0:
-            brentq(over, low, high, xtol=1e-9 if around == np.inf else NEAR, rtol=1e-12)
+    linear = _Margins(problem, solve, normal)
+    steps = any(contribution.options for contribution in problem.contributions)  # where the yield is no steady one
+    answer = linear.cheapest(target, _score(target), CLOSE_SAMPLED if steps else CLOSE)
+    if not answer.found:
+        return answer
+    if verify is None:
+        reckoned = answer.sampled or UNKNOWN
+        return _judged(replace(answer, sampled=None, trials=()), target, reckoned, sure)
+    chosen = _Margins(problem, solve, lambda tolerances: verify(tolerances, 0), sure)
+    goal = target
+    for number in range(1, CHECKS + 1):
+        answer = chosen.cheapest(goal, answer.problem.z, CLOSE_SAMPLED)
+        sampled = answer.sampled or UNKNOWN
+        if chosen.level(sampled) < target:  # whatever the margin
+            return _judged(answer, target, sampled, sure)
+        checked = verify(answer.tolerances, number)
+        answer = replace(answer, checked=checked)
+        level = checked.low if sure else checked.high
+        if level >= target:
             break
-    if not tried:
-        return solve(replace(problem, z=ends[0]))
-    enough = [one for one in tried if score(one.expected) >= score(target) - SURE * 10]
-    if enough:
-        return min(enough, key=lambda one: one.cost)
-    best = max(tried, key=lambda one: one.expected)
-    if reserve:
-        best = replace(reserve, expected=normal_yield(problem, reserve.tolerances))
-        if best.expected >= target:
-            return best
-    of = {"of": "of normal deviations"}
-    doubt = finding_for("yield.narrowest", "yield", phrases=of, share=best.expected, target=target)
-    return replace(best, findings=(*best.findings, doubt))
+        goal = _share(_score(chosen.level(sampled)) + max(_score(target) - _score(level), RAISED))
+    return _judged(answer, target, checked, sure)
 
 
-def _beyond_normal(first: Answer, problem: AllocationProblem, fails: dict[str, float], samples: Samples) -> Answer:
-    """Where no half widths keep the limits for normal deviations: those that samples keep, as without tails they may.
+def _judged(answer: Answer, target: float, sampled: SampledYield, sure: bool) -> Answer:
+    """The same with a finding if a yield misses the target: a note if that may be chance, its interval having it."""
+    if (sampled.low if sure else sampled.share) >= target - ROUNDING:
+        return answer
+    severity = Severity.ERROR if sure or sampled.high < target else Severity.NOTE
+    missed = finding_for("yield.missed", "yield", severity=severity, **sampled._asdict(), target=target)
+    return replace(answer, findings=(missed,) if severity is Severity.ERROR else (*answer.findings, missed))
 
-    That normal deviations do not is a reason to be sure of it: the narrowest half widths have to meet the target with
-    the lower end of their interval. The measures that are short get a smaller margin, however large that of the
-    others: none, then more, up to that of the others; the cheapest that meets the target is taken.
-    `first` if no such allocation meets the target with samples; fails: what each measure fails with the narrowest.
+
+@dataclass
+class _Margins:
+    """Answers by their margin, each with its yield. sure: whether the lower end of its interval counts."""
+
+    problem: AllocationProblem
+    solve: Solve
+    judge: Callable[[Array], SampledYield]
+    sure: bool = False
+    answers: dict[float, Answer] = field(default_factory=dict)
+    yields: dict[bytes, SampledYield] = field(default_factory=dict)
+
+    def level(self, sampled: SampledYield) -> float:
+        """What of a yield has to meet the target."""
+        return sampled.low if self.sure else sampled.share
+
+    def cheapest(self, goal: float, start: float, close: float) -> Answer:
+        """The cheapest answer with a yield, its margin being looked for around a start; else that of most yield."""
+
+        def excess(z: float) -> float:
+            answer = self.at(z)
+            return MOST if answer.sampled is None else _score(self.level(answer.sampled)) - _score(goal)
+
+        low = max((z for z in self.answers if excess(z) < 0), default=max(start - NEAR, LEAST))
+        above = (z for z in self.answers if z > low and excess(z) >= 0)
+        high, step = min(above, default=min(max(low, start) + NEAR, MOST)), NEAR
+        while low > LEAST and excess(low) >= 0:
+            low, high, step = max(low - step, LEAST), low, 2 * step
+        while high < MOST and excess(high) < 0:
+            low, high, step = high, min(high + step, MOST), 2 * step
+        if excess(low) < 0 <= excess(high):
+            brentq(excess, low, high, xtol=close)
+        found = [answer for answer in self.answers.values() if answer.found]
+        if not found:
+            return self.at(low)
+        enough = [one for one in found if one.sampled and _score(self.level(one.sampled)) >= _score(goal) - ROUNDING]
+        best = max(found, key=lambda one: self.level(one.sampled) if one.sampled else 0.0)
+        answer = min(enough, key=lambda one: one.cost) if enough else best
+        trials = [Trial(z, one.cost, one.sampled) for z, one in self.answers.items() if one.sampled]
+        return replace(answer, trials=tuple(trials))
+
+    def at(self, z: float) -> Answer:
+        """The cheapest answer with a margin, and its yield."""
+        if z not in self.answers:
+            answer = self.solve(replace(self.problem, z=z))
+            if answer.found:
+                key = np.round(answer.tolerances, 15).tobytes()
+                if key not in self.yields:
+                    self.yields[key] = self.judge(answer.tolerances)
+                expected = normal_yield(self.problem, answer.tolerances)
+                answer = replace(answer, expected=expected, sampled=self.yields[key])
+            self.answers[z] = answer
+        return self.answers[z]
+
+
+def _largest_margins(problem: AllocationProblem) -> Array:
+    """The margin that each row can have at most, with the narrowest half widths, (row,): of a measure the least."""
+    effects = problem.effects
+    narrowest = np.array(
+        [0.0 if one.options else one.value if one.fixed else one.least for one in problem.contributions]
+    )
+    place = {one.name: i for i, one in enumerate(problem.contributions)}
+    for members in problem.groups().values():
+        rows = [place[one.name] for one in members]
+        options = list(common_options(members).values()) if members[0].options else []
+        if options:
+            narrowest[rows] = np.min([[option.tolerance for option in each] for each in options], axis=0)
+        elif not members[0].options:
+            narrowest[rows] = max(one.least for one in members)
+    sigma, room = _spread_and_room(problem, narrowest)
+    deviation = np.sqrt(np.sum(sigma**2, axis=1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        margins = np.where(deviation > 0, np.min(room, axis=0) / deviation, np.inf)
+    labels = np.array(effects.labels or [""] * len(margins))
+    for label in set(labels.tolist()):
+        margins[labels == label] = np.min(margins[labels == label])
+    return np.maximum(margins, LEAST)
+
+
+def _spread_and_room(problem: AllocationProblem, tolerances: Array) -> tuple[Array, Array]:
+    """Deviation of each row by independent numbers (row, part), and its room to both sides (side, row)."""
+    effects = problem.effects
+    sigma = effects.sigma() * tolerances
+    if effects.correlation is not None:
+        sigma = sigma @ factor(effects.correlation)
+    middle = effects.middle() + effects.drift() @ tolerances
+    return sigma, np.stack([effects.upper - middle, middle - effects.lower])
+
+
+def normal_yield(problem: AllocationProblem, tolerances: Array) -> float:
+    """Share of mechanisms within all limits, for normal deviations and linear rows.
+
+    The row of each measure that fails most is reckoned exactly. With the deviations in polar form, their radius
+    integrated exactly (chi distribution) and their direction by a Sobol sequence, follows what the others add
+    (I. Deák, Three digit accurate multiple normal probabilities, Numerische Mathematik 35 (1980) 369–380).
     """
-    reserve = samples.reserve or samples.solve(replace(problem, z=furthest(problem)))
-    if not reserve.found:
-        return first
-    least = samples.verified(reserve)
-    if least.sampled is None or least.sampled.low < samples.target:
-        return replace(first, sampled=least.sampled) if first.found else first
-    short = _short(fails, samples.target)
-    if not short:
-        return first
-    own = np.zeros(len(problem.effects.worst), bool)
-    own[np.concatenate([rows for label, rows in by_measure(problem).items() if label in short])] = True
-    caps = np.full(len(own), FAR) if problem.caps is None else np.clip(problem.caps, 0.0, FAR)
-
-    def eased(one: AllocationProblem, share: float) -> Answer:
-        asked = np.where(own, np.minimum(share * caps / one.z, 1.0), 1.0)
-        return samples.solve(replace(one, ratios=asked))
-
-    begin = min(first.problem.z, _ends(problem, samples.target)[1])
-    ways = [replace(samples, reserve=least)]
-    if not np.all(own):
-        ways += [replace(samples, solve=partial(eased, share=share), reserve=None) for share in EASED]
-    kept = [answer for way in ways if (answer := _along(way, problem, begin)) is not None]
-    if not kept:
-        return replace(first, sampled=least.sampled) if first.found else first
-    found = min(kept, key=lambda one: one.cost)
-    note = finding_for(
-        "yield.not_normal", "yield", measures=sorted(name.removeprefix("measures.") for name in short),
-        share=found.sampled.share if found.sampled else np.nan, normal=found.expected,
-    )  # fmt: skip
-    return replace(found, findings=(note,))
+    sigma, room = _spread_and_room(problem, tolerances)
+    deviation = np.sqrt(np.sum(sigma**2, axis=1))
+    if np.any(room[:, deviation == 0] < 0):
+        return 0.0
+    rows = np.flatnonzero((np.min(room, axis=0) < FAR * deviation) & (deviation > 0))
+    if not len(rows):
+        return 1.0
+    sigma, room = sigma[np.ix_(rows, np.any(sigma[rows] != 0, axis=0))], room[:, rows]
+    fails = np.sum(ndtr(-room / deviation[rows]), axis=0)
+    share = _within(sigma, room)
+    labels = np.array(problem.effects.labels or [""] * len(deviation))[rows]
+    for label in dict.fromkeys(labels.tolist()):
+        worst = max(np.flatnonzero(labels == label), key=lambda row: fails[row])
+        share += 1 - fails[worst] - _within(sigma[[worst]], room[:, [worst]])
+    return float(np.clip(share, 0.0, 1.0))
 
 
-def _along(way: Samples, problem: AllocationProblem, z: float) -> Answer | None:
-    """The allocation that meets the target with samples, the margin of its problem being changed; None without one."""
-    most, begin = (way.solve(replace(problem, z=one)) for one in (furthest(problem), z))
-    if not most.found or not begin.found or way.level(way.verified(most).sampled) < way.target:
-        return None
-    found = corrected(begin, way)
-    return found if not _refused(found) and way.holds(found) else None
+def _within(sigma: Array, room: Array) -> float:
+    """Share of normal numbers that rows keep within their room, by directions: sigma (row, part), room (side, row)."""
+    dims = sigma.shape[1]
+    directions = _directions(dims)
+    first, last = np.zeros(directions.shape[1]), np.full(directions.shape[1], np.inf)
+    for start in range(0, len(sigma), ROWS):
+        part = slice(start, start + ROWS)
+        along = sigma[part] @ directions
+        for slope, free in ((along, room[0, part, None]), (-along, room[1, part, None])):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                radius = free / slope
+            last = np.minimum(last, np.min(np.where(slope > 0, radius, np.inf), axis=0))
+            if np.any(free < 0):
+                first = np.maximum(first, np.max(np.where(slope < 0, radius, -np.inf), axis=0))
+    inside = chdtr(dims, np.maximum(last, 0.0) ** 2) - chdtr(dims, first**2)
+    return float(np.mean(np.where(last > first, inside, 0.0)))
 
 
-def _short(fails: dict[str, float], target: float) -> set[str]:
-    """The measures that fail most, until what the others fail together leaves room for the target."""
-    short: set[str] = set()
-    for label in sorted(fails, key=lambda label: -fails[label]):
-        if sum(fails[other] for other in fails if other not in short) < FEW * (1 - target):
-            break
-        short.add(label)
-    return short
+@lru_cache(maxsize=8)
+def _directions(dims: int) -> Array:
+    """Unit vectors, each with its opposite, (component, direction)."""
+    if dims == 1:
+        return np.array([[1.0, -1.0]])
+    points = ndtri(SobolStream(seed=0, replicate=0, dims=dims).points(0, DIRECTIONS // 2))
+    points = points / np.sqrt(np.sum(points**2, axis=0))
+    return np.concatenate([points, -points], axis=1)
+
+
+def _score(share: float) -> float:
+    """The standard score whose symmetric range has this probability, within ±8."""
+    return float(ndtri((1 + min(max(share, 0.0), 1 - 1e-12)) / 2))
+
+
+def _share(score: float) -> float:
+    """The probability of the symmetric range of a standard score."""
+    return float(chdtr(1, score**2))

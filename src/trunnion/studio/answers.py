@@ -350,11 +350,11 @@ def _compare(asked: Asked) -> dict[str, Any]:
 
 
 def _export(asked: Asked) -> dict[str, Any]:
-    """A file of the solved cycle."""
-    state = loaded(str(asked["text"]))
+    """A file of the solved cycle; a picture of the position `index`."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
     if state.bare:  # its file would be one without friction
         raise MechanismError(state.findings)
-    return exported(state, str(asked["what"]), _steps(asked))
+    return exported(state, str(asked["what"]), steps, int(asked.get("index") or 0) % steps)
 
 
 def _tolerances(asked: Asked) -> dict[str, Any]:

@@ -5,22 +5,18 @@ import * as state from "./state.js";
 import { isPart } from "./fields.js";
 import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { enterTab, forget, forgetOwn, keepSteps, lastSheet, left, leftBehind, lookForTabs, takeUp } from "./keeping.js";
-import { carries, linkOf, textOf } from "./links.js";
-import { forgetPhoto } from "./photo.js";
-import { pictureOf } from "./picture.js";
 import { sheet } from "./sheet.js";
 import { connection, decode, request } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
 const STOPPED = "The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.";
-const STRANGER = "This browser is not let in yet. Open the address that `trunnion studio` printed. A link that holds a model goes on with #m=: open it again then, or paste it under File, Open.";
+const STRANGER = "This browser is not let in yet. Open the address that `trunnion studio` printed.";
 
 let link = { ask: async (_kind, _fields) => null }; // nobody, until this page is let in
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
 export function start() {
-  addEventListener("hashchange", () => carries(location.hash) && counted(openLink(location.hash)));
   return counted(begun());
 }
 
@@ -47,9 +43,8 @@ async function begun() {
   if (about && !about.error) state.about.value = about;
 }
 
-/** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
+/** What is to be opened first: the sheet of this tab, else that of the command line, else an empty one. */
 async function opened(files) {
-  if (carries(location.hash) && (await openLink(location.hash))) return;
   const last = lastSheet();
   if (last && last.folder !== files.id) state.variant.value = null; // of another folder
   const again = last?.folder === files.id ? last.name : files.open;
@@ -220,7 +215,6 @@ export async function takeWaiting(open) {
     return;
   }
   forget(key);
-  if (name === null) forgetPhoto(null);
 }
 
 /** Go back from the recovered work to the file as it was saved, as a step to undo. */
@@ -261,35 +255,10 @@ export function openText(content, words) {
   const before = state.fileName.value === null && state.unsaved.value ? present() : work?.text !== work?.saved ? work : null;
   const step = before && { name: words, text: before.text, places: before.places ?? {} };
   forgetOwn(null);
-  forgetPhoto(null);
   const opened = openSheet({ name: null, saved: content, content });
   if (step) state.past.value = [step];
   state.say(`${words}.${step ? " Undo brings the unsaved sheet back." : ""}${file ? ` Unsaved work on ${file} is kept: open it again.` : ""}`);
   return opened;
-}
-
-/** Open the model of a link, and take it out of the address; whether there was one. */
-export async function openLink(address) {
-  const mine = (sheets += 1);
-  history.replaceState(null, "", location.pathname);
-  try {
-    const content = await textOf(address);
-    if (mine === sheets) await openText(content, "The model of the link opened");
-    return true;
-  } catch (problem) {
-    state.say(problem.message, true);
-    return false;
-  }
-}
-
-/** The model as a link in the clipboard. */
-export async function copyLink() {
-  try {
-    await navigator.clipboard.writeText(await linkOf(state.text.value, `${location.origin}/`));
-    state.say("The link is in the clipboard. It holds the model itself: File, Open takes it, or put its part from #m= on behind the address that trunnion studio prints.");
-  } catch (problem) {
-    state.say(problem.message, true);
-  }
 }
 
 export function openExample(example) {
@@ -338,11 +307,7 @@ function refused(refusal) {
 /** Export and hand the file to the browser. */
 export async function exported(what) {
   state.say(`${what.toUpperCase()} is being made …`);
-  if (sheet.view && (what === "png" || what === "svg")) {
-    const { name, blob } = await counted(pictureOf(what));
-    return handOver(name, blob);
-  }
-  const made = await counted(link.ask("export", { text: state.text.value, what, steps: STEPS }));
+  const made = await counted(link.ask("export", { text: state.text.value, what, steps: STEPS, index: state.index.value }));
   if (!made) return;
   if (made.error) return state.say(made.error, true);
   const [first, count] = made.bytes.bytes;

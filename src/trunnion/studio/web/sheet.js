@@ -37,8 +37,6 @@ export const sheet = {
   after: () => {},
   /** What is drawn beside it, [{points}]. @type {() => {points: object}[]} */
   beside: () => [],
-  /** Puts the picture behind the grid where it belongs. */
-  photo: () => {},
   fit() {
     const { width, height } = sheet.view.frame;
     const { scene } = shown.peek() ?? {};
@@ -115,6 +113,5 @@ function middle() {
 
 function look(frame) {
   reframe(sheet.view, frame);
-  sheet.photo();
   sheet.after();
 }

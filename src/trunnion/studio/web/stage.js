@@ -11,7 +11,6 @@ import { compared } from "./variants.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
-import { watchPhoto } from "./photo.js";
 import * as state from "./state.js";
 import { pointer, toolOf, typed, typedEnd } from "./tools.js";
 import { html } from "./ui.js";
@@ -39,7 +38,6 @@ function mount(holder) {
   };
   const stop = [
     watchSize(holder, view),
-    watchPhoto(view),
     listenToPointer(root, view),
     listenToPlaces(root, view),
     effect(() => show(view)),

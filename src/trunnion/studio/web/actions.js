@@ -114,6 +114,7 @@ async function carryOut(gestures, merge, places) {
   const before = places ? { ...present(), places } : present();
   const done = await link.ask("edit", { ...before, gestures, fine: sheet.fine() });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
+  if (before.text !== state.text.value) return refuse("The model was changed meanwhile; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
   if (done.made) state.selection.value = { kind: done.made[0], name: done.made[1] };
@@ -201,6 +202,7 @@ export function openSheet({ name, saved, content, first = null }) {
   const found = work && (name === null || work.text === saved || work.text !== work.saved) ? work : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
   if (first?.tracks && first.text === state.text.value) showFirst(first);
+  else if (!state.text.value.trim()) showFirst({ text: state.text.value, entries: {}, numbers: {}, tracks: null }); // the frame of an empty sheet stays with what is drawn there
   state.dialog.value = null;
   return solve();
 }
@@ -242,9 +244,9 @@ async function fetched(name) {
   await opened;
 }
 
-/** Draw a mechanism by where its points go, until its answer is there. */
+/** Draw a mechanism by where its points go, or an empty sheet, until its answer is there. */
 function showFirst({ text, entries, numbers, tracks }) {
-  state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
+  if (tracks) state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
   state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };
 }
 

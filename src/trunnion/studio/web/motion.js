@@ -1,6 +1,6 @@
 // The player under the sheet, and the figures of the present position.
 
-import { effect, untracked } from "@preact/signals";
+import { batch, effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { gaps, say } from "../web/data.js";
 import { html as element, svg } from "../web/dom.js";
@@ -57,16 +57,17 @@ function fill(holder) {
       return;
     }
     const figures = readout(scene);
-    const show = (index) => {
-      state.index.value = index;
+    const show = (index, share) => {
+      batch(() => ([state.index.value, state.share.value] = [index, share]));
       figures.show(index);
     };
     const same = crank.player && crank.count === scene.count && !scene.motion && !crank.once;
     if (!same) {
       crank.player?.pause();
-      crank.player = player(scene.count, (index) => crank.words(index), (index) => crank.show(index), {
+      crank.player = player(scene.count, (index) => crank.words(index), (index, share) => crank.show(index, share), {
         svg,
         duration: scene.motion?.duration ?? null,
+        onBetween: (share) => (state.share.value = share),
       });
       lightUp(crank);
     }

@@ -63,7 +63,7 @@ export const sheet = {
   fine: () => (sheet.view ? sheet.step() / 1000 : 0),
   /** Width of the window and reach of a click, m. */
   scale: () => ({ wide: sheet.view.frame.width / sheet.view.frame.scale, near: nearOf(sheet.view.frame.scale) }),
-  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.posed) : []),
+  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.drawn) : []),
   /** What lies at a place: a joint or a point no farther than `near` m, or the grid; `loose` leaves the grid out. */
   snap(at, loose = false, near = nearOf(sheet.view.frame.scale)) {
     const step = sheet.step() / (loose || !state.snapping.value ? 100 : 1);

@@ -64,8 +64,10 @@ function watchSize(holder, view) {
     const { clientWidth: width, clientHeight: height } = holder;
     if (!width || !height) return;
     sheet.resize(width, height);
-    if (!view.sized) sheet.fit();
+    if (view.sized) return;
     view.sized = true;
+    view.fresh = !shown.peek();
+    sheet.fit();
   });
   observer.observe(holder);
   return () => observer.disconnect();
@@ -91,7 +93,7 @@ function show(view) {
     view.scene = found.scene;
     drawTracks(view);
   }
-  pose(view, found.scene, index);
+  pose(view, found.scene, index, state.share.value);
   if (view.fresh && view.sized) {
     view.fresh = false;
     untracked(sheet.fit);

@@ -31,6 +31,8 @@ export const places = signal({});
 export const answer = signal(null);
 export const busy = signal(0);
 export const index = signal(0);
+/** How far a played mechanism is from this position to the next, 0 to 1. */
+export const share = signal(0);
 /** {kind, name}, kind being links, joints, points, loads, springs or drivers; or null. */
 export const selection = signal(null);
 export const tool = signal("select");
@@ -132,6 +134,7 @@ export function begin({ name, saved, content, steps = null }) {
     pending.value = null;
     live.value = null;
     index.value = 0;
+    share.value = 0;
     tool.value = "select";
     if (opened.value) variant.value = null; // of another sheet; a page that is loaded again has the one it had
     opened.value += 1;

@@ -128,6 +128,38 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.until("s.answer.value?.text === s.text.value && s.answer.value.entries.links")
         assert user.of("sheet", "m.sheet.view.frame.scale") == scale
 
+    def test_a_slider_changes_the_mechanism_as_it_is_pulled_and_the_file_as_it_is_released(user):
+        text, torque = user.state("s.text.value"), user.page.locator(".readout div:has-text('torque A') dd")
+        before = torque.text_content()
+        slider = user.page.get_by_label("BC, slider")
+        box = slider.bounding_box()
+        user.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        user.page.mouse.down()
+        for step in range(8):
+            user.page.mouse.move(box["x"] + (0.5 - 0.005 * step) * box["width"], box["y"] + 0.5 * box["height"])
+            user.page.wait_for_timeout(40)
+        user.until("s.live.value?.joints.B.reaction.x.length === 360")
+        assert user.state("s.text.value") == text
+        live = torque.text_content()
+        assert live != before
+        arrow = "document.querySelectorAll('.layer.vectors path')[1].getAttribute('d')"
+        pulled = user.page.evaluate(arrow)
+        assert pulled
+        assert "here" in user.page.locator(".bar.bottom .margin").inner_text()
+        user.page.mouse.up()
+        user.until("s.live.value === null && s.past.value.length === 1 && s.answer.value.text === s.text.value")
+        assert user.state("s.text.value") != text
+        assert torque.text_content().split()[0][:4] == live.split()[0][:4]
+        user.keys("Control+z")
+        assert user.state("s.text.value") == text
+        user.page.mouse.down()  # pulled and brought back: nothing changes
+        user.page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.5 * box["height"])
+        user.until("s.live.value")
+        user.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        user.page.mouse.up()
+        user.until("s.live.value === null")
+        assert user.state("s.text.value") == text
+
     def test_an_answer_to_what_was_changed_since_is_dropped(user):
         """A step that is answered after the text was changed, and a cycle of a text that is no longer there."""
         changed = FOURBAR.replace("BC: 6.00 m", "BC: 5.80 m")

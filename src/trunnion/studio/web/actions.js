@@ -139,9 +139,27 @@ export function setValue(path, value, merge = null) {
   return edit([{ do: "set", path, value }], merge);
 }
 
-/** Where the mechanism would be with a point at another place. */
-export function drag(fields) {
-  return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, fine: sheet.fine(), ...fields });
+/** What the mechanism would be with a point at another place ("drag"), or with other numbers ("try"); null where something newer was asked. */
+export function changed(kind, fields) {
+  const friction = state.friction.value === "off" ? "off" : "stated";
+  return link.ask(kind, { text: state.text.value, steps: STEPS, friction, locked: state.locked.value, fine: sheet.fine(), ...fields });
+}
+
+/** Calls `act` with what is given to it, one after another and only with the newest; the promise ends when it rests. */
+export function newest(act) {
+  let [wanted, working] = [null, null];
+  const work = async () => {
+    while (wanted !== null) {
+      const next = wanted;
+      wanted = null;
+      await act(next);
+    }
+    working = null;
+  };
+  return (next) => {
+    wanted = next;
+    return (working ??= work());
+  };
 }
 
 /** Ask something else of the mechanism that is shown; null where it has changed meanwhile or there is no answer. */

@@ -119,7 +119,7 @@ function allParts(scene, view) {
     springs: scene.springs.map((one) => spring(one)),
     loads: loadsOf(scene).map((one) => marked(one, "loads", one.name)),
     drives: scene.drivers.map((driver) => ({ driver, joint: scene.joints.find(({ name }) => name === driver.name), node: svg("path", { class: "drive" }) })).filter((one) => one.joint),
-    vectors: scene.joints.map((one) => ({ joint: one, node: svg("path", { class: `reaction ${view.kinds.get(one.name) ?? "k0"}` }) })),
+    vectors: scene.joints.map((one) => ({ node: svg("path", { class: `reaction ${view.kinds.get(one.name) ?? "k0"}` }) })),
     names: [...scene.joints.map((one) => nameOf(one.at, one.on, one.name, fixed(one), slides(one))), ...moving.flatMap((link) => link.free.map((key) => nameOf(key, key, key.slice(link.name.length + 1), false, false)))],
   }; // prettier-ignore
 }
@@ -327,12 +327,13 @@ function poseDrive({ scene, posed: index }, { driver, joint: one, node }, spot) 
 
 function poseVectors(view, spot) {
   const scale = perNewton(view);
-  for (const { joint: one, node } of view.parts.vectors) {
+  view.parts.vectors.forEach(({ node }, order) => {
+    const one = view.scene.joints[order];
     const force = forceAt(view.scene, one, view.exact);
     const found = spot(one.at);
-    const show = found && force && view.shown.reactions !== false && !view.still;
+    const show = found && force && view.shown.reactions !== false;
     node.setAttribute("d", show ? arrow(found[0], found[1], force[0] * scale, -force[1] * scale) : "");
-  }
+  });
 }
 
 /** Names that would stand on each other stand side by side. */

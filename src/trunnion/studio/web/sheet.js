@@ -15,14 +15,20 @@ export const shown = computed(() => {
     const scene = sketch(found.entries, state.places.value, found.numbers);
     return { scene: found.tracks ? { ...scene, points: found.tracks } : scene, structure: scene, sketched: true };
   }
-  const scene = state.live.value?.points ? moved(found.scene, state.live.value) : found.scene;
+  const scene = state.live.value?.points ? changing(found.scene, state.live.value) : found.scene;
   return { scene, structure: found, sketched: false };
 });
 
-/** The scene with points and angles of a mechanism that is dragged. */
-function moved(scene, { points, angles, status }) {
-  const links = scene.links.map((link) => (angles?.[link.name] ? { ...link, angle: angles[link.name] } : link));
-  return { ...scene, links, points: { ...scene.points, ...points }, status: status ?? scene.status };
+/** The scene with the motion and forces of a mechanism that is being changed. */
+export function changing(scene, { points, angles, efforts, joints, status }) {
+  return {
+    ...scene,
+    links: scene.links.map((link) => ({ ...link, angle: angles[link.name] ?? link.angle })),
+    points: { ...scene.points, ...points },
+    drivers: scene.drivers.map((one) => ({ ...one, effort: efforts[one.name] ?? one.effort })),
+    joints: scene.joints.map((one) => ({ ...one, ...joints[one.name] })),
+    status,
+  };
 }
 
 /** Colour classes of the joints, as the report has them. */

@@ -85,7 +85,6 @@ function show(view) {
   const other = view.shown.curves !== curves || view.shown.reactions !== reactions || view.shown.grid !== grid;
   view.shown = { curves, reactions, names, grid };
   view.index = index;
-  view.still = Boolean(state.live.value);
   if (view.structure !== found.structure || other) {
     view.structure = found.structure;
     build(view, found.scene, kindsOf(found.scene));

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import trunnion
 from studio.asking import ask, edited
+from trunnion.errors import Status
 from trunnion.model.file import entries_of, text_of
 from trunnion.model.mechanism import Mechanism
 from trunnion.studio.answers import answer
@@ -292,6 +293,63 @@ def test_a_drop_writes_what_the_drag_showed():
     np.testing.assert_allclose(*(np.array(effort, float) for effort in efforts), rtol=1e-4)
     assert found["places"]["rocker.C"] == pytest.approx(to, abs=1e-5)
     assert "chooses the branch" in text
+
+
+def column(values):
+    return np.array(values, float)  # None is NaN
+
+
+@pytest.mark.parametrize("friction", ["stated", "off"])
+@pytest.mark.parametrize(
+    ("name", "path", "written", "value"),
+    [
+        (FOURBAR, "dimensions.BC", {"BC: 6.00 m": "BC: 5.7 m"}, 5.7),
+        ("drawing-press", "dimensions.L", {"L: 200 mm": "L: 210 mm"}, 0.21),
+        ("elliptic-trammel", "dimensions.b", {"b: 90 mm": "b: 92 mm"}, 0.092),
+    ],
+)
+def test_a_number_that_is_tried_gives_the_cycle_of_a_model_that_has_it(name, path, written, value, friction):
+    text = EXAMPLES[name]
+    for old, new in written.items():
+        assert old in text
+        text = text.replace(old, new)
+    mechanism = Mechanism(**entries_of(text)[0])
+    result = trunnion.analyse(mechanism if friction == "stated" else mechanism.with_friction("off"), 360)
+    shown = ask(ask="model", text=text, friction=friction)
+    scene = shown["scene"]
+    for index in (0, 100, 250):
+        tried = ask(ask="try", text=EXAMPLES[name], values={path: value}, index=index, friction=friction)
+        margin, least = tried["margin"], float(result["locking_margin"][index])
+        assert margin["beyond"] == (least > 3)
+        assert margin["value"] == pytest.approx(min(least, 3.0), rel=1e-6)
+    assert tried["status"] == scene["status"]
+    for driver in scene["drivers"]:
+        near = {"rtol": 0, "atol": 1e-6 * np.nanmax(np.abs(column(driver["effort"])))}
+        np.testing.assert_allclose(column(tried["efforts"][driver["name"]]), column(driver["effort"]), **near)
+    size = float(np.nanmax(np.abs(result["reaction_force"])))
+    for joint in scene["joints"]:
+        live = tried["joints"][joint["name"]]
+        for axis in "xy":
+            series = np.broadcast_to(column(joint["reaction"][axis]), 360)
+            np.testing.assert_allclose(column(live["reaction"][axis]), series, rtol=0, atol=1e-6 * size)
+        lost = np.broadcast_to(column(joint["friction_power"]), 360)
+        np.testing.assert_allclose(column(live["friction_power"]), lost, rtol=1e-5, atol=1e-6 * size)
+        along = np.broadcast_to(column(joint["friction"] or [0.0]), 360)
+        np.testing.assert_allclose(column(live.get("friction", [0.0] * 360)), along, rtol=0, atol=1e-6 * size)
+
+
+def test_a_mechanism_in_space_is_not_tried():
+    found = ask(ask="try", text=EXAMPLES["rssr"], values={"dimensions.b": 0.1}, index=0)
+    assert "in space" in found["error"]
+
+
+def test_a_position_that_is_locked_while_it_is_dragged_has_its_margin_and_no_forces():
+    text = EXAMPLES["drawing-press"].replace("friction: 0.1", "friction: 0.4")
+    place = ask(ask="model", text=text)["places"]["lower.K"]
+    dragged = ask(ask="drag", text=text, point="K", index=0, to=place)
+    assert dragged["margin"]["value"] == pytest.approx(0.862, abs=5e-4)
+    assert dragged["efforts"]["Z"][0] is None
+    assert dragged["status"][0] == Status.LOCKED
 
 
 def test_a_pin_on_the_ground_keeps_lengths_where_it_shall():

@@ -1,8 +1,7 @@
-"""The frame of the studio's page in a real browser: first picture, gallery, links, picture behind the grid, files."""
+"""The frame of the studio's page in a real browser: first picture, gallery, files."""
 
 from __future__ import annotations
 
-import base64
 import io
 import itertools
 import json
@@ -11,7 +10,6 @@ import subprocess
 import sys
 import threading
 import time
-import zlib
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,7 +19,7 @@ import pytest
 from PIL import Image
 
 import trunnion
-from browsing import CHROMIUM, User
+from browsing import CHROMIUM
 from trunnion.model.file import entries_of
 from trunnion.model.mechanism import Mechanism
 
@@ -56,12 +54,6 @@ window.done = Promise.all([
   opened.then((state) => (tried.socket = state)),
 ]).then(() => tried);
 </script>"""
-
-
-def encoded(content):
-    """Behind `#m=`, made by another hand than the page's: raw deflate, base64 for addresses."""
-    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-    return base64.urlsafe_b64encode(packer.compress(content) + packer.flush()).decode().rstrip("=")
 
 
 if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browser; this is the page's own part
@@ -183,105 +175,6 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.until("s.solved.value")
         assert user.state("s.text.value") == FOURBAR
         assert user.state("s.fileName.value") is None
-
-    @pytest.mark.slow
-    def test_a_link_carries_a_model(user):
-        link = user.of("links", "m.linkOf(given, location.href)", FOURBAR + "# Ö\n")
-        assert len(link) < 2000
-        other = User(user.page.context.new_page(), user.studio)
-        other.page.goto(link)
-        other.until("s.solved.value")
-        assert other.state("s.text.value") == FOURBAR + "# Ö\n"
-        assert "#" not in other.page.url
-        assert not other.wrong
-        other.page.evaluate("hash => location.hash = hash", f"#m={encoded(FOURBAR.encode())}")
-        other.until("!s.text.value.includes('Ö')")
-        assert other.state("s.text.value") == FOURBAR
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize(
-        ("signs", "told"),
-        [
-            ("AAAA", "damaged"),
-            (encoded(FOURBAR.encode())[:-40], "damaged"),
-            ("a%22%3E%3Cscript%3E", "no link has"),
-            ("A" * 150_000, "120,000 at most"),
-            (encoded(b"\xff\xfe\xfd"), "damaged"),
-            (encoded(b"a" * 300_001), "more than 300,000 signs"),
-            (encoded(bytes(60_000_000)), "more than 300,000 signs"),  # a bomb: 60 MB in 58 kB
-        ],
-        ids=["nonsense", "cut", "markup", "long", "bytes", "large", "bomb"],
-    )
-    def test_hostile_links_are_refused_in_words(user, signs, told):
-        before = user.state("s.text.value")
-        user.page.evaluate("hash => location.hash = hash", f"#m={signs}")
-        user.until("s.notice.value.bad")
-        assert told in user.state("s.notice.value.words")
-        assert user.state("s.text.value") == before
-
-    @pytest.mark.slow
-    def test_a_long_model_makes_no_link(user):
-        noise = "".join(f"# {k * 7919 % 104729:x}{k * 104729 % 7919:x}\n" for k in range(4000))
-        told = user.of("links", "m.linkOf(given, location.href).catch(e => e.message)", noise)
-        assert "16,000 at most" in told
-
-    @pytest.mark.slow
-    def test_a_picture_behind_the_grid(user, tmp_path):
-        Image.effect_noise((400, 200), 60).save(tmp_path / "drawing.png")
-        choose(user, "Show", "Picture behind the grid")
-        user.page.locator(".photo-card input[type=file]").set_input_files(tmp_path / "drawing.png")
-        user.until("s.photo.value")
-        box = user.page.locator(".layer.photo image").bounding_box()
-        user.page.click("text=Scale by two points")
-        ends = [(box["x"] + (0.5 + share) * box["width"], box["y"] + 0.3 * box["height"]) for share in (0, 0.25)]
-        for end in ends:
-            user.page.mouse.click(*end)
-        user.page.wait_for_selector(".photo-card form input:focus")
-        user.page.keyboard.type("3 in")
-        user.page.keyboard.press("Enter")
-        photo = user.state("({ ...s.photo.value, image: s.photo.value.image.type })")
-        assert photo["pixel"] == pytest.approx(3 * 0.0254 / 100, rel=0.02)  # 100 of its 400 px; clicks are whole px
-        assert user.state("s.past.value.length") == 0  # no click reached the mechanism
-        user.page.locator(".photo-card input[type=range]").fill("0.8")
-        left = user.page.locator(".layer.photo image").bounding_box()["x"]
-        user.page.click("button:has-text('Move')")
-        user.page.mouse.click(700, 200)
-        user.page.mouse.click(740, 200)
-        user.page.wait_for_timeout(100)
-        assert user.page.locator(".layer.photo image").bounding_box()["x"] == pytest.approx(left + 40, abs=1.5)
-        user.page.click("text=Scale by two points")
-        user.page.mouse.click(600, 200)
-        user.page.mouse.click(700, 200)
-        user.page.wait_for_selector(".photo-card form input:focus")
-        user.page.keyboard.type("3 in")
-        user.page.keyboard.press("Tab")
-        user.page.keyboard.type("-90°")
-        user.page.keyboard.press("Enter")
-        user.page.wait_for_timeout(100)
-        turned = user.page.locator(".layer.photo image").bounding_box()
-        assert turned["height"] == pytest.approx(2 * turned["width"], rel=0.01)
-        assert "the second at -90° from the first" in user.state("s.notice.value.words")
-        kept = user.state("({ ...s.photo.value, image: 0 })")
-        user.page.wait_for_timeout(200)
-        user.page.reload()
-        user.until("s.solved.value && s.photo.value")
-        assert user.state("({ ...s.photo.value, image: 0 })") == kept
-        assert kept["opacity"] == 0.8
-        user.of("actions", "m.save(given)", "with-picture.yaml")
-        user.idle()
-        assert (user.studio.folder / "with-picture.yaml").read_text("utf-8") == FOURBAR
-        assert user.state("Boolean(s.photo.value)")
-        choose(user, "File", "New sheet")
-        user.until("s.photo.value === null")
-        assert user.page.locator(".layer.photo image").count() == 0
-
-    @pytest.mark.slow
-    def test_no_picture_is_told(user, tmp_path):
-        (tmp_path / "no.png").write_bytes(b"no picture")
-        choose(user, "Show", "Picture behind the grid")
-        user.page.locator(".photo-card input[type=file]").set_input_files(tmp_path / "no.png")
-        user.until("s.notice.value.bad")
-        assert "no picture" in user.state("s.notice.value.words")
 
     # ---- files ----------------------------------------------------------------------------------------------------
 

@@ -42,11 +42,11 @@ if CHROMIUM:  # not a skip: this is the page's own part
         user.keys("?")  # in a field it is a letter
         assert user.state("s.dialog.value") is None
 
-    def test_torque_is_that_of_the_dragged_mechanism(user):
+    def test_torque_friction_and_margin_are_those_of_the_dragged_mechanism(user):
         user.until("s.solved.value")
         torque = user.page.locator(".readout div:has-text('torque A') dd")
         friction = user.page.locator(".readout div:has-text('friction power') dd")
-        before = torque.text_content()
+        before = [torque.text_content(), friction.text_content()]
         x, y = user.handle("D")
         user.page.mouse.move(x, y)
         user.page.mouse.down()
@@ -54,13 +54,16 @@ if CHROMIUM:  # not a skip: this is the page's own part
             user.page.mouse.move(x, y - 4 * step)
             user.page.wait_for_timeout(60)
         user.until("s.live.value?.efforts")
-        dragged = torque.text_content()
-        assert dragged != before
-        assert friction.text_content() == "—"
+        dragged = [torque.text_content(), friction.text_content()]
+        assert dragged[0] != before[0]
+        assert dragged[1] != before[1]
+        margin = user.page.locator(".bar.bottom .margin").inner_text()
+        assert "> 3 here" in margin
+        assert "least" not in margin
         user.page.mouse.up()
         user.until("s.live.value === null && s.past.value.length === 1")
-        assert torque.text_content().split()[0][:3] == dragged.split()[0][:3]
-        assert friction.text_content() != "—"
+        for cell, words in zip((torque, friction), dragged, strict=True):
+            assert cell.text_content().split()[0][:3] == words.split()[0][:3]
 
     def test_with_a_mistake_the_mechanism_stays_as_it_was_drawn(user):
         user.until("s.solved.value")

@@ -130,39 +130,6 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         assert sum(user.page.locator(kind).count() for kind in kinds) == 0
 
     @pytest.mark.slow
-    def test_a_table_and_its_plot_and_the_mechanism_move_each_other(user):
-        user.page.click("role=tab[name=Plots]")
-        chart = user.page.locator(".chart").first
-        button = chart.get_by_role("button", name="Table of Drive torque A")
-        button.focus()
-        user.keys("Enter")
-        assert button.get_attribute("aria-expanded") == "true"
-        rows = chart.locator("tbody tr")
-        torque = analysed(user.state("s.text.value"))["drive_effort"].values[0]
-        assert rows.count() == 360
-        assert chart.locator("thead th").all_inner_texts() == ["drive angle A [°]", "torque [kN m]"]
-        for index in (0, 59, 340):
-            assert number(rows.nth(index).locator("td").inner_text()) == pytest.approx(torque[index] / 1000, abs=5e-3)
-        rows.nth(5).hover()
-        user.page.wait_for_timeout(60)
-        assert user.state("s.index.value") == 5
-        box = chart.locator(".plot").bounding_box()
-        user.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 40)
-        user.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 50)
-        user.page.wait_for_timeout(60)
-        index = user.state("s.index.value")
-        assert 100 < index < 300
-        marked = chart.locator("tr[aria-current=true]")
-        assert marked.get_attribute("data-index") == str(index)
-        inner, outer = marked.bounding_box(), chart.locator(".numbers").bounding_box()
-        assert outer["y"] <= inner["y"] <= outer["y"] + outer["height"] - inner["height"] + 1
-        chart.locator(".numbers").focus()
-        user.keys("ArrowDown", "PageDown")
-        assert user.state("s.index.value") == index + 11
-        user.keys("Home")
-        assert user.state("s.index.value") == 0
-
-    @pytest.mark.slow
     def test_two_variants_are_compared(user):
         user.page.click("role=tab[name=Plots]")
         user.page.click("button:has-text('Keep as variant A')")
@@ -212,11 +179,9 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         loops = user.page.locator(".chart.polar")
         assert loops.count() == 4
         assert loops.first.locator("path.curve").count() == 2
-        loops.first.get_by_role("button", name="Table of reaction A").click()
         go(user, 60)
         force = analysed(user.state("s.text.value"))["reaction_force"].sel(joint="A").values[:, 60] / 1000
-        cells = loops.first.locator("tr[aria-current=true] td").all_inner_texts()
-        assert [number(one) for one in cells] == pytest.approx([*force, np.hypot(*force)], abs=6e-3)
+        assert number(loops.first.locator(".value").inner_text()) == pytest.approx(np.hypot(*force), abs=6e-3)
 
     @pytest.mark.slow
     def test_the_margin_is_always_in_view(user):

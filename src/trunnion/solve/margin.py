@@ -31,13 +31,14 @@ def locking_margin(back: Backward) -> Number:
     Below 1 where the position is locked; NaN of numbers that are compiled where the search does not come to an end.
     """
     if back.margin is None:
-        back.margin = _margin(back, back.margin_up_to)
+        back.margin = margin_in(back, back.margin_up_to)
     return back.margin
 
 
-def _margin(back: Backward, most: float) -> Number:
+def margin_in(back: Backward, most: float, lanes: Number = np.True_) -> Number:
+    """Multiple of all friction at which a position locks, looked for up to `most` in some lanes; ∞ in all others."""
     margin: Number = np.inf
-    left: Number = np.True_
+    left = lanes
     for k in reversed(range(len(back.settled) if most > 0 else 0)):
         problem, share = back.settled[k].problem, back.settled[k].share
         if problem is None or problem.one_way:

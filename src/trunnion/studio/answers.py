@@ -23,18 +23,18 @@ from trunnion.model.file import text_of
 from trunnion.model.rewrite import changed_text
 from trunnion.results.attributes import findings_of, summary_of
 from trunnion.results.quantities import quantity
-from trunnion.solve.backward import Backward
 from trunnion.solve.system import rubbing
 from trunnion.studio.assemblies import other_assemblies
 from trunnion.studio.ends import held, vector
 from trunnion.studio.exports import exported
 from trunnion.studio.gestures import done
+from trunnion.studio.live import live_columns, live_margin, places_at, solved_with
 from trunnion.studio.loaded import Loaded, loaded
 from trunnion.studio.margin import margin_of
 from trunnion.studio.message import packed
 from trunnion.studio.missing import missing
 from trunnion.studio.overlays import centres, circles, place_motion, point_motion, transmission
-from trunnion.studio.placed import column, plain, tracks
+from trunnion.studio.placed import plain, tracks
 from trunnion.studio.readiness import readiness
 from trunnion.studio.sketch import Change, Sketch
 from trunnion.studio.tolerances import tolerated
@@ -188,12 +188,14 @@ def _drag(asked: Asked) -> dict[str, Any]:
     """The cycle with a joint or point dragged to a place, a pin on the ground with `keep` by its links."""
     state, steps = loaded(str(asked["text"])), _steps(asked)
     index, to = int(asked.get("index") or 0) % steps, vector(asked["to"])
-    sketch = _shown(state, steps, index)
+    sketch = Sketch(copy.deepcopy(dict(state.entries or {})), places_at(state, steps, index))
+    if state.mechanism is not None:
+        sketch.numbers = state.mechanism.parameter_set.nominal
     sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
     changes = sketch.moved(point, to, bool(asked.get("keep")))
-    back = _walked(state, {change.path: change.value for change in changes}, steps)
-    columns = _columns(back, steps)
+    back = solved_with(state, {change.path: change.value for change in changes}, steps, asked.get("friction") != "off")
+    columns = live_columns(back, steps)
     shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
     track = columns["points"][shown]
     far = np.hypot(track["x"] - to[0], track["y"] - to[1])
@@ -202,7 +204,8 @@ def _drag(asked: Asked) -> dict[str, Any]:
         near = index
     if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
         near = index
-    return columns | {"solved": True, "index": near, "changes": _told(sketch, changes)}
+    head = {"solved": True, "index": near, "changes": _told(sketch, changes)}
+    return head | columns | {"margin": live_margin(back, steps, near)}
 
 
 def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
@@ -214,32 +217,13 @@ def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int
     return all(far <= KEPT * sketch.size for far in gone)
 
 
-def _shown(state: Loaded, steps: int, index: int) -> Sketch:
-    """The sketch of a model at a position of its cycle."""
-    paths = tracks(_walked(state, {}, steps).walk, steps)
-    places = {key: (float(track["x"][index]), float(track["y"][index])) for key, track in paths.items()}
-    if any(not np.isfinite(part) for place in places.values() for part in place):
-        what = "cannot be assembled at the position that is shown"
-        raise MechanismError(Finding(what, remedy="go to another position"))
-    return Sketch(copy.deepcopy(dict(state.entries or {})), places)
-
-
-@np.errstate(all="ignore")
-def _walked(state: Loaded, values: Mapping[str, float], steps: int) -> Backward:
-    """Motion and forces over the cycle with some numbers replaced."""
-    run = state.run
-    if run.system.mechanism.space != "planar":
-        raise MechanismError(Finding("cannot be dragged in space", remedy="change its numbers instead"))
-    time = run.cycle.times(steps)
-    return run.solve(time, run.system.mechanism.parameters(values)) if values else run.solve(time)
-
-
-def _columns(back: Backward, steps: int) -> dict[str, Any]:
-    """What the page draws of a walk in the plane."""
-    walk, whole = back.walk, partial(column, steps=steps)
-    points = tracks(walk, steps)
-    angles = {link: whole(np.arctan2(one.frame.s, one.frame.c)) for link, one in walk.motions.items()}
-    return {"points": points, "angles": angles, "efforts": {name: whole(one) for name, one in back.efforts.items()}}
+def _try(asked: Asked) -> dict[str, Any]:
+    """The cycle with some numbers replaced, `values` in SI by path, and the margin at the position `index`."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
+    index = int(asked.get("index") or 0) % steps
+    values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
+    back = solved_with(state, values, steps, asked.get("friction") != "off")
+    return {"solved": True, "index": index} | live_columns(back, steps) | {"margin": live_margin(back, steps, index)}
 
 
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
@@ -311,7 +295,7 @@ def _layers(asked: Asked) -> dict[str, Any]:
     if "circles" in wanted:
         found["circles"] = circles(result, rubbing(state.run.system))
     if wanted & {"centres", "transmission"}:
-        walk = _walked(state, {}, steps).walk
+        walk = solved_with(state, {}, steps).walk
         found |= {name: tell(walk, steps) for name, tell in WALKED.items() if name in wanted}
     return found
 
@@ -350,11 +334,11 @@ def _compare(asked: Asked) -> dict[str, Any]:
 
 
 def _export(asked: Asked) -> dict[str, Any]:
-    """A file of the solved cycle."""
-    state = loaded(str(asked["text"]))
+    """A file of the solved cycle; a picture of the position `index`."""
+    state, steps = loaded(str(asked["text"])), _steps(asked)
     if state.bare:  # its file would be one without friction
         raise MechanismError(state.findings)
-    return exported(state, str(asked["what"]), _steps(asked))
+    return exported(state, str(asked["what"]), steps, int(asked.get("index") or 0) % steps)
 
 
 def _tolerances(asked: Asked) -> dict[str, Any]:
@@ -368,6 +352,7 @@ ANSWERS: dict[str, Callable[[Asked], dict[str, Any]]] = {
     "example": _example,
     "model": _model,
     "drag": _drag,
+    "try": _try,
     "edit": _edit,
     "export": _export,
     "assemblies": _assemblies,

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 __all__ = ["EXPORTS", "exported"]
 
 
-def exported(state: Loaded, what: str, steps: int) -> dict[str, Any]:
-    """Name, type and bytes of a file; MechanismError where the model has no cycle."""
+def exported(state: Loaded, what: str, steps: int, index: int = 0) -> dict[str, Any]:
+    """Name, type and bytes of a file; MechanismError where the model has no cycle. index: the position of a picture."""
     if what not in EXPORTS:
         raise MechanismError(Finding(f"'{what}' is no file of the studio", remedy=f"use {', '.join(EXPORTS)}"))
     ending, mime, make = EXPORTS[what]
     stem = "".join(sign if sign.isalnum() else "-" for sign in str((state.entries or {}).get("name") or "mechanism"))
-    content = make(state, steps)
+    content = make(state, steps, index)
     return {"name": f"{stem[:60].strip('-') or 'mechanism'}.{ending}", "mime": mime, "bytes": content}
 
 
@@ -29,37 +29,37 @@ def _result(state: Loaded, steps: int) -> xr.Dataset:
     return state.result(steps, True)
 
 
-def _csv(state: Loaded, steps: int) -> bytes:
+def _csv(state: Loaded, steps: int, _: int) -> bytes:
     from trunnion.results.export import frame
 
     text: str = frame(_result(state, steps), units="model").to_csv(index=False, lineterminator="\n")
     return text.encode()
 
 
-def _report(state: Loaded, steps: int) -> bytes:
+def _report(state: Loaded, steps: int, _: int) -> bytes:
     from trunnion.views.cycle.report import report
 
     return report(_result(state, steps), state.result(steps, False)).encode()
 
 
-def _picture(kind: str) -> Callable[[Loaded, int], bytes]:
-    def make(state: Loaded, steps: int) -> bytes:
-        from trunnion.views.cycle.plots import figure
+def _picture(kind: str) -> Callable[[Loaded, int, int], bytes]:
+    def make(state: Loaded, steps: int, index: int) -> bytes:
+        from trunnion.views.cycle.plots import mechanism
 
         stream = io.BytesIO()
-        figure(_result(state, steps), "mechanism").savefig(stream, format=kind)
+        mechanism(_result(state, steps), index=index).savefig(stream, format=kind)
         return stream.getvalue()
 
     return make
 
 
-def _animation(state: Loaded, steps: int) -> bytes:
+def _animation(state: Loaded, steps: int, _: int) -> bytes:
     from trunnion.studio.animation import animation
 
     return animation(_result(state, steps))
 
 
-def _script(state: Loaded, steps: int) -> bytes:
+def _script(state: Loaded, steps: int, _: int) -> bytes:
     """The model and what was asked of it, as Python; it writes no file that is not named to it."""
     lines = [
         '"""The session of the studio as a script: the model and its cycle; with the name of a file also its table."""',
@@ -85,7 +85,7 @@ def _script(state: Loaded, steps: int) -> bytes:
     return "\n".join(lines).encode()
 
 
-EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int], bytes]]] = {
+EXPORTS: dict[str, tuple[str, str, Callable[[Loaded, int, int], bytes]]] = {
     "csv": ("csv", "text/csv", _csv),
     "report": ("html", "text/html", _report),
     "png": ("png", "image/png", _picture("png")),

@@ -50,6 +50,11 @@ class Loaded:
             raise MechanismError(self.findings)
         return prepare(self.mechanism)
 
+    @cached_property
+    def frictionless_run(self) -> Run:
+        """The same without friction."""
+        return prepare(self.run.system.mechanism.with_friction("off"))
+
     @lru_cache(maxsize=2)  # noqa: B019  # a handful of texts is kept, see `loaded`
     def result(self, steps: int, friction: bool) -> xr.Dataset:
         """Its cycle with or without friction; MechanismError where it has none."""

@@ -4,7 +4,7 @@ transmission angles; each for every position of the cycle, SI and rad.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from trunnion.algebra import plane
 from trunnion.algebra.literal import is_zero
 from trunnion.groups.dyad import DyadPose
+from trunnion.results.scales import scales_in
 from trunnion.solve.forward import Forward
 from trunnion.studies.design import instant_centre
 from trunnion.studio.placed import column
@@ -25,7 +26,8 @@ __all__ = ["centres", "circles", "place_motion", "point_motion", "transmission"]
 Array = NDArray[np.float64]
 
 MOST_LINKS = 12  # whose centres against each other are told; of more only those against the ground
-MOTION = ("position", "velocity", "acceleration")
+MOTION = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+RATES_OF_PLACE = ("velocity", "acceleration")
 RATES = ("", "_velocity", "_acceleration")
 FAR = 1e4  # sizes of the mechanism: what is farther away lies at infinity
 AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two links move as one
@@ -34,8 +36,8 @@ AT_REST = 1e-9  # of the speeds typical of the mechanism: slower than this two l
 def point_motion(result: xr.Dataset, point: str) -> dict[str, Any]:
     """Velocity, m/s, and acceleration, m/s², of a point "link.point" by axis; KeyError for one that is not known."""
     axes = [str(axis) for axis in result["axis"].values]
-    rows = {name: _rows(result[f"point_{name}"].sel(point=point)) for name in MOTION[1:]}
-    return {"key": point, **{name: dict(zip(axes, row, strict=True)) for name, row in rows.items()}}
+    rows = [_rows(result[f"point_{name}"].sel(point=point)) for name in RATES_OF_PLACE]
+    return {"key": point, **_named(result, dict(zip(RATES_OF_PLACE, rows, strict=True)), axes)}
 
 
 def place_motion(result: xr.Dataset, place: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -63,9 +65,15 @@ def place_motion(result: xr.Dataset, place: Mapping[str, Any]) -> dict[str, Any]
         return None
     d = np.array([cosine * u - sine * v, sine * u + cosine * v])
     across = np.array([-d[1], d[0]])
-    found = known[0] + d, known[1] + turn * across, known[2] + second * across - turn**2 * d
-    parts = {name: dict(zip("xy", rows, strict=True)) for name, rows in zip(MOTION, found, strict=True)}
+    rows = known[0] + d, known[1] + turn * across, known[2] + second * across - turn**2 * d
+    parts = _named(result, dict(zip(MOTION, rows, strict=True)), "xy")
     return {"key": f"a place on {link}", "link": link, "start": start, "local": [u, v], **parts}
+
+
+def _named(result: xr.Dataset, rows: Mapping[str, Array], axes: Sequence[str]) -> dict[str, dict[str, Array]]:
+    """Rows of motion by axis, 0 where they are rounding."""
+    zeroed = scales_in(result).zeroed
+    return {name: dict(zip(axes, zeroed(row, MOTION[name]), strict=True)) for name, row in rows.items()}
 
 
 def _rows(vector: xr.DataArray) -> Array:

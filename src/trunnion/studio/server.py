@@ -168,7 +168,7 @@ class Studio:
         nonce = secrets.token_urlsafe(16)
         policy = (
             f"default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'unsafe-inline'; "
-            "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; "
+            "img-src 'self' data:; connect-src 'self'; base-uri 'none'; "
             "form-action 'none'; frame-ancestors 'none'"
         )
         headers = {

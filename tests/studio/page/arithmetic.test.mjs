@@ -49,11 +49,6 @@ assert.deepEqual([0, 1, 2, 3, 4].map((index) => geometry.posedAt(track, index)),
 assert.ok(geometry.assembled(track));
 assert.ok(!geometry.assembled({ count: 2, points: { "a.P": { x: [null], y: [0] } } }));
 
-// ---- a picture behind the grid: what was at (1, 2) stays, what was 1 m right of it is 3 m above it
-const turned = geometry.enlarged({ x: 0, y: 2, pixel: 0.01 }, [1, 2], 3, Math.PI / 2);
-const near = (found, stated) => found.forEach((one, order) => assert.ok(Math.abs(one - stated[order]) < 1e-12));
-near([turned.x, turned.y, turned.pixel, turned.turn], [1, -1, 0.03, Math.PI / 2]); // its corner was 1 m left of it
-
 // ---- values as the file writes them
 assert.equal(fields.written(" 0.3 "), 0.3);
 assert.equal(fields.written("2 kg"), "2 kg");
@@ -91,13 +86,16 @@ assert.deepEqual(forceAt(lever, sliding, 0).map((part) => Number(part.toFixed(12
 assert.equal(forceAt(lever, sliding, 1), null);
 
 // ---- the locking margin in words
-const { told } = await load("studio/words.js");
+const { at: here, told } = await load("studio/words.js");
 assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 0), "4 here, least 0.5 at 90°");
 assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 1), "none here, least 0.5 at 90°");
 assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 2), "0.5 here: it locks, least 0.5 at 90°");
 assert.equal(told([4, null, 0.5, 10], { value: 0.5, beyond: false, at: "90°" }, 3), "> 10 here, least 0.5 at 90°");
 assert.equal(told([10], { value: 10, beyond: true, at: "0°" }, 7), "> 10 everywhere");
 assert.equal(told(null, null, 0), "—");
+assert.equal(here({ value: 3, beyond: true }), "> 3 here");
+assert.equal(here({ value: 0.8, beyond: false }), "0.8 here: it locks");
+assert.equal(here({ value: null, beyond: false }), "none here");
 
 // ---- answers
 const header = JSON.stringify({ ask: "model", points: { A: { x: { column: [1, 2] } } }, list: [1, null] });

@@ -5,22 +5,18 @@ import * as state from "./state.js";
 import { isPart } from "./fields.js";
 import { placesAt, posedAt, stemOf } from "./geometry.js";
 import { enterTab, forget, forgetOwn, keepSteps, lastSheet, left, leftBehind, lookForTabs, takeUp } from "./keeping.js";
-import { carries, linkOf, textOf } from "./links.js";
-import { forgetPhoto } from "./photo.js";
-import { pictureOf } from "./picture.js";
 import { sheet } from "./sheet.js";
 import { connection, decode, request } from "./socket.js";
 
 const STEPS = 360; // positions of a run
 const TYPING = 350; // ms of quiet before typed text is solved
 const STOPPED = "The studio on this machine has stopped. Start it again and open its new address: your work is kept in this browser and offered there, on the same port.";
-const STRANGER = "This browser is not let in yet. Open the address that `trunnion studio` printed. A link that holds a model goes on with #m=: open it again then, or paste it under File, Open.";
+const STRANGER = "This browser is not let in yet. Open the address that `trunnion studio` printed.";
 
 let link = { ask: async (_kind, _fields) => null }; // nobody, until this page is let in
 
 /** Connect, read the program's examples and the opened folder, open what is to be opened. */
 export function start() {
-  addEventListener("hashchange", () => carries(location.hash) && counted(openLink(location.hash)));
   return counted(begun());
 }
 
@@ -47,9 +43,8 @@ async function begun() {
   if (about && !about.error) state.about.value = about;
 }
 
-/** What is to be opened first: the model of a link, else the sheet of this tab, else that of the command line, else an empty one. */
+/** What is to be opened first: the sheet of this tab, else that of the command line, else an empty one. */
 async function opened(files) {
-  if (carries(location.hash) && (await openLink(location.hash))) return;
   const last = lastSheet();
   if (last && last.folder !== files.id) state.variant.value = null; // of another folder
   const again = last?.folder === files.id ? last.name : files.open;
@@ -119,6 +114,7 @@ async function carryOut(gestures, merge, places) {
   const before = places ? { ...present(), places } : present();
   const done = await link.ask("edit", { ...before, gestures, fine: sheet.fine() });
   if (!done) return refuse("The connection was lost; the step was not carried out.");
+  if (before.text !== state.text.value) return refuse("The model was changed meanwhile; the step was not carried out.");
   if (done.error) return refuse(done.error);
   state.commit(sentence(done.says, ""), before, done, merge);
   if (done.made) state.selection.value = { kind: done.made[0], name: done.made[1] };
@@ -143,9 +139,27 @@ export function setValue(path, value, merge = null) {
   return edit([{ do: "set", path, value }], merge);
 }
 
-/** Where the mechanism would be with a point at another place. */
-export function drag(fields) {
-  return link.ask("drag", { text: state.text.value, steps: STEPS, locked: state.locked.value, fine: sheet.fine(), ...fields });
+/** What the mechanism would be with a point at another place ("drag"), or with other numbers ("try"); null where something newer was asked. */
+export function changed(kind, fields) {
+  const friction = state.friction.value === "off" ? "off" : "stated";
+  return link.ask(kind, { text: state.text.value, steps: STEPS, friction, locked: state.locked.value, fine: sheet.fine(), ...fields });
+}
+
+/** Calls `act` with what is given to it, one after another and only with the newest; the promise ends when it rests. */
+export function newest(act) {
+  let [wanted, working] = [null, null];
+  const work = async () => {
+    while (wanted !== null) {
+      const next = wanted;
+      wanted = null;
+      await act(next);
+    }
+    working = null;
+  };
+  return (next) => {
+    wanted = next;
+    return (working ??= work());
+  };
 }
 
 /** Ask something else of the mechanism that is shown; null where it has changed meanwhile or there is no answer. */
@@ -206,6 +220,7 @@ export function openSheet({ name, saved, content, first = null }) {
   const found = work && (name === null || work.text === saved || work.text !== work.saved) ? work : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
   if (first?.tracks && first.text === state.text.value) showFirst(first);
+  else if (!state.text.value.trim()) showFirst({ text: state.text.value, entries: {}, numbers: {}, tracks: null }); // the frame of an empty sheet stays with what is drawn there
   state.dialog.value = null;
   return solve();
 }
@@ -220,7 +235,6 @@ export async function takeWaiting(open) {
     return;
   }
   forget(key);
-  if (name === null) forgetPhoto(null);
 }
 
 /** Go back from the recovered work to the file as it was saved, as a step to undo. */
@@ -248,9 +262,9 @@ async function fetched(name) {
   await opened;
 }
 
-/** Draw a mechanism by where its points go, until its answer is there. */
+/** Draw a mechanism by where its points go, or an empty sheet, until its answer is there. */
 function showFirst({ text, entries, numbers, tracks }) {
-  state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
+  if (tracks) state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
   state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };
 }
 
@@ -261,35 +275,10 @@ export function openText(content, words) {
   const before = state.fileName.value === null && state.unsaved.value ? present() : work?.text !== work?.saved ? work : null;
   const step = before && { name: words, text: before.text, places: before.places ?? {} };
   forgetOwn(null);
-  forgetPhoto(null);
   const opened = openSheet({ name: null, saved: content, content });
   if (step) state.past.value = [step];
   state.say(`${words}.${step ? " Undo brings the unsaved sheet back." : ""}${file ? ` Unsaved work on ${file} is kept: open it again.` : ""}`);
   return opened;
-}
-
-/** Open the model of a link, and take it out of the address; whether there was one. */
-export async function openLink(address) {
-  const mine = (sheets += 1);
-  history.replaceState(null, "", location.pathname);
-  try {
-    const content = await textOf(address);
-    if (mine === sheets) await openText(content, "The model of the link opened");
-    return true;
-  } catch (problem) {
-    state.say(problem.message, true);
-    return false;
-  }
-}
-
-/** The model as a link in the clipboard. */
-export async function copyLink() {
-  try {
-    await navigator.clipboard.writeText(await linkOf(state.text.value, `${location.origin}/`));
-    state.say("The link is in the clipboard. It holds the model itself: File, Open takes it, or put its part from #m= on behind the address that trunnion studio prints.");
-  } catch (problem) {
-    state.say(problem.message, true);
-  }
 }
 
 export function openExample(example) {
@@ -338,11 +327,7 @@ function refused(refusal) {
 /** Export and hand the file to the browser. */
 export async function exported(what) {
   state.say(`${what.toUpperCase()} is being made …`);
-  if (sheet.view && (what === "png" || what === "svg")) {
-    const { name, blob } = await counted(pictureOf(what));
-    return handOver(name, blob);
-  }
-  const made = await counted(link.ask("export", { text: state.text.value, what, steps: STEPS }));
+  const made = await counted(link.ask("export", { text: state.text.value, what, steps: STEPS, index: state.index.value }));
   if (!made) return;
   if (made.error) return state.say(made.error, true);
   const [first, count] = made.bytes.bytes;

@@ -6,7 +6,6 @@ import { Bounded, Failures } from "./boundary.js";
 import { Dialogs } from "./dialogs.js";
 import { Findings } from "./findings.js";
 import { Motion } from "./motion.js";
-import { PhotoCard } from "./photo.js";
 import { Plots } from "./plots.js";
 import { Properties } from "./properties.js";
 import { sheet } from "./sheet.js";
@@ -27,7 +26,7 @@ export function App() {
       ${bounded(ToolBar)}
       <div class="middle-part">
         <div class="window">
-          ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome, PhotoCard)}
+          ${state.spatial.value ? bounded(Space) : bounded(Stage, ZoomBar, Welcome)}
           ${bounded(Messages)}
         </div>
         ${bounded(Motion)}

@@ -1,9 +1,8 @@
 // The bars around the sheet: file, undo, friction and export above; tools at the left; readiness and margin below.
 
-import { copyLink, exported, openText, redo, save, undo } from "./actions.js";
+import { exported, openText, redo, save, undo } from "./actions.js";
 import { LAYERS } from "./layers.js";
 import { Margin } from "./margin.js";
-import { photoCard } from "./photo.js";
 import { sheet } from "./sheet.js";
 import * as state from "./state.js";
 import { nextTheme, theme } from "./theme.js";
@@ -23,7 +22,6 @@ export function TopBar() {
       <${Button} label="Examples …" onClick=${() => (dialog.value = "examples")} />
       <${Button} label="Save" title="Save (Ctrl+S)" onClick=${() => save()} />
       <${Button} label="Save as …" onClick=${() => (dialog.value = "save")} />
-      <${Button} label="Copy a link" title="The model as a link, to be opened in another studio" disabled=${!state.text.value.trim()} onClick=${copyLink} />
       <${Button} label="Keys …" title="What the keys do (?)" onClick=${() => (dialog.value = "keys")} />
     <//>
     <span class="file" title=${state.folder.value.folder}>${fileName.value ?? "Not saved yet"}<span class=${unsaved.value ? "changed" : "changed none"} aria-hidden=${!unsaved.value} title="There are changes that are not saved"> · changed</span></span>
@@ -40,7 +38,6 @@ export function TopBar() {
       ${LAYERS.map(([name, label]) => html`<label class="tick"><input type="checkbox" checked=${state.layers.value[name]}
         onChange=${(event) => (state.layers.value = { ...state.layers.value, [name]: event.target.checked })} /> ${label}</label>`)}
       <label class="tick"><input type="checkbox" checked=${state.snapping.value} onChange=${(event) => (state.snapping.value = event.target.checked)} /> Snap to the grid</label>
-      <${Button} label="Picture behind the grid …" disabled=${state.spatial.value} onClick=${() => (photoCard.value = true)} />
     <//>
     <${Menu} label="Export" disabled=${!state.solved.value}>${EXPORTS.map(([what, label]) => html`<${Button} label=${label} onClick=${() => exported(what)} />`)}<//>
     <${Button} kind="icon" label=${`Colours: ${theme.value}`} title=${`Colours: ${theme.value}; click for the next`} onClick=${nextTheme}><${Icon} name=${theme.value} /><//>

@@ -1,11 +1,10 @@
 // Dialogs: files of the folder, saving under a name; files that are dropped.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { openFile, openLink, openText, save } from "./actions.js";
+import { openFile, openText, save } from "./actions.js";
 import { Examples } from "./gallery.js";
 import { stemOf } from "./geometry.js";
 import { Keys } from "./keysheet.js";
-import { carries } from "./links.js";
 import * as state from "./state.js";
 import { Button, html } from "./ui.js";
 
@@ -30,20 +29,10 @@ function Frame({ children }) {
 function Open() {
   const { folder, names } = state.folder.value;
   const take = async ({ target }) => target.files[0] && openText(await target.files[0].text(), `${target.files[0].name} opened`);
-  const [wrong, setWrong] = useState("");
-  const link = async (event) => {
-    event.preventDefault();
-    const typed = event.target.elements.link.value.trim();
-    if (!carries(typed)) return setWrong("This is no link to a model: it has no #m= in it.");
-    if (!(await openLink(typed))) setWrong(state.notice.value.words);
-  };
   return html`<h2>Open</h2>
     <p class="calm">${folder}</p>
     <ul class="list">${names.map((name) => html`<li><button type="button" class="plain wide" onClick=${() => openFile(name)}>${name}</button></li>`)}</ul>
-    <label class="choice">A file from elsewhere <input type="file" accept=".yaml,.yml,.json,.txt" onChange=${take} /></label>
-    <form onSubmit=${link}><label class="choice wide-choice">A link <input name="link" placeholder="http://…#m=…" autocomplete="off" /></label>
-      <p class="wrong" role="alert">${wrong}</p>
-      <p class="row-of-buttons end"><button type="submit" class="plain">Open the link</button></p></form>`; // prettier-ignore
+    <label class="choice">A file from elsewhere <input type="file" accept=".yaml,.yml,.json,.txt" onChange=${take} /></label>`; // prettier-ignore
 }
 
 function Save() {

@@ -17,13 +17,13 @@ export const TARGET = 12; // px, radius of what a pointer may hit
 /** The drawing of a scene in an SVG element; `draw(scene)` builds, `pose(…)` moves, `fit` and `zoom` change the frame. */
 export function drawing(root) {
   const layers = Object.fromEntries(
-    ["photo", "grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "locks", "tools", "key"].map((name) => [
+    ["grid", "tracks", "ghosts", "ground", "bodies", "parts", "vectors", "names", "handles", "locks", "tools", "key"].map((name) => [
       name,
       svg("g", { class: `layer ${name}` }),
     ]),
   );
   root.append(...Object.values(layers));
-  return { root, layers, scene: null, index: 0, parts: null, kinds: new Map(), factor: 1, shown: {}, frame: frameOf(800, 600, 2000, 0, 0) };
+  return { root, layers, scene: null, index: 0, share: 0, parts: null, kinds: new Map(), factor: 1, shown: {}, frame: frameOf(800, 600, 2000, 0, 0) };
 }
 
 /** A frame: width and height px, px a metre, and where the origin lies. */
@@ -60,7 +60,7 @@ export function reframe(view, frame) {
   if (view.scene) {
     poseGuides(view);
     drawKey(view);
-    pose(view, view.scene, view.index);
+    pose(view, view.scene, view.index, view.share);
   }
 }
 
@@ -119,7 +119,7 @@ function allParts(scene, view) {
     springs: scene.springs.map((one) => spring(one)),
     loads: loadsOf(scene).map((one) => marked(one, "loads", one.name)),
     drives: scene.drivers.map((driver) => ({ driver, joint: scene.joints.find(({ name }) => name === driver.name), node: svg("path", { class: "drive" }) })).filter((one) => one.joint),
-    vectors: scene.joints.map((one) => ({ joint: one, node: svg("path", { class: `reaction ${view.kinds.get(one.name) ?? "k0"}` }) })),
+    vectors: scene.joints.map((one) => ({ node: svg("path", { class: `reaction ${view.kinds.get(one.name) ?? "k0"}` }) })),
     names: [...scene.joints.map((one) => nameOf(one.at, one.on, one.name, fixed(one), slides(one))), ...moving.flatMap((link) => link.free.map((key) => nameOf(key, key, key.slice(link.name.length + 1), false, false)))],
   }; // prettier-ignore
 }
@@ -247,31 +247,33 @@ export function drawKey(view) {
   layers.key.replaceChildren(...parts);
 }
 
-/** Move everything to a position of a scene of the same structure. */
-export function pose(view, scene, index) {
-  Object.assign(view, { scene, index: Math.min(index, scene.count - 1) });
+/** Move everything to a position of a scene of the same structure, or by a share of the way to the next. */
+export function pose(view, scene, index, share = 0) {
+  Object.assign(view, { scene, share, index: Math.min(index, scene.count - 1) });
   view.posed = posedAt(scene, view.index);
+  view.exact = view.index + (view.index < scene.count - 1 || scene.abscissa.closed ? share : 0);
+  const drawn = (view.drawn = view.posed === view.index ? view.exact : view.posed);
   const { parts, frame } = view;
   const known = solved(scene, view.index) || scene.count === 1;
   for (const name of ["bodies", "parts", "names"]) view.layers[name].classList.toggle("without-answer", !known);
   const spot = (key) => {
-    const found = place(scene, key, view.posed);
+    const found = place(scene, key, drawn);
     return found && frame.to(found);
   };
   if (parts.plain) return posePlain(view, spot);
   const spots = (keys) => keys.map(spot).filter(Boolean);
   parts.supports.forEach(({ joint: one, node }) => moveTo(node, spot(one.on) ?? spot(one.at)));
   parts.bodies.forEach((one) => poseBody(one, spots(one.link.points)));
-  parts.slots.forEach((one) => poseSlot(one, scene, frame, view.posed));
+  parts.slots.forEach((one) => poseSlot(one, scene, frame, drawn));
   parts.points.forEach(({ key, node }) => moveTo(node, spot(key)));
-  parts.joints.forEach(({ joint: one, node }) => moveTo(node, spot(one.at) ?? spot(one.on), one.type === "prismatic" ? guide(scene, one, view.posed) : 0));
+  parts.joints.forEach(({ joint: one, node }) => moveTo(node, spot(one.at) ?? spot(one.on), one.type === "prismatic" ? guide(scene, one, drawn) : 0));
   parts.springs.forEach((one) => one.parts.forEach((part) => set(part, { d: coil(spots(one.ends)) })));
   parts.gears.forEach(({ key, radius, circles, node }) => {
     moveTo(node, spot(key));
     circles.forEach((one) => set(one, { r: radius * frame.scale }));
   });
   parts.loads.forEach((one) => {
-    one.aim(scene, view.posed);
+    one.aim(scene, drawn);
     poseLoad(one, spots(one.keys), { width: frame.width, height: frame.height - LEGEND });
   });
   parts.drives.forEach((one) => poseDrive(view, one, spot(one.joint.at)));
@@ -325,12 +327,13 @@ function poseDrive({ scene, posed: index }, { driver, joint: one, node }, spot) 
 
 function poseVectors(view, spot) {
   const scale = perNewton(view);
-  for (const { joint: one, node } of view.parts.vectors) {
-    const force = forceAt(view.scene, one, view.index);
+  view.parts.vectors.forEach(({ node }, order) => {
+    const one = view.scene.joints[order];
+    const force = forceAt(view.scene, one, view.exact);
     const found = spot(one.at);
-    const show = found && force && view.shown.reactions !== false && !view.still;
+    const show = found && force && view.shown.reactions !== false;
     node.setAttribute("d", show ? arrow(found[0], found[1], force[0] * scale, -force[1] * scale) : "");
-  }
+  });
 }
 
 /** Names that would stand on each other stand side by side. */

@@ -192,13 +192,6 @@ export function extentOf(scene) {
   return Object.keys(scene.points).length ? bounds(scene) : null;
 }
 
-/** Where a picture lies that is enlarged and turned, rad, about a place of the plane that stays. */
-export function enlarged({ x, y, pixel, turn = 0 }, [px, py], factor, by = 0) {
-  const [c, s] = [factor * Math.cos(by), factor * Math.sin(by)];
-  const [dx, dy] = [x - px, y - py];
-  return { pixel: factor * pixel, turn: turn + by, x: px + c * dx - s * dy, y: py + s * dx + c * dy };
-}
-
 const UNITS = { "": null, mm: 1e-3, cm: 1e-2, dm: 0.1, m: 1, km: 1e3, in: 0.0254, ft: 0.3048, um: 1e-6, µm: 1e-6 };
 
 /** A typed length in m ("60", "60 mm", "2.5in"); a bare number is in `unit`. Null if it is none, or may be a thousand. */

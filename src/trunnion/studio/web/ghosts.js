@@ -24,7 +24,7 @@ export function takeOther(name) {
 }
 
 /** Put the ghosts to a position of the cycle. */
-export function poseGhosts({ layers, scene, frame, index }, list) {
+export function poseGhosts({ layers, scene, frame, exact: index }, list) {
   const box = layers.ghosts;
   if (box.childElementCount !== list.length)
     box.replaceChildren(...list.map(() => svg("g", { class: "ghost", "data-kind": "others" }, svg("title"), svg("path"))));

@@ -1,7 +1,8 @@
 // The pointer on the sheet: click, drag a joint, pan, zoom, also by two fingers. One question to Python at a time while a joint is dragged.
 
+import { batch } from "@preact/signals";
 import { place } from "../web/data.js";
-import { drag, edit, present } from "./actions.js";
+import { changed, edit, newest, present } from "./actions.js";
 import { gridStep, onGrid } from "./geometry.js";
 import { takeOther } from "./ghosts.js";
 import { sheet, shown } from "./sheet.js";
@@ -112,7 +113,8 @@ function takeHold(view, held) {
   const base = present();
   const { sketched, scene } = shown.peek();
   const path = sketched || state.locked.value.length ? null : pathOf(scene, key); // a locked joint stays where it is
-  held.joint = { name, key, index: view.posed, asked: false, wanted: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
+  held.joint = { name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
+  held.joint.ask = newest((to) => follow(held.joint, to));
   state.selection.value = { kind, name };
 }
 
@@ -158,7 +160,6 @@ function dragTo(joint, at, scale, alt) {
   const index = joint.path && !alt ? poseAt(joint, at, scale) : null;
   joint.posed = index !== null;
   if (joint.posed) {
-    joint.wanted = null;
     state.live.value = null;
     state.index.value = index;
     joint.base = null;
@@ -171,32 +172,24 @@ function dragTo(joint, at, scale, alt) {
     state.places.value = { ...state.places.value, ...Object.fromEntries(joint.together.map((key) => [key, joint.to])) };
     return;
   }
-  joint.wanted = joint.to;
-  if (!joint.asked) joint.asked = follow(joint);
+  joint.asked = joint.ask(joint.to);
 }
 
-/** Ask for the mechanism at the latest place until the hand rests. */
-async function follow(joint) {
-  while (joint.wanted) {
-    const to = joint.wanted;
-    joint.wanted = null;
-    const found = await drag({ point: joint.name, index: joint.index, to, keep: joint.keep });
-    if (!found) break;
-    if (joint.posed) continue;
-    if (found.error) state.say(found.error, true);
-    else if (found.points && !joint.left) {
-      joint.told = wordsOf(found);
-      state.live.value = { ...found, to };
-      if (found.solved) state.index.value = found.index;
-      state.say(joint.told, !found.solved);
-    }
-  }
-  joint.asked = false;
+/** Show the mechanism with a joint at a place. */
+async function follow(joint, to) {
+  const found = await changed("drag", { point: joint.name, index: joint.index, to, keep: joint.keep });
+  if (!found || joint.posed || joint.left) return;
+  if (found.error) return state.say(found.error, true);
+  joint.told = wordsOf(found);
+  batch(() => {
+    state.live.value = { ...found, to };
+    state.index.value = found.index;
+    state.say(joint.told);
+  });
 }
 
-function wordsOf({ solved, changes }) {
-  const told = (changes ?? []).map(([name, from, to]) => `${name} ${from} → ${to}`).join(", ");
-  return solved ? told : `${told}${told ? ": " : ""}it cannot be assembled so.`;
+function wordsOf({ changes }) {
+  return changes.map(([name, from, to]) => `${name} ${from} → ${to}`).join(", ");
 }
 
 async function release(held, shift) {

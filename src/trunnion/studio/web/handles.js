@@ -3,6 +3,7 @@
 import { set, svg } from "../web/dom.js";
 import { stated } from "../web/format.js";
 import { TARGET } from "./drawing.js";
+import { gridStep } from "./geometry.js";
 import * as state from "./state.js";
 
 const MOST = 400; // targets; of larger mechanisms the list under Properties chooses
@@ -13,11 +14,13 @@ export function poseHandles(view, spots, chosen) {
   const locked = new Set(state.locked.value);
   layers.locks.replaceChildren(...spots.filter(({ name }) => locked.has(name)).map(({ at }) => padlock(frame.to(at))));
   const few = spots.slice(0, MOST);
+  const least = gridStep(frame.scale) / 1000; // what a hand can tell apart: less is rounding
+  const told = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
   const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
   if (view.handled !== names) build(view, few, names);
   few.forEach(({ kind, name, at }, order) => {
     const [x, y] = frame.to(at);
-    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}${locked.has(name) ? ", locked" : ""}, at ${stated(at[0], "m")}, ${stated(at[1], "m")}`;
+    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}${locked.has(name) ? ", locked" : ""}, at ${told(at[0])}, ${told(at[1])}`;
     const active = chosen?.kind === kind && chosen.name === name;
     set(layers.handles.children[order], {
       cx: x.toFixed(1),

@@ -1,11 +1,12 @@
 // The player under the sheet, and the figures of the present position.
 
-import { effect, untracked } from "@preact/signals";
+import { batch, effect, untracked } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { gaps, say } from "../web/data.js";
 import { html as element, svg } from "../web/dom.js";
 import { player } from "../web/player.js";
 import { readout } from "../web/report.js";
+import { changing } from "./sheet.js";
 import * as state from "./state.js";
 import { html } from "./ui.js";
 
@@ -57,16 +58,17 @@ function fill(holder) {
       return;
     }
     const figures = readout(scene);
-    const show = (index) => {
-      state.index.value = index;
+    const show = (index, share) => {
+      batch(() => ([state.index.value, state.share.value] = [index, share]));
       figures.show(index);
     };
     const same = crank.player && crank.count === scene.count && !scene.motion && !crank.once;
     if (!same) {
       crank.player?.pause();
-      crank.player = player(scene.count, (index) => crank.words(index), (index) => crank.show(index), {
+      crank.player = player(scene.count, (index) => crank.words(index), (index, share) => crank.show(index, share), {
         svg,
         duration: scene.motion?.duration ?? null,
+        onBetween: (share) => (state.share.value = share),
       });
       lightUp(crank);
     }
@@ -79,25 +81,16 @@ function fill(holder) {
   });
 }
 
-/** While a joint is dragged the figures are those of the dragged mechanism; what is not known yet is a dash. */
+/** While the mechanism is being changed the figures are those of what it is changed to. */
 function follow(live) {
   const scene = untracked(() => (state.solved.value ? state.answer.value.scene : null));
   if (!scene || !crank.figures?.isConnected) return;
-  const dragged = live?.efforts ? readout(draggedOf(scene, live)) : null;
+  const dragged = live?.points ? readout(changing(scene, live)) : null;
   dragged?.show(state.index.peek());
   const element = dragged?.element ?? crank.own;
   if (element === crank.figures) return;
   crank.figures.replaceWith(element);
   crank.figures = element;
-}
-
-function draggedOf(scene, { efforts }) {
-  const known = untracked(() => state.friction.value) !== "off"; // a drag is answered with the friction that is stated
-  return {
-    ...scene,
-    drivers: scene.drivers.map((one) => ({ ...one, effort: (known && efforts[one.name]) || [null] })),
-    joints: scene.joints.map((one) => ({ ...one, friction_power: [null] })),
-  };
 }
 
 /** A strip under the slider for the positions that cannot be reached. */

@@ -2,7 +2,7 @@
 // angles, values at the arrows, and the outlines of variant A. Python works it out; here it is only drawn.
 
 import { arrow } from "../web/arrow.js";
-import { at, forceAt, hull, magnitude, peak, place } from "../web/data.js";
+import { angleAt, at, forceAt, hull, magnitude, peak, place } from "../web/data.js";
 import { svg } from "../web/dom.js";
 import { quantity, roundBelow, short, stated } from "../web/format.js";
 import { KEY, perNewton, trackPath } from "./drawing.js";
@@ -79,7 +79,7 @@ function keyed({ frame }, wide, text, drawn) {
 // ---- the chosen point -----------------------------------------------------------------------------------------------
 
 function motion(view, point, wanted, key) {
-  const { frame, index, scene } = view;
+  const { frame, exact: index, scene } = view;
   const scenery = point.position ? { ...scene, points: { [point.key]: point.position } } : scene;
   const found = place(scenery, point.key, index);
   if (!found) return [];
@@ -95,7 +95,7 @@ function motion(view, point, wanted, key) {
     const [dx, dy] = [at(parts.x, index), at(parts.y, index)];
     if (dx === null || dy === null) return [];
     const vector = svg("path", { class: `motion ${name}`, d: arrow(x, y, dx * scale, -dy * scale) });
-    return [vector, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(sizes[index], unit, peak(sizes))}`)];
+    return [vector, beyond([x, y], [dx * scale, -dy * scale], `${sign} = ${quantity(at(sizes, index), unit, peak(sizes))}`)];
   }));
 }
 
@@ -153,7 +153,7 @@ function edge(frame, spot, kind, text) {
 // ---- friction circles -----------------------------------------------------------------------------------------------
 
 function circles(view, list, key) {
-  const { frame, scene, index } = view;
+  const { frame, scene, exact: index } = view;
   const most = peak(...list.map(({ radius }) => radius)) * frame.scale;
   if (!(most > 0)) return [];
   const times = most >= CIRCLE ? 1 : roundAbove(CIRCLE / most);
@@ -183,8 +183,9 @@ function circles(view, list, key) {
 
 // ---- transmission angles --------------------------------------------------------------------------------------------
 
-function angle({ frame, index }, { x, y, first, angle: turn }) {
-  const [a, b, from, by] = [x, y, first, turn].map((one) => at(one, index));
+function angle({ frame, exact: index }, { x, y, first, angle: turn }) {
+  const [a, b, by] = [x, y, turn].map((one) => at(one, index));
+  const from = angleAt(first, index);
   if ([a, b, from, by].includes(null)) return [];
   const spot = frame.to([a, b]);
   const on = (way, far) => [spot[0] + far * Math.cos(way), spot[1] - far * Math.sin(way)];
@@ -203,7 +204,7 @@ function angle({ frame, index }, { x, y, first, angle: turn }) {
 // ---- values of the reactions ----------------------------------------------------------------------------------------
 
 function values(view) {
-  const { scene, frame, index } = view;
+  const { scene, frame, exact: index } = view;
   const scale = perNewton(view);
   const sizes = scene.joints.map((one) => magnitude(one.reaction, scene.count));
   const least = NOTHING * peak(...sizes);
@@ -217,9 +218,9 @@ function values(view) {
 }
 
 /** The names of joints and points as words that stand already. */
-function names({ parts, scene, frame, posed }) {
+function names({ parts, scene, frame, drawn }) {
   return (parts?.names ?? []).flatMap(({ key, other, beside, node }) => {
-    const found = place(scene, key, posed) ?? place(scene, other, posed);
+    const found = place(scene, key, drawn) ?? place(scene, other, drawn);
     if (!found) return [];
     const [x, y] = frame.to(found);
     const half = (LETTER * node.textContent.length) / 2 + 3;
@@ -242,7 +243,7 @@ function loads({ parts }) {
 // ---- variant A ------------------------------------------------------------------------------------------------------
 
 function variants(view, key) {
-  const { frame, index, scene } = view;
+  const { frame, exact: index, scene } = view;
   const other = compared.peek().find((one) => one.ghost && one.scene?.count === scene.count);
   if (!other) return [];
   const line = (x, y) => svg("path", { class: "outline-of-variant", d: `M${x},${y}h22` });

@@ -11,7 +11,6 @@ import { clicked, laid } from "./layers.js";
 import { crank } from "./motion.js";
 import { kindsOf } from "./sheet.js";
 import * as state from "./state.js";
-import { tabled } from "./tables.js";
 import { Tolerances } from "./tolerances.js";
 import { Button, html } from "./ui.js";
 import { Variants, compared } from "./variants.js";
@@ -73,10 +72,7 @@ function curves(found, others) {
   });
   return list
     .filter((one) => !one.only || one.series.length > 1)
-    .map((one) => {
-      const chart = lineChart(scene, { ...one, pick: crank.pick });
-      return tabled(chart, { scene, title: one.title, columns: one.series, pick: crank.pick });
-    });
+    .map((one) => lineChart(scene, { ...one, pick: crank.pick }));
 }
 
 function listed({ scene, margin, margin_least: least }) {
@@ -143,9 +139,7 @@ function loops({ scene }, others) {
     const ideal = other?.scene.joints.find(({ name }) => name === joint.name)?.reaction ?? null;
     const chart = polarChart(scene, { ...joint, ideal }, kinds.get(joint.name), crank.pick, seen);
     if (ideal) chart.element.append(Object.assign(document.createElement("p"), { className: "remark", textContent: `Dashed: ${other.name}` }));
-    const parts = Object.entries(joint.reaction).map(([axis, values]) => ({ label: `F${axis}`, values: full(values, scene.count) }));
-    const columns = [...parts, { label: "magnitude", values: magnitude(joint.reaction, scene.count) }];
-    return tabled(chart, { scene, title: `reaction ${joint.name}`, columns, pick: crank.pick });
+    return chart;
   });
 }
 

@@ -1,7 +1,7 @@
 // Values of what is chosen, as the file writes them, typed in place; the list of parts; dimensions with sliders.
 
 import { useRef, useState } from "preact/hooks";
-import { edit, setValue } from "./actions.js";
+import { changed, edit, newest, setValue } from "./actions.js";
 import { AddDimension } from "./adding.js";
 import { ambiguous, bare, findingsOf, numberOf, rowsOf, unitOf, usualUnit, written } from "./fields.js";
 import { dictionary, groundOf } from "./geometry.js";
@@ -154,31 +154,43 @@ function Parts({ kind, names }) {
   </div>`;
 }
 
+/** Show the mechanism with a dimension so many times as long. */
+async function tried(name, times) {
+  const path = `dimensions.${name}`;
+  const { text, numbers } = state.answer.value;
+  const found = await changed("try", { values: { [path]: times * numbers[path] }, index: state.index.peek() });
+  if (!found || text !== state.text.value) return;
+  if (found.error) state.say(found.error, true);
+  else state.live.value = found;
+}
+
 /** A dimension with a slider from none to twice of it; all that one pull of the slider changes is one step. */
 function Dimension({ name, value, findings }) {
   const path = ["dimensions", name];
   const number = numberOf(value);
   const [pulled, setPulled] = useState(null);
-  const sending = useRef({ busy: false, wanted: null });
   const start = pulled?.from ?? number;
-  const pull = async (event) => {
-    const next = `${Number(Number(event.target.value).toPrecision(4))} ${start.rest}`.trim();
-    setPulled({ from: start, text: next });
-    sending.current.wanted = next;
-    if (sending.current.busy) return;
-    sending.current.busy = true;
-    while (sending.current.wanted) {
-      const text = sending.current.wanted;
-      sending.current.wanted = null;
-      await setValue(path, written(text), `slider ${name}`);
-    }
-    sending.current.busy = false;
+  const [shown, asked] = [useRef(null), useRef(null)];
+  shown.current ??= newest(({ value, before }) => tried(name, value / before));
+  const typedBy = ({ target }) => Number(Number(target.value).toPrecision(4));
+  const pull = (event) => {
+    setPulled({ from: start, text: `${typedBy(event)} ${start.rest}`.trim() });
+    if (state.solved.value && !state.spatial.value) asked.current = shown.current({ value: typedBy(event), before: start.value });
+  };
+  const back = async (event) => {
+    if (typedBy(event) !== start.value) return; // it is released elsewhere
+    await asked.current;
+    state.live.value = null;
+    setPulled(null);
+  };
+  const release = async (event) => {
+    await setValue(path, written(`${typedBy(event)} ${start.rest}`.trim()), `slider ${name}`);
     setPulled(null);
   };
   const slides = start && start.value !== 0;
   return html`<div class=${String(value).length > ROOMY ? "dimension long" : "dimension"}>
     <${Row} row=${{ path, label: name, value: pulled?.text ?? String(value), example: null }} findings=${findings} />
     ${slides && html`<input type="range" aria-label=${`${name}, slider`} min=${Math.min(0, 2 * start.value)} max=${Math.max(0, 2 * start.value)}
-      step=${Math.abs(start.value) / 200} value=${numberOf(pulled?.text ?? value)?.value} onInput=${pull} />`}
+      step=${Math.abs(start.value) / 200} value=${numberOf(pulled?.text ?? value)?.value} onInput=${pull} onChange=${release} onPointerUp=${back} />`}
   </div>`; // prettier-ignore
 }

@@ -15,14 +15,20 @@ export const shown = computed(() => {
     const scene = sketch(found.entries, state.places.value, found.numbers);
     return { scene: found.tracks ? { ...scene, points: found.tracks } : scene, structure: scene, sketched: true };
   }
-  const scene = state.live.value?.points ? moved(found.scene, state.live.value) : found.scene;
+  const scene = state.live.value?.points ? changing(found.scene, state.live.value) : found.scene;
   return { scene, structure: found, sketched: false };
 });
 
-/** The scene with points and angles of a mechanism that is dragged. */
-function moved(scene, { points, angles, status }) {
-  const links = scene.links.map((link) => (angles?.[link.name] ? { ...link, angle: angles[link.name] } : link));
-  return { ...scene, links, points: { ...scene.points, ...points }, status: status ?? scene.status };
+/** The scene with the motion and forces of a mechanism that is being changed. */
+export function changing(scene, { points, angles, efforts, joints, status }) {
+  return {
+    ...scene,
+    links: scene.links.map((link) => ({ ...link, angle: angles[link.name] ?? link.angle })),
+    points: { ...scene.points, ...points },
+    drivers: scene.drivers.map((one) => ({ ...one, effort: efforts[one.name] ?? one.effort })),
+    joints: scene.joints.map((one) => ({ ...one, ...joints[one.name] })),
+    status,
+  };
 }
 
 /** Colour classes of the joints, as the report has them. */
@@ -37,8 +43,6 @@ export const sheet = {
   after: () => {},
   /** What is drawn beside it, [{points}]. @type {() => {points: object}[]} */
   beside: () => [],
-  /** Puts the picture behind the grid where it belongs. */
-  photo: () => {},
   fit() {
     const { width, height } = sheet.view.frame;
     const { scene } = shown.peek() ?? {};
@@ -65,7 +69,7 @@ export const sheet = {
   fine: () => (sheet.view ? sheet.step() / 1000 : 0),
   /** Width of the window and reach of a click, m. */
   scale: () => ({ wide: sheet.view.frame.width / sheet.view.frame.scale, near: nearOf(sheet.view.frame.scale) }),
-  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.posed) : []),
+  spots: () => (sheet.view?.scene ? spotsOf(sheet.view.scene, sheet.view.drawn) : []),
   /** What lies at a place: a joint or a point no farther than `near` m, or the grid; `loose` leaves the grid out. */
   snap(at, loose = false, near = nearOf(sheet.view.frame.scale)) {
     const step = sheet.step() / (loose || !state.snapping.value ? 100 : 1);
@@ -115,6 +119,5 @@ function middle() {
 
 function look(frame) {
   reframe(sheet.view, frame);
-  sheet.photo();
   sheet.after();
 }

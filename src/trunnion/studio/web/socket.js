@@ -12,7 +12,7 @@ let token = "";
 export function enter() {
   token = /** @type {HTMLMetaElement} */ (document.querySelector("meta[name=token]")).content;
   if (!token) token = inStores((store) => store.getItem(TOKEN)).find(Boolean) ?? "";
-  else if (inStores((store) => (store.setItem(TOKEN, token), true)).some(Boolean)) history.replaceState(null, "", location.pathname + location.hash);
+  else if (inStores((store) => (store.setItem(TOKEN, token), true)).some(Boolean)) history.replaceState(null, "", location.pathname);
 }
 
 /** What comes of an act in the storage that all tabs share, and in that of this tab: the first may be full, both may be off. */

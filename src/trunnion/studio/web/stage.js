@@ -11,7 +11,6 @@ import { compared } from "./variants.js";
 import { markChosen, poseHandles } from "./handles.js";
 import { listenToPointer } from "./hand.js";
 import { kindsOf, sheet, shown } from "./sheet.js";
-import { watchPhoto } from "./photo.js";
 import * as state from "./state.js";
 import { pointer, toolOf, typed, typedEnd } from "./tools.js";
 import { html } from "./ui.js";
@@ -39,7 +38,6 @@ function mount(holder) {
   };
   const stop = [
     watchSize(holder, view),
-    watchPhoto(view),
     listenToPointer(root, view),
     listenToPlaces(root, view),
     effect(() => show(view)),
@@ -66,8 +64,10 @@ function watchSize(holder, view) {
     const { clientWidth: width, clientHeight: height } = holder;
     if (!width || !height) return;
     sheet.resize(width, height);
-    if (!view.sized) sheet.fit();
+    if (view.sized) return;
     view.sized = true;
+    view.fresh = !shown.peek();
+    sheet.fit();
   });
   observer.observe(holder);
   return () => observer.disconnect();
@@ -85,7 +85,6 @@ function show(view) {
   const other = view.shown.curves !== curves || view.shown.reactions !== reactions || view.shown.grid !== grid;
   view.shown = { curves, reactions, names, grid };
   view.index = index;
-  view.still = Boolean(state.live.value);
   if (view.structure !== found.structure || other) {
     view.structure = found.structure;
     build(view, found.scene, kindsOf(found.scene));
@@ -93,7 +92,7 @@ function show(view) {
     view.scene = found.scene;
     drawTracks(view);
   }
-  pose(view, found.scene, index);
+  pose(view, found.scene, index, state.share.value);
   if (view.fresh && view.sized) {
     view.fresh = false;
     untracked(sheet.fit);

@@ -17,8 +17,6 @@ export const about = signal({ version: "", examples: [], laws: [] });
 export const folder = signal({ folder: "", id: "", names: [] });
 /** Name of the open file in the folder, or null for a sheet that was never saved. */
 export const fileName = signal(null);
-/** Picture behind the grid: null for none, undefined while it is not known; see photo.js. */
-export const photo = signal(undefined);
 /** How many sheets were opened. */
 export const opened = signal(0);
 export const savedText = signal("");
@@ -33,6 +31,8 @@ export const places = signal({});
 export const answer = signal(null);
 export const busy = signal(0);
 export const index = signal(0);
+/** How far a played mechanism is from this position to the next, 0 to 1. */
+export const share = signal(0);
 /** {kind, name}, kind being links, joints, points, loads, springs or drivers; or null. */
 export const selection = signal(null);
 export const tool = signal("select");
@@ -134,8 +134,8 @@ export function begin({ name, saved, content, steps = null }) {
     pending.value = null;
     live.value = null;
     index.value = 0;
+    share.value = 0;
     tool.value = "select";
-    photo.value = undefined;
     if (opened.value) variant.value = null; // of another sheet; a page that is loaded again has the one it had
     opened.value += 1;
     recovered.value = steps && content !== saved ? steps.time : null;

@@ -6,8 +6,13 @@ export function told(margin, least, index) {
   const here = margin[Math.min(index, margin.length - 1)];
   if (least.beyond) return "> 10 everywhere";
   const whole = `least ${number(least.value)} at ${least.at}`;
-  if (here === null) return `none here, ${whole}`;
-  return `${here >= 10 ? "> 10" : number(here)} here${here <= 1 ? ": it locks" : ""}, ${whole}`;
+  return `${at({ value: here, beyond: here >= 10 })}, ${whole}`;
+}
+
+/** The margin of one position: "4.27 here", "> 3 here". */
+export function at({ value, beyond }) {
+  if (value === null) return "none here";
+  return `${beyond ? "> " : ""}${number(value)} here${value <= 1 ? ": it locks" : ""}`;
 }
 
 function number(value) {

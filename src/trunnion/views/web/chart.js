@@ -13,8 +13,7 @@ const MARGIN = { top: 8, right: 14, bottom: 40, left: 58 };
  * has no dot, `unlisted` no line in the legend; a value that reaches `most` is more than that.
  * `breaks` of a series are positions that no line leads to, `marks` positions that are marked in all of the chart.
  * `band` {low, high, kind, label} is filled. `limits` caps the vertical axis, `note` is a remark below it.
- * `pick(index, firm)` is called when the reader points. Beside {element, show(index)} it tells the {factor, unit} it shows
- * values in, and the largest of them, which decides on their decimals.
+ * `pick(index, firm)` is called when the reader points.
  */
 export function lineChart(scene, { title, unit, series, band = null, limits = null, note = "", marks = [], pick }) {
   const columns = [...series.map((one) => one.values), ...(band ? [band.low, band.high] : [])];
@@ -54,8 +53,6 @@ export function lineChart(scene, { title, unit, series, band = null, limits = nu
   listen(chart, pick);
   return {
     element,
-    scale,
-    most,
     show(index) {
       chart.index = index;
       moveCursor(chart);

@@ -7,10 +7,26 @@ export const OUTSIDE = "near a dead centre is outside the frame; --uncut shows i
 
 const FIRST_UNSOLVED = 4; // errors.Status.NOT_CONVERGED: from here on the forces have no value
 
-/** The value of a series at a position; a series of one number holds everywhere. */
+/**
+ * The value of a series at a position; a series of one number holds everywhere. Between two positions (index 3.4) it is
+ * on the straight line between their values, where both are known.
+ */
 export function at(series, index) {
   if (!series || series.length === 0) return null;
-  return series.length === 1 ? series[0] : series[index];
+  if (series.length === 1) return series[0];
+  return Number.isInteger(index) ? series[index] : between(series, index, (change) => change);
+}
+
+/** An angle at a position, rad; between two positions it turns the short way. */
+export function angleAt(series, index) {
+  if (!series || series.length < 2 || Number.isInteger(index)) return at(series, index);
+  return between(series, index, (change) => change - 2 * Math.PI * Math.round(change / (2 * Math.PI)));
+}
+
+function between(series, index, way) {
+  const before = Math.floor(index);
+  const [start, end] = [series[before], series[(before + 1) % series.length]];
+  return start === null || end === null ? start : start + (index - before) * way(end - start);
 }
 
 /** A series written out for every position. */
@@ -199,5 +215,5 @@ export function forceAt(scene, joint, index) {
 export function guide(scene, joint, index) {
   const [x, y] = joint.axis ?? [1, 0];
   const link = scene.links.find((one) => one.name === joint.links[0]);
-  return Math.atan2(y, x) + (link ? (at(link.angle, index) ?? 0) : 0);
+  return Math.atan2(y, x) + (link ? (angleAt(link.angle, index) ?? 0) : 0);
 }

@@ -1,7 +1,7 @@
 // Loads in the drawing: a force as an arrow at its point, a moment as a bent one on its link. Their length is no scale.
 
 import { arrow, bentArrow } from "./arrow.js";
-import { at, guide } from "./data.js";
+import { angleAt, at, guide } from "./data.js";
 import { set, svg } from "./dom.js";
 import { stated } from "./format.js";
 
@@ -36,7 +36,7 @@ function present(load, key, index) {
 function pushed(scene, load, index) {
   const [x, y] = present(load, "force", index);
   const link = load.frame === "link" ? scene.links.find(({ name }) => name === load.link) : null;
-  return { size: Math.hypot(x, y), angle: Math.atan2(y, x) + (link ? (at(link.angle, index) ?? 0) : 0) };
+  return { size: Math.hypot(x, y), angle: Math.atan2(y, x) + (link ? (angleAt(link.angle, index) ?? 0) : 0) };
 }
 
 /** A moment, N m; positive counter-clockwise. */

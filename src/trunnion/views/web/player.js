@@ -29,11 +29,12 @@ function pacer(duration) {
 }
 
 /**
- * Controls for `count` positions; `describe(index)` is the position in words, `onShow(index)` is called on a change.
+ * Controls for `count` positions; `describe(index)` is the position in words, `onShow(index, share)` is called on a
+ * change. While it plays, `onBetween(share)` tells how far it is from the position to the next, 0 where it stands.
  * duration: of a motion in time, s; it is played at a speed and stops at its end, while a cycle begins again.
  * Returns {element, go, pause, playing, index}.
  */
-export function player(count, describe, onShow, { svg, duration = null }) {
+export function player(count, describe, onShow, { svg, duration = null, onBetween = (_) => {} }) {
   const once = duration !== null;
   const icon = svg("path", { d: PLAY });
   const button = html(
@@ -63,24 +64,27 @@ export function player(count, describe, onShow, { svg, duration = null }) {
   );
   const state = { index: 0, exact: 0, timer: 0, last: 0 };
 
-  const show = (index) => {
+  const show = (index, share = 0) => {
     state.index = once ? Math.min(Math.max(index, 0), count - 1) : ((index % count) + count) % count;
     slider.value = String(state.index);
     set(slider, { "aria-valuetext": describe(state.index) });
-    onShow(state.index);
+    onShow(state.index, share);
   };
   const pause = () => {
     cancelAnimationFrame(state.timer);
     state.timer = 0;
     icon.setAttribute("d", PLAY);
     button.setAttribute("aria-label", "Play");
+    onBetween(0);
   };
   const frame = (now) => {
     state.exact += ((now - state.last) / 1000 / pace.run()) * (once ? count - 1 : count);
     state.last = now;
     if (once && state.exact >= count - 1) return go(count - 1);
     state.exact %= count;
-    if (Math.floor(state.exact) !== state.index) show(Math.floor(state.exact));
+    const index = Math.floor(state.exact);
+    if (index !== state.index) show(index, state.exact - index);
+    else onBetween(state.exact - index);
     state.timer = requestAnimationFrame(frame);
   };
   const play = () => {

@@ -45,8 +45,6 @@ export function polarChart(scene, { name, reaction, ideal }, kind, pick, /** @ty
   plot.addEventListener("pointermove", (event) => point(event, event.buttons > 0));
   return {
     element,
-    scale,
-    most: most * scale.factor,
     show(index) {
       chart.index = index;
       value.textContent =

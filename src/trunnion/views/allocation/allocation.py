@@ -14,11 +14,12 @@ from trunnion.statistics.costs import Cost
 from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.allocation.tables import bought, headed, offers_table, room, tables, trials
 from trunnion.views.common.cycle import names
-from trunnion.views.common.page import Section
-from trunnion.views.tolerance.figure import KINDS as OF_TOLERANCES
-from trunnion.views.tolerance.figure import figure as tolerance_figure
-from trunnion.views.tolerance.readings import is_play, readings
-from trunnion.views.tolerance.report import report as tolerance_report
+from trunnion.views.page import Section
+from trunnion.views.readings import readings
+from trunnion.views.texts import is_play
+from trunnion.views.tolerance import KINDS as OF_TOLERANCES
+from trunnion.views.tolerance import figure as tolerance_figure
+from trunnion.views.tolerance import report as tolerance_report
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,11 +102,11 @@ def report(result: xr.Dataset) -> str:
     if not result.attrs["found"]:
         return tolerance_report(result, kicker=kicker)
     pictures = [("Cost of each tolerance, the chosen one marked", figure(result, "cost"))]
-    told = [bought(result)._replace(title=""), room(result)]
+    told = [bought(result).titled(""), room(result)]
     told += [trials(result)] if "trial_yield" in result else []
-    first = [Section("Allocated tolerances", headed(result), pictures, told)]
+    first = [Section("Allocated tolerances", headed(result), pictures, told[:2], told[2:])]
     if "trade_off_cost" in result:
         about = "Minimum cost if all limits are multiplied by the same factor."
         curve = [("Minimum cost over accuracy", figure(result, "trade-off"))]
-        first.append(Section("Cost over accuracy", about, curve, [offers_table(result)._replace(title="")]))
+        first.append(Section("Cost over accuracy", about, curve, [offers_table(result).titled("")]))
     return tolerance_report(result, first, kicker)

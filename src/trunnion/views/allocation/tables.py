@@ -11,9 +11,10 @@ from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import drawn_in, joined
 from trunnion.views.common.cycle import names
-from trunnion.views.common.table import TextTable
-from trunnion.views.tolerance.readings import is_play, readings, share, share_interval
-from trunnion.views.tolerance.tables import tables as tolerance_tables
+from trunnion.views.readings import readings
+from trunnion.views.table import Table
+from trunnion.views.texts import is_play, share, share_interval
+from trunnion.views.tolerance import tables as tolerance_tables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +24,7 @@ __all__ = ["bought", "headed", "offers_table", "room", "tables", "trials"]
 CRITERIA = {"worst-case": "worst case", "rss": "root of the sum of squares", "yield": "yield"}
 
 
-def tables(result: xr.Dataset) -> list[TextTable]:
+def tables(result: xr.Dataset) -> list[Table]:
     """What to buy, how the limits are kept, what accuracy costs, and then the tables of `tolerance`."""
     if not result.attrs["found"]:
         return []
@@ -52,7 +53,7 @@ def headed(result: xr.Dataset) -> str:
     return f"{told}, {'global optimum to first order' if result.attrs['proven'] else 'best found'}"
 
 
-def bought(result: xr.Dataset) -> TextTable:
+def bought(result: xr.Dataset) -> Table:
     """Each tolerance that has a cost: what it is to be, what it costs, and what it was."""
     rows = []
     units = units_along(result["tolerance"], "parameter")
@@ -70,7 +71,7 @@ def bought(result: xr.Dataset) -> TextTable:
     total, before = float(result["cost_total"]), float(result["cost_total_before"])
     rows.append(["all", "", "", "", _known(total), share(1.0), "", _known(before)])
     head = ["parameter", "tolerance", "made", "group", "cost", "share", "as stated", "cost as stated"]
-    return _without_empty(TextTable(headed(result), head, rows))
+    return _without_empty(Table(headed(result), head, rows))
 
 
 def half_width(t: float, unit: str, sign: str = "±") -> str:
@@ -85,13 +86,13 @@ def _known(cost: float) -> str:
     return f"{cost:.6g}" if math.isfinite(cost) else "—"
 
 
-def _without_empty(table: TextTable) -> TextTable:
+def _without_empty(table: Table) -> Table:
     """Without columns that say nothing."""
     kept = [k for k in range(len(table.head)) if k == 0 or any(row[k] not in ("", "—") for row in table.rows)]
-    return TextTable(table.title, [table.head[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
+    return Table(table.title, [table.head[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
 
 
-def room(result: xr.Dataset) -> TextTable:
+def room(result: xr.Dataset) -> Table:
     """Of each measure how much of its room is taken by the criterion, and found by search and samples."""
     rows = []
     split = "yield_margin" in result and int(np.sum(np.isfinite(result["yield_margin"].values))) > 1
@@ -104,19 +105,19 @@ def room(result: xr.Dataset) -> TextTable:
         ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
         wider = 0.01 * read.value("saving") * min(ends) if ends else math.nan
         rows.append(
-            [read.name, read.told_limits, _share(read.value("used")), margin,
+            [read.name, read.limits_said, _share(read.value("used")), margin,
              _share(max(found, default=math.nan)), _share(read.value("yield")),
              "—" if math.isnan(wider) else f"{wider:.4g}"]
         )  # fmt: skip
     head = ["measure", "limits", "used", "margin", "worst case found", "yield", "1\u00a0% wider saves"]
-    return _without_empty(TextTable("share of the limits that is used", head, rows))
+    return _without_empty(Table("share of the limits that is used", head, rows))
 
 
 def _share(value: float) -> str:
     return "—" if math.isnan(value) else f"{100 * value:.4g}\u00a0%"
 
 
-def trials(result: xr.Dataset) -> TextTable:
+def trials(result: xr.Dataset) -> Table:
     """What was sampled on the way to a yield."""
     keys = ("trial_margin", "trial_cost", "trial_yield", "trial_yield_low", "trial_yield_high")
     rows = [
@@ -125,13 +126,13 @@ def trials(result: xr.Dataset) -> TextTable:
     ]
     several = int(np.sum(np.isfinite(result["yield_margin"].values))) > 1
     margin = "mean margin of the limits" if several else "margin of every limit"
-    return TextTable("trials", [margin, "cost", "yield", "at least", "at most"], rows)
+    return Table("trials", [margin, "cost", "yield", "at least", "at most"], rows)
 
 
-def offers_table(result: xr.Dataset) -> TextTable:
+def offers_table(result: xr.Dataset) -> Table:
     """Cost over accuracy."""
     rows = [
         [f"{100 * factor:.4g}\u00a0%", _known(cost) if math.isfinite(cost) else "infeasible"]
         for factor, cost in zip(result["trade_off_factor"].values, result["trade_off_cost"].values, strict=True)
     ]
-    return TextTable("cost over accuracy", ["limits, relative to stated", "minimum cost"], rows)
+    return Table("cost over accuracy", ["limits, relative to stated", "minimum cost"], rows)

@@ -26,7 +26,7 @@ __all__ = ["chart", "figure", "line_style"]
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
                           "dotted": (0, (1, 1.5)), "none": "none"}  # fmt: skip
-PAGE = 12.6  # width of a figure of several columns, inches
+PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
 BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
@@ -44,7 +44,7 @@ def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int
     columns = min(columns, len(panels))
     rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
     heights = [max(panel.height for panel in row) for row in rows]
-    sheet = new(title, result, 0.55 + sum(heights), width or (WIDTH if columns == 1 else PAGE))
+    sheet = new(title, result, 0.55 + sum(heights), width or PAGE[columns])
     parts = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights)
     for place, panel in zip(parts.ravel(), panels, strict=False):
         if not panel.charts:  # of a measure that lacks this figure
@@ -126,7 +126,7 @@ def _limits(axes: Axes, one: Chart) -> None:
     for name, axis in (("x", one.x), ("y", one.y)):
         if isinstance(axis, Axis):
             if axis.margin is not None:
-                axes.margins(**{name: axis.margin})
+                axes.margins(**{name: axis.margin})  # type: ignore[arg-type]  # x or y
             low, high = axis.limits
             if low is not None or high is not None:
                 (axes.set_xlim if name == "x" else axes.set_ylim)(low, high)

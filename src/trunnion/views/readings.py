@@ -324,7 +324,9 @@ def readings(result: xr.Dataset) -> list[MeasureReading]:
         pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
                  for low, high in ends]  # fmt: skip
         text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
-        reads.append(MeasureReading(result.isel(measure=i), name, text, str(units[i]), *pairs, rule, course))
+        reads.append(
+            MeasureReading(result.isel(measure=i), name, text, str(units[i]), pairs[0], pairs[1], rule, course)
+        )
     return reads
 
 

@@ -237,7 +237,7 @@ FEWEST, MOST = 20, 60  # bars of a histogram
 CORE = 0.01  # share of the samples at either end beyond the core
 FAR = 1.5  # of the width of the core, beyond which no sample decides how far the picture goes
 READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
-INSIDE = 0.09  # share of a bar that holds its number
+INSIDE = 0.14  # share of a bar that holds its number
 NAME = 34  # characters of a name beside a bar
 
 
@@ -388,7 +388,7 @@ def envelope(read: MeasureReading) -> Panel:
     marks: list[Mark] = [Stripe(x[k - 1], x[k + 1], "not solved") for k in np.flatnonzero(picked < 0)]
     if read.has("curve_worst_case_upper"):
         ends = [read.along(read.row(f"curve_worst_case_{end}")) for end in ("lower", "upper")]
-        marks.append(Band(x, *ends, "worst case, linear", Look(4, alpha=0.16, order=1), close=True))
+        marks.append(Band(x, ends[0], ends[1], "worst case, linear", Look(4, alpha=0.16, order=1), close=True))
         marks += [Line(x, end, None, Look("muted", 0.9), close=True) for end in ends]
     marks += _sample_bands(read, x)
     if read.has("curve_rss"):
@@ -421,7 +421,7 @@ def _sample_bands(read: MeasureReading, x: Array) -> list[Mark]:
         return read.along(band[int(np.argmin(np.abs(levels - level)))])
 
     return [
-        Band(x, *map(at, OUTER), "99.73 % of the samples", Look(WITHIN, alpha=0.28, order=1.2), close=True),
+        Band(x, at(OUTER[0]), at(OUTER[1]), "99.73 % of the samples", Look(WITHIN, alpha=0.28, order=1.2), close=True),
         Band(x, at(0.05), at(0.95), "90 %", Look(WITHIN, alpha=0.45, order=1.2), close=True),
         Line(x, at(0.5), None, Look(WITHIN, 1.0), close=True),
     ]
@@ -434,7 +434,7 @@ def convergence(read: MeasureReading) -> Panel:
     rows += [("yield", "yield [%]", 100.0)] if read.limited else []
     across = Axis("samples", log=True, count=2 if size[-1] < 50 * size[0] else 1,
                   form=lambda value: f"{value:,.0f}".replace(",", "\u202f"))  # fmt: skip
-    charts = []
+    charts: list[Chart] = []
     for key, title, factor in rows:
         values = read.row(f"convergence_{key}") * factor
         low, high = (factor * end for end in _running_interval(read, key, values / factor, size))
@@ -468,7 +468,7 @@ def _running_interval(read: MeasureReading, key: str, values: Array, size: Array
 # ---- figures ------------------------------------------------------------------------------------------------------
 
 MOST_PANELS = 6  # measures of a figure
-TALL, SHORT = 17.0, 2.5  # heights of a whole sheet and of a panel on it, inches
+TALL, SHORT = 16.0, 2.5  # heights of a whole sheet and of a panel on it, inches
 FEW_BARS = 4  # of a sheet of several measures
 
 
@@ -537,12 +537,14 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
     few = {"histogram": histogram, "contributions": lambda read: contribution_bars(read, FEW_BARS),
            "envelope": envelope}  # fmt: skip
     kinds = [kind for kind in few if any(KINDS[kind].ready(read) for read in reads)]
-    height = max(min(3.6, TALL / len(reads)), SHORT)
+    height = max(min(3.3, TALL / len(reads)), SHORT)
     panels = []
-    for read in reads:
+    for k, read in enumerate(reads):
         for kind in kinds:
-            panel = few[kind](read) if KINDS[kind].ready(read) else Panel("", [])
-            panels.append(replace(panel, title=f"{read.name}: {KINDS[kind].title.lower()}", height=height))
+            charts = few[kind](read).charts if KINDS[kind].ready(read) else []
+            if k and kind != "histogram":  # whose colours mean the same as in the first row
+                charts = [replace(chart, legend=None) for chart in charts]
+            panels.append(Panel(f"{read.name}: {KINDS[kind].title.lower()}", charts, height + (0.9 if k == 0 else 0)))
     return draw("Effect of the tolerances", result, panels, columns=len(kinds))
 
 

@@ -21,7 +21,7 @@ from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
 from trunnion.results.quantities import scaled
-from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
+from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.cycle.plots import save
 from trunnion.views.readings import readings

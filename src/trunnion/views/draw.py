@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["chart", "figure", "line_style"]
+__all__ = ["chart", "figure", "grid", "line_style"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
@@ -58,6 +58,22 @@ def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int
             if axes is not grid[-1]:
                 axes.set_xlabel("")
                 axes.tick_params(labelbottom=False)
+    return sheet
+
+
+def grid(
+    title: str, result: xr.Dataset, charts: Sequence[Chart], columns: int, height: float, note: str = ""
+) -> Figure:
+    """Small charts in rows of so many columns, each so high (inches); note: of what is not drawn."""
+    rows = -(-len(charts) // columns)
+    sheet = new(title, result, 1.0 + rows * height)
+    places = sheet.subplots(rows, columns, squeeze=False).ravel()
+    for axes in places[len(charts) :]:
+        axes.set_visible(False)
+    for axes, one in zip(places, charts, strict=False):
+        chart(axes, one)
+    if note:
+        sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
     return sheet
 
 

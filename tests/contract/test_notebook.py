@@ -15,7 +15,7 @@ from matplotlib import pyplot
 
 import trunnion
 from trunnion.views import notebook
-from trunnion.views.common.page import hashed
+from trunnion.views.page import hashed
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STEPS = 12

@@ -14,9 +14,8 @@ import trunnion
 from toleranced import FOURBAR, fourbar, fourbar_angle, slider_crank
 from trunnion import Mechanism
 from trunnion.results.attributes import summary_of
-from trunnion.views.tolerance.figure import figure
-from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.tables import tables
+from trunnion.views.readings import readings
+from trunnion.views.tolerance import figure, tables
 
 WIDE = 0.05e-3 / 3  # σ of each length
 

@@ -16,7 +16,7 @@ from toleranced import FOURBAR, fourbar, fourbar_angle
 from trunnion import Mechanism
 from trunnion.cli.app import app
 from trunnion.studies.allocation.allocate import half_widths
-from trunnion.views.tolerance.report import report
+from trunnion.views.tolerance import report
 
 NOMINAL = float(fourbar_angle(**FOURBAR))
 COSTS = {name: {"model": "power", "B": 1, "k": 1, "unit": "mm"} for name in FOURBAR}

@@ -12,9 +12,8 @@ from mechanisms_parts import prismatic, slide
 from toleranced import clutch, rssr, slider_crank
 from trunnion import Mechanism, save, tolerance
 from trunnion.results.dataset import units_along
-from trunnion.views.tolerance.figure import drawable, figure
-from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.tables import figures, headline
+from trunnion.views.readings import readings
+from trunnion.views.tolerance import drawable, figure, figures, headline
 
 MEASURES: dict[str, dict[str, Any]] = {
     "top": {"point": "piston.P", "axis": "x", "at": "60 deg"},

@@ -13,12 +13,9 @@ import trunnion
 from trunnion import Mechanism
 from trunnion.results.attributes import findings_of
 from trunnion.results.quantities import drawn_in, signed
-from trunnion.views.allocation.allocation import prices
-from trunnion.views.allocation.cost import trade_off
-from trunnion.views.allocation.tables import headed
-from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.report import report
-from trunnion.views.tolerance.tables import tables
+from trunnion.views.allocation import headed, prices, trade_off
+from trunnion.views.readings import readings
+from trunnion.views.tolerance import report, tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = {

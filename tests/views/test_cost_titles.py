@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from stand_in_tolerances import torque
 
-from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
+from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
 
 
 def test_every_cost_chart_has_a_title_of_its_own() -> None:

@@ -14,10 +14,10 @@ from trunnion.cycle.locking import LockingState
 from trunnion.results.attributes import summary_of
 from trunnion.views.common.joined import joined
 from trunnion.views.common.markup import with_code
-from trunnion.views.common.page import headline
 from trunnion.views.cycle import plots
 from trunnion.views.cycle.locking_plot import STATES
 from trunnion.views.cycle.report import report
+from trunnion.views.page import headline
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 STEPS = 24

@@ -11,10 +11,10 @@ from test_report import Page
 
 from trunnion import Mechanism, analyse
 from trunnion.results.attributes import summary_of
-from trunnion.views.common.page import inputs_of
 from trunnion.views.cycle.plots import PLOTS, READY, save
 from trunnion.views.cycle.report import report
 from trunnion.views.cycle.scene import scene
+from trunnion.views.page import inputs_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

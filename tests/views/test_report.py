@@ -16,8 +16,8 @@ from trunnion.errors import Status
 from trunnion.results.attributes import figure_rows, summary_of
 from trunnion.results.figure import MORE_THAN, Figure
 from trunnion.views.common.bundle import bundle, module, web_text
-from trunnion.views.common.page import headline
 from trunnion.views.cycle.report import embedded, report
+from trunnion.views.page import headline
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

@@ -21,12 +21,25 @@ from trunnion.cli.tolerance import shown_of
 from trunnion.errors import MechanismError
 from trunnion.results.export import save as export
 from trunnion.results.quantities import scaled
-from trunnion.views.allocation.cost import PriceCurve, tolerance_cost, trade_off
+from trunnion.views.allocation import PriceCurve, tolerance_cost, trade_off
 from trunnion.views.common.figures import PALETTE
 from trunnion.views.cycle.plots import save
-from trunnion.views.tolerance.figure import KINDS, MOST_PANELS, check_kind, drawable, figure, sheet
-from trunnion.views.tolerance.readings import fixed, limits_text, readings, share, share_interval
-from trunnion.views.tolerance.tables import corners, figures, indices, inputs, overview, tables
+from trunnion.views.readings import readings
+from trunnion.views.texts import fixed, limits_text, share, share_interval
+from trunnion.views.tolerance import (
+    KINDS,
+    MOST_PANELS,
+    check_kind,
+    corners,
+    drawable,
+    figure,
+    figures,
+    indices,
+    inputs,
+    overview,
+    sheet,
+    tables,
+)
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -334,7 +347,7 @@ def test_corners_indices_and_failures_are_told():
     assert table.head == ["worst corner", "−0.2344°", "0.2423°"]
     assert table.rows[0] == ["links.ground.length", "100\u00a0mm", "100.07\u00a0mm"]
     assert corners(readings(CASES["linear only"]())[0]) is None
-    assert indices(readings(CASES["sobol"]())[0]).rows[0][0] == "links.coupler.length"
+    assert indices(readings(CASES["sobol"]())[0]).rows[0][0] == "coupler.length"
     failed = next(table for table in tables(CASES["failures"]()) if "failed" in table.title)
     assert [[cell.replace("\u00a0", " ") for cell in row] for row in failed.rows] == [
         ["all", "120", "4.00 %"],

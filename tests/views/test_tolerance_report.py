@@ -13,12 +13,10 @@ from stand_in_tolerances import CASES, odd_names, toleranced
 from test_report import Page
 
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.page import Section
-from trunnion.views.tolerance.figure import drawable, figure
-from trunnion.views.tolerance.notes import NOTES
-from trunnion.views.tolerance.readings import readings
-from trunnion.views.tolerance.report import report
-from trunnion.views.tolerance.tables import TextTable
+from trunnion.views.page import Section
+from trunnion.views.readings import readings
+from trunnion.views.table import Table
+from trunnion.views.tolerance import NOTES, drawable, figure, report
 
 SOURCE = "data:image/svg+xml;base64,"
 
@@ -88,7 +86,7 @@ def test_findings_notes_and_inputs_are_told():
 @pytest.mark.slow
 def test_other_parts_may_come_first():
     result = toleranced(24, 300)
-    table = TextTable("chosen", ["tolerance", "cost"], [["AB", "4.507"]])
+    table = Table("chosen", ["tolerance", "cost"], [["AB", "4.507"]])
     part = Section("Allocation", "least cost", [("a picture", figure(result, "contributions"))], [table])
     page = Page(report(result, [part], "What tolerances to buy"))
     words = " ".join(page.words)
@@ -97,12 +95,12 @@ def test_other_parts_may_come_first():
 
 
 def test_every_class_of_the_page_has_a_style():
-    style = web_text("report.css") + web_text("tolerance.css")
-    classes = set(re.findall(r'class="([a-z-]+)"', web_text("tolerance.html.j2")))
+    style = web_text("report.css") + web_text("page.css")
+    classes = set(re.findall(r'class="([a-z-]+)"', web_text("page.html.j2")))
     assert not [name for name in classes if f".{name}" not in style]
 
 
 def test_print_shows_tables_and_figures_whole():
-    printed = web_text("tolerance.css").partition("@media print")[2]
+    printed = web_text("page.css").partition("@media print")[2]
     assert "overflow: visible" in printed
     assert "break-inside: avoid" in printed

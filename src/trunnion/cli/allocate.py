@@ -173,7 +173,7 @@ def _draw(result: xr.Dataset, kind: str | None, _: Path) -> Any:
 
 
 def _show(result: xr.Dataset) -> None:
-    from trunnion.views.allocation.tables import tables
+    from trunnion.views.allocation import tables
 
     name, shown = str(result.attrs.get("name", "")), tables(result)
     show_tables(name, shown)

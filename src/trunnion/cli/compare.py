@@ -81,6 +81,6 @@ def _show(result: xr.Dataset) -> None:
     """Results and efficiencies; the first rows of many."""
     from trunnion.views.compare.tables import efficiencies, explained, results
 
-    first = results(result)._replace(title=f"{result.attrs['comparing']}: measured minus model")
+    first = results(result).titled(f"{result.attrs['comparing']}: measured minus model")
     shown = [one for one in (first, explained(result), efficiencies(result)) if one is not None]
     show_tables(str(result.attrs["name"]), shown, most=MOST_ROWS, rest="FILE.figures.csv")

@@ -117,7 +117,7 @@ def shown_of(
     """What is done with the result. kind: of figure; all on one sheet if None."""
 
     def show() -> None:
-        from trunnion.views.tolerance.tables import tables
+        from trunnion.views.tolerance import tables
 
         shown = tables(result)
         show_tables(name, shown)

@@ -25,13 +25,13 @@ __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report
 # kind of result: the module of its view, in which `report` or `figure` stands; loaded when it is asked for, for
 # matplotlib is slow to import
 REPORTS = {
-    "cycle": "cycle.report", "tolerance": "tolerance.report", "allocation": "allocation.allocation",
+    "cycle": "cycle.report", "tolerance": "tolerance", "allocation": "allocation",
     "comparison": "compare.report", "identification": "identify.report",
     "motion": "motion.report", "play": "play.report", "sweep": "sweep.report", "assembly": "assembly.report",
 }  # fmt: skip
 FIGURES = {
     "cycle": "cycle.plots", "sweep": "sweep.figure", "play": "play.figure", "assembly": "assembly.figure",
-    "tolerance": "tolerance.figure", "allocation": "allocation.allocation", "comparison": "compare.figure",
+    "tolerance": "tolerance", "allocation": "allocation", "comparison": "compare.figure",
     "identification": "identify.figure", "motion": "motion.figure",
 }  # fmt: skip
 

@@ -16,7 +16,6 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.cycle import names
-from trunnion.views.common.page import inputs_of, said, source, template
 from trunnion.views.compare.comparison import label, units
 from trunnion.views.compare.figure import efficiency, panels, small
 from trunnion.views.compare.notes import definitions
@@ -30,6 +29,7 @@ from trunnion.views.compare.tables import (
     sensors,
     verdicts,
 )
+from trunnion.views.page import inputs_of, said, source, template
 
 if TYPE_CHECKING:
     import xarray as xr

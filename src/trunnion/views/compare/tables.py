@@ -12,9 +12,9 @@ from trunnion.results.quantities import number, prefixed
 from trunnion.rig.comparison import CAUSES
 from trunnion.rig.judge import Verdict
 from trunnion.views.common.cycle import Array, names
-from trunnion.views.common.table import TextTable
 from trunnion.views.compare.comparison import coverage_of, scale_of, sets, setting, text, units, verdict
 from trunnion.views.rig.conditions import shortened
+from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +24,7 @@ __all__ = ["conditions", "efficiencies", "explained", "files", "headline", "resu
 NONE = "—"
 
 
-def results(result: xr.Dataset, channel: int | None = None) -> TextTable:
+def results(result: xr.Dataset, channel: int | None = None) -> Table:
     """Residual and verdict of every channel in every condition, or of one channel."""
     wanted = range(result.sizes["channel"]) if channel is None else [channel]
     what, told = shortened(names(result, "condition"))
@@ -37,10 +37,10 @@ def results(result: xr.Dataset, channel: int | None = None) -> TextTable:
             rows.append([*head, *_figures(result, i, k)])
     first = [what] if channel is not None else [what, "channel"]
     head = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
-    return TextTable("results", [*first, *head], rows)
+    return Table("results", [*first, *head], rows)
 
 
-def explained(result: xr.Dataset, channel: int | None = None) -> TextTable | None:
+def explained(result: xr.Dataset, channel: int | None = None) -> Table | None:
     """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
     what, told = shortened(names(result, "condition"))
     rows = []
@@ -50,7 +50,7 @@ def explained(result: xr.Dataset, channel: int | None = None) -> TextTable | Non
             if any(cell != NONE for cell in cells):
                 rows.append([name, *([] if channel is not None else [names(result, "channel")[i]]), *cells])
     head = [what, *([] if channel is not None else ["channel"]), *CAUSES]
-    return TextTable("what would explain the residual, each by itself", head, rows) if rows else None
+    return Table("what would explain the residual, each by itself", head, rows) if rows else None
 
 
 def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
@@ -63,7 +63,7 @@ def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
     return f"{sign}{text(size * factor, unit)} ({100 * share:.1f}\u00a0%)"
 
 
-def verdicts(result: xr.Dataset) -> TextTable:
+def verdicts(result: xr.Dataset) -> Table:
     """The verdict of every channel in every condition."""
     channels = names(result, "channel")
     what, told = shortened(names(result, "condition"))
@@ -71,7 +71,7 @@ def verdicts(result: xr.Dataset) -> TextTable:
     for k, name in enumerate(told):
         cells = [verdict(result, i, k).text if result["turns"].values[i, k] else NONE for i in range(len(channels))]
         rows.append([name, *cells])
-    return TextTable("verdicts", [what, *channels], rows)
+    return Table("verdicts", [what, *channels], rows)
 
 
 def _figures(result: xr.Dataset, i: int, k: int) -> list[str]:
@@ -122,7 +122,7 @@ def _share(value: float) -> str:
     return f"{100 * value:.1f}\u00a0%" if np.isfinite(value) else NONE
 
 
-def efficiencies(result: xr.Dataset) -> TextTable | None:
+def efficiencies(result: xr.Dataset) -> Table | None:
     """Measured efficiency with U beside the model's; None if it was not measured."""
     if "efficiency" not in result:
         return None
@@ -136,14 +136,14 @@ def efficiencies(result: xr.Dataset) -> TextTable | None:
         within = words[int(result["efficiency_within"].values[k])]
         rows.append([name, *(_plain(value) for value in (measured, wide, model, measured - model)), within])
     head = [what, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
-    return TextTable("efficiency", head, rows)
+    return Table("efficiency", head, rows)
 
 
 def _plain(value: float) -> str:
     return f"{value:.4f}".replace("-", "−") if np.isfinite(value) else NONE
 
 
-def conditions(result: xr.Dataset) -> TextTable:
+def conditions(result: xr.Dataset) -> Table:
     """What was set in every condition, in how many turns it was measured, and where the data are."""
     told, held = sets(result), attribute(result, "condition_files")
     rows = []
@@ -153,10 +153,10 @@ def conditions(result: xr.Dataset) -> TextTable:
         low, high = int(turns.min()), int(turns.max())
         kept = [file.replace("\\", "/").rsplit("/", 1)[-1] for file in held[k]] if held else []
         rows.append([name, *values, str(high) if low == high else f"{low} to {high}", ", ".join(kept) or NONE])
-    return TextTable("conditions", ["condition", *(one.name for one in told), "turns", "file"], rows)
+    return Table("conditions", ["condition", *(one.name for one in told), "turns", "file"], rows)
 
 
-def sensors(result: xr.Dataset) -> TextTable:
+def sensors(result: xr.Dataset) -> Table:
     """What each channel measures, with the standard uncertainties of its zero and gain."""
     measures, held = attribute(result, "channel_measures"), attribute(result, "channel_read_in")
     rows = []
@@ -167,7 +167,7 @@ def sensors(result: xr.Dataset) -> TextTable:
         zeros = " to ".join(dict.fromkeys(_small(one, own, read, size) if one else "0" for one in zero)) or NONE
         gains = " to ".join(dict.fromkeys(f"{number(100 * one, 3)}\u00a0%" if one else "0" for one in gain)) or NONE
         rows.append([name, measures[i], "" if unit == "1" else unit, zeros, gains])
-    return TextTable("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
+    return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
 
 
 def _small(value: float, unit: str, read: str, size: float) -> str:
@@ -180,7 +180,7 @@ def _spread(values: Array) -> list[float]:
     return [float(known.min()), float(known.max())] if known.size else []
 
 
-def files(result: xr.Dataset, key: str = "files") -> TextTable | None:
+def files(result: xr.Dataset, key: str = "files") -> Table | None:
     """The files of the data with their size and hash; None if none is known. key: of the attribute that has them."""
     held = attribute(result, key)
     rows = [
@@ -191,7 +191,7 @@ def files(result: xr.Dataset, key: str = "files") -> TextTable | None:
         ]
         for row in held
     ]
-    return TextTable("files", ["file", "bytes", "SHA-256"], rows) if rows else None
+    return Table("files", ["file", "bytes", "SHA-256"], rows) if rows else None
 
 
 def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:

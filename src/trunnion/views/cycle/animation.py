@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from trunnion.files import whole
 from trunnion.views.common.bundle import bundle, web_text
-from trunnion.views.common.page import hashed
 from trunnion.views.cycle.report import embedded
 from trunnion.views.cycle.scene import scene
+from trunnion.views.page import hashed
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,9 +18,9 @@ from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number, quantity
 from trunnion.views.common.bundle import bundle, web_text
 from trunnion.views.common.cycle import abscissa, column, intervals, names
-from trunnion.views.common.page import hashed, headline, inputs_of, said, template
 from trunnion.views.cycle.deviations_tables import error_rows, loss_rows
 from trunnion.views.cycle.scene import scene
+from trunnion.views.page import hashed, headline, inputs_of, said, template
 
 if TYPE_CHECKING:
     import xarray as xr

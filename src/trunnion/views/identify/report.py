@@ -13,13 +13,13 @@ import numpy as np
 from trunnion.results.attributes import attribute
 from trunnion.results.quantities import number
 from trunnion.views.common.bundle import web_text
-from trunnion.views.common.page import inputs_of, said, source, template
-from trunnion.views.common.table import TextTable
 from trunnion.views.compare.report import of_file
 from trunnion.views.compare.tables import files
 from trunnion.views.identify.figure import figure
 from trunnion.views.identify.identification import estimates
 from trunnion.views.identify.tables import budget, correlations, estimated, fits, held_out, sensors, stated
+from trunnion.views.page import inputs_of, said, source, template
+from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,8 +117,6 @@ def _sections(result: xr.Dataset) -> list[dict[str, Any]]:
     return [one for one in found if one is not None]
 
 
-def _section(
-    title: str, result: xr.Dataset, kind: str, tables: list[TextTable | None], about: str = ""
-) -> dict[str, Any]:
+def _section(title: str, result: xr.Dataset, kind: str, tables: list[Table | None], about: str = "") -> dict[str, Any]:
     picture = {"alt": title, "source": source(figure(result, kind))} if kind else None
     return {"title": title, "about": about, "picture": picture, "tables": [one for one in tables if one is not None]}

@@ -10,9 +10,9 @@ import numpy as np
 from trunnion.results.quantities import prefixed
 from trunnion.rig.identification.number_text import amount
 from trunnion.views.common.cycle import names
-from trunnion.views.common.table import TextTable
 from trunnion.views.identify.identification import Estimate, channels, conditions, estimates, percent
 from trunnion.views.rig.conditions import shortened
+from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 __all__ = ["budget", "correlations", "estimated", "fits", "held_out", "sensors", "stated", "tables"]
 
 
-def tables(result: xr.Dataset) -> list[TextTable]:
+def tables(result: xr.Dataset) -> list[Table]:
     """What was found, how it hangs together, how the model fits, and what was held out."""
     found = [estimated(result), correlations(result), fits(result), held_out(result), sensors(result)]
     return [one for one in found if one is not None]
 
 
-def estimated(result: xr.Dataset) -> TextTable:
+def estimated(result: xr.Dataset) -> Table:
     """A row for each parameter: start, estimate ± expanded uncertainty, interval, and what most of that is due to."""
     rows = [
         [
@@ -40,15 +40,15 @@ def estimated(result: xr.Dataset) -> TextTable:
         for one in estimates(result)
     ]
     head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "dof", "main source"]
-    return TextTable(f"{result.attrs['identified']}: estimates", head, rows)
+    return Table(f"{result.attrs['identified']}: estimates", head, rows)
 
 
-def stated(result: xr.Dataset) -> TextTable:
+def stated(result: xr.Dataset) -> Table:
     """What of the model each parameter is: all its paths, and its value at the start."""
     rows = [
         [one.name, ", ".join(one.paths), f"{one.start:.4g}{one.tail}".replace("-", "−")] for one in estimates(result)
     ]
-    return TextTable("parameters", ["parameter", "paths in the model", "start"], rows)
+    return Table("parameters", ["parameter", "paths in the model", "start"], rows)
 
 
 def _freedom(one: Estimate) -> str:
@@ -76,7 +76,7 @@ def _interval(one: Estimate) -> str:
     return f"{one.say(one.lower, unit=False)}\u00a0to\u00a0{one.say(one.upper)}"
 
 
-def correlations(result: xr.Dataset) -> TextTable | None:
+def correlations(result: xr.Dataset) -> Table | None:
     """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
     told = [p for p, one in enumerate(estimates(result)) if one.told]
     if len(told) < 2:
@@ -87,10 +87,10 @@ def correlations(result: xr.Dataset) -> TextTable | None:
         [f"{k} {short[p]}", *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in told)]
         for k, p in enumerate(told, 1)
     ]
-    return TextTable("correlation", ["", *(f"{k}" for k in range(1, len(told) + 1))], rows)
+    return Table("correlation", ["", *(f"{k}" for k in range(1, len(told) + 1))], rows)
 
 
-def fits(result: xr.Dataset) -> TextTable | None:
+def fits(result: xr.Dataset) -> Table | None:
     """A row for each channel and condition: rms before and after, and what the scatter explains of it."""
     rows = []
     title, names_of = shortened(names(result, "condition"))
@@ -106,10 +106,10 @@ def fits(result: xr.Dataset) -> TextTable | None:
     if not rows:
         return None
     head = ["channel", title, "RMS before", "RMS after", "expected", "unit", "turns", "positions"]
-    return TextTable("residuals of the fit", head, rows)
+    return Table("residuals of the fit", head, rows)
 
 
-def held_out(result: xr.Dataset) -> TextTable | None:
+def held_out(result: xr.Dataset) -> Table | None:
     """What was not fitted but predicted."""
     rows = []
     title, names_of = shortened(names(result, "condition"))
@@ -123,10 +123,10 @@ def held_out(result: xr.Dataset) -> TextTable | None:
     if not rows:
         return None
     head = ["channel", title, "turns", "RMS before", "RMS after", "expected", "unit"]
-    return TextTable("held-out data", head, rows)
+    return Table("held-out data", head, rows)
 
 
-def sensors(result: xr.Dataset) -> TextTable | None:
+def sensors(result: xr.Dataset) -> Table | None:
     """Estimated errors of the sensors, in what is stated of them."""
     units = {name: unit for _, name, unit in channels(result)}
     columns = (result[key].values for key in ("sensor_error", "sensor_uncertainty", "sensor_size"))
@@ -145,17 +145,17 @@ def sensors(result: xr.Dataset) -> TextTable | None:
             f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not identifiable",
         ])  # fmt: skip
     head = ["", "estimate ± 2 u", "in units of its stated standard uncertainty"]
-    return TextTable("errors of the sensors", head, rows) if rows else None
+    return Table("errors of the sensors", head, rows) if rows else None
 
 
-def budget(result: xr.Dataset) -> TextTable | None:
+def budget(result: xr.Dataset) -> Table | None:
     """Share of each source in the variance of each estimate; of sources that are anything."""
     told = [one for one in estimates(result) if one.told]
     sources = [name for name in names(result, "source") if any(one.shares[name] >= LEAST for one in told)]
     if not told:
         return None
     rows = [[name, *(percent(one.shares[name]) for one in told)] for name in sources]
-    return TextTable("uncertainty budget", ["share of the variance", *(one.short for one in told)], rows)
+    return Table("uncertainty budget", ["share of the variance", *(one.short for one in told)], rows)
 
 
 LEAST = 0.005

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trunnion.results.quantities import prefixed, quantity
-from trunnion.views.common.page import source
 from trunnion.views.cycle.report import page
 from trunnion.views.motion import contacts
 from trunnion.views.motion.scene import motion_scene
 from trunnion.views.motion.shown import Shown, energies, shown
+from trunnion.views.page import source
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from trunnion.errors import agreeing
-from trunnion.views.common.page import Section, study_page
+from trunnion.views.page import Section, page
 from trunnion.views.play.figure import figure
 from trunnion.views.play.tables import tables
 
@@ -24,6 +24,6 @@ def report(result: xr.Dataset) -> str:
     parts = []
     for i, table in enumerate(tables(result)):
         name = str(result["measure"].values[i])
-        untitled = table._replace(title=table.title.removeprefix(name).lstrip(",: "))
-        parts.append(Section(name, ABOUT, [(f"worst case of {name}", figure(result, [i]))], [untitled]))
-    return study_page(result, "Effect of the play of the joints", facts, parts)
+        untitled = table.titled(table.title.removeprefix(name).lstrip(",: "))
+        parts.append(Section(name, ABOUT, [(f"worst case of {name}", figure(result, [i]))], after=[untitled]))
+    return page(result, "Effect of the play of the joints", facts, parts)

@@ -11,19 +11,19 @@ from trunnion.results.dataset import units_along
 from trunnion.results.quantities import quantity
 from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa
-from trunnion.views.common.table import TextTable
+from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["TextTable", "abscissa_of", "tables"]
+__all__ = ["Table", "abscissa_of", "tables"]
 
 FLOATING = 3  # ends of a pin: two across and that of the float
 SUMS = ("all, worst case, first order", "all, RSS", "all, standard deviation")
 HEAD = ["joint", "play", "effect ±", "share"]
 
 
-def tables(result: xr.Dataset) -> list[TextTable]:
+def tables(result: xr.Dataset) -> list[Table]:
     """For each measure: the joints with their play, effect and share at the place of the measure."""
     result = without_noise(result)
     units, places = units_along(result["value"], "measure"), attribute(result, "places")
@@ -33,18 +33,18 @@ def tables(result: xr.Dataset) -> list[TextTable]:
     ]
 
 
-def _table(result: xr.Dataset, name: str, unit: str, kind: str, where: str) -> TextTable:
+def _table(result: xr.Dataset, name: str, unit: str, kind: str, where: str) -> Table:
     effects, deviations = (result[f"extreme_{key}"].values for key in ("worst_case", "deviation"))
     total, rows = float(np.sum(effects)), list[list[str]]()
     if not np.isfinite(total):
-        return TextTable(f"{name}: not solved at {where}", HEAD, [])
+        return Table(f"{name}: not solved at {where}", HEAD, [])
     for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
         share = f"{100 * effect / total:.1f} %" if total > 0 else "—"
         rows.append([str(joint), _play(result, j), quantity(float(effect), unit), share])
     sums = total, np.sqrt(np.sum(effects**2)), np.sqrt(np.sum(deviations**2))
     for label, number in zip(SUMS, sums, strict=True):
         rows.append([label, "", quantity(float(number), unit), ""])
-    return TextTable(f"{name}, {kind}{' ' * bool(kind)}at {where}", HEAD, rows)
+    return Table(f"{name}, {kind}{' ' * bool(kind)}at {where}", HEAD, rows)
 
 
 def _play(result: xr.Dataset, j: int) -> str:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from trunnion.rig.reading.measurement import Measurement, Signal
-from trunnion.views.common.table import TextTable
 from trunnion.views.rig.conditions import shortened
+from trunnion.views.table import Table
 
 __all__ = ["tables"]
 
 MOST = 40  # conditions shown
 
 
-def tables(measurement: Measurement) -> list[TextTable]:
+def tables(measurement: Measurement) -> list[Table]:
     """The conditions with the mean of each channel, then the channels with scatter and uncertainty over all of them."""
     conditions = measurement.conditions
     channels = list(measurement.channels)
@@ -32,11 +32,11 @@ def tables(measurement: Measurement) -> list[TextTable]:
         rows.append([*own, f"{turns:,}", *speed, *means])
     if len(conditions) > MOST:
         rows.append([f"{len(conditions) - MOST} more", *[""] * (len(head) - 1)])
-    shown = [TextTable(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
+    shown = [Table(f"{measurement.name}\nconditions: mean over turns and positions", head, rows)]
     head = ["channel", "measures", "unit", "least", "largest", "scatter", "uncertainty"]
     rows = [[name, *_channel([one.courses[name] for one in conditions if name in one.courses])] for name in channels]
     title = "channels: mean signal, scatter of turns, standard uncertainty of the mean"
-    return [*shown, TextTable(title, head, rows)]
+    return [*shown, Table(title, head, rows)]
 
 
 def _channel(courses: list[Signal]) -> list[str]:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from trunnion.errors import agreeing
 from trunnion.results.attributes import attribute
-from trunnion.views.common.page import Section, study_page
-from trunnion.views.common.table import TextTable
+from trunnion.views.page import Section, page
 from trunnion.views.sweep.figure import figure
 from trunnion.views.sweep.tables import SweepTable, tables
+from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,11 +33,11 @@ def report(
     parts = []
     for name in measures:
         drawn = [(f"{name} over {' and '.join(swept)}", figure(result, name, x, family, kind))]
-        parts.append(Section(name, "", drawn, [_told(one) for one in tables(result, [name], x, family)]))
-    return study_page(result, "Results over a range of model values", facts, parts)
+        parts.append(Section(name, "", drawn, after=[_told(one) for one in tables(result, [name], x, family)]))
+    return page(result, "Results over a range of model values", facts, parts)
 
 
-def _told(table: SweepTable) -> TextTable:
+def _told(table: SweepTable) -> Table:
     """A table whose title says how many points it leaves out."""
     left_out = f"; {table.left_out:,} points more in a table file" if table.left_out else ""
-    return TextTable(table.title + left_out, table.head, table.rows)
+    return Table(table.title + left_out, table.head, table.rows)

@@ -1,4 +1,4 @@
-"""What every HTML report has: its template, figures and tables by parts, findings, input data, and where it is from.
+"""The one page of all studies, and what every HTML report has: findings, input data, and where it is from.
 
 Every figure is an SVG inside the page. The content security policy allows these and the one style, named by its hash,
 and nothing else, so no name in a model can become code.
@@ -9,48 +9,99 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from trunnion.errors import agreeing
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.results.figure import MORE_THAN
 from trunnion.results.figure import Figure as Stated
 from trunnion.results.quantities import quantity
 from trunnion.views.common.bundle import web_text
 from trunnion.views.common.markup import with_code
-from trunnion.views.common.table import TextTable
+from trunnion.views.table import Table
 
 if TYPE_CHECKING:
     import xarray as xr
     from jinja2 import Template
     from matplotlib.figure import Figure
 
-__all__ = ["Section", "drawn", "hashed", "headline", "inputs_of", "said", "source", "study_page", "template"]
+__all__ = ["Section", "Summary", "counts", "hashed", "headline", "inputs_of", "page", "said", "source", "template"]
 
 
-class Section(NamedTuple):
-    """A part of the page: a title, what it is about, figures with what they show in words, tables."""
+@dataclass(frozen=True)
+class Section:
+    """A part of the page, in this order: what it is about, lines, tables, pictures, further tables, findings, terms.
+
+    title: of the part, as what is shown
+    pictures: (what it shows in words, figure), the only one broad, several side by side; small: of half the size
+    terms: (term, what it means), which may be markup
+    findings: rows of `attrs["findings"]`; calm: what is said where there are none, if anything
+    anchor: by which the page leads to it
+    """
 
     title: str
-    about: str
-    figures: Sequence[tuple[str, Figure]]
-    tables: Sequence[TextTable]
+    about: str = ""
+    pictures: Sequence[tuple[str, Figure]] = ()
+    tables: Sequence[Table] = ()
+    after: Sequence[Table] = ()
+    small: bool = False
+    lines: Sequence[str] = ()
+    terms: Sequence[tuple[str, str]] = ()
+    findings: Sequence[dict[str, str]] = ()
+    calm: str = ""
+    anchor: str = ""
 
 
-def study_page(result: xr.Dataset, kicker: str, facts: Sequence[tuple[str, str]], parts: Sequence[Section]) -> str:
-    """The report of a study that is a figure and tables: what it is about, its parts, findings and the input data.
+Summary = Sequence[tuple[str, list[tuple[str, str]]]]
 
-    facts: (figure, what it counts).
+
+def page(
+    result: xr.Dataset,
+    kicker: str,
+    facts: Sequence[tuple[str, str]],
+    parts: Sequence[Section],
+    *,
+    summary: Summary = (),
+    missed: Sequence[dict[str, str]] = (),
+    end: Sequence[Section] = (),
+    name: str = "",
+    about_data: int = 0,
+    signed: bool = False,
+) -> str:
+    """The report of a study as one HTML file that opens and prints anywhere without a network or a script.
+
+    Parameters
+    ----------
+    result : with its findings, inputs, formula and references
+    kicker : what kind of report it is
+    facts : (figure, what it counts)
+    parts, end : before and after the notes
+    summary : subjects with their figures and what these are, read first
+    missed : findings that stand before all else
+    name : of what is reported, the mechanism if not given
+    about_data : findings about the data, to which the page leads where there is no other
+    signed : with room for names and dates
     """
+    style = web_text("report.css") + web_text("page.css")
+    stated = said(result, style)
+    stated["findings"] = [row for row in stated["findings"] if row not in missed]
     context: dict[str, Any] = {
-        "kicker": kicker, "name": str(result.attrs.get("name", "")) or "Mechanism",
-        "formula": str(result.attrs.get("formula", "")), "facts": facts,
-        "sections": [drawn(part) for part in parts], "inputs": inputs_of(result),
-        **said(result, web_text("report.css") + web_text("tolerance.css")),
+        "kicker": kicker, "name": name or str(result.attrs.get("name", "")) or "Mechanism",
+        "formula": str(result.attrs.get("formula", "")), "facts": facts, "summary": summary, "missed": missed,
+        "sections": [_drawn(part) for part in parts], "end": [_drawn(part) for part in end],
+        "inputs": inputs_of(result) if "inputs" in result.attrs else [], "about_data": about_data, "signed": signed,
+        **stated,
     }  # fmt: skip
-    return template("study.html.j2").render(context)
+    return template("page.html.j2").render(context)
+
+
+def counts(*pairs: tuple[int, str]) -> list[tuple[str, str]]:
+    """Facts of a page: (12, "position") as ("12", "positions")."""
+    return [(f"{count:,}".replace(",", "\u202f"), agreeing(count, what, what + "s")) for count, what in pairs]
 
 
 @cache
@@ -66,10 +117,10 @@ def template(name: str) -> Template:
     return environment.get_template(name)
 
 
-def drawn(part: Section) -> dict[str, Any]:
+def _drawn(part: Section) -> dict[str, Any]:
     """A part as the page takes it: its figures as addresses that hold them."""
-    pictures = [{"alt": alt, "source": source(figure)} for alt, figure in part.figures]
-    return {"title": part.title, "about": part.about, "pictures": pictures, "tables": part.tables}
+    pictures = [{"alt": alt, "source": source(figure)} for alt, figure in part.pictures]
+    return {**vars(part), "pictures": pictures}
 
 
 def source(figure: Figure) -> str:

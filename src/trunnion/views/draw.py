@@ -1,0 +1,285 @@
+"""Charts drawn by matplotlib: `chart` on axes, `figure` as panels under a title."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from trunnion.views.charts import Axis, Band, Bars, Cells, Chart, Line, Look, Note, Panel, Rule, Stairs, Stripe
+from trunnion.views.common.cycle import Abscissa, Array, thin
+from trunnion.views.common.figures import INK, MUTED, PALETTE, RULE, SHADE, WIDTH, along, dress, legend, new
+from trunnion.views.common.lettering import plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["chart", "figure", "grid", "line_style"]
+
+COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
+DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
+                          "dotted": (0, (1, 1.5)), "none": "none"}  # fmt: skip
+PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
+BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+
+
+def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int = 1, width: float = 0.0) -> Figure:
+    """Panels in rows of so many columns under a title.
+
+    Parameters
+    ----------
+    title : of the whole figure, also of the only panel
+    result : whose mechanism is named beneath
+    panels : what is drawn, row by row
+    columns : panels side by side
+    width : inches; that of all figures, or of a page of several columns, if 0
+    """
+    columns = min(columns, len(panels))
+    rows = [panels[k : k + columns] for k in range(0, len(panels), columns)]
+    heights = [max(panel.height for panel in row) for row in rows]
+    sheet = new(title, result, 0.55 + sum(heights), width or PAGE[columns])
+    parts = sheet.subfigures(len(rows), columns, squeeze=False, height_ratios=heights)
+    for place, panel in zip(parts.ravel(), panels, strict=False):
+        if not panel.charts:  # of a measure that lacks this figure
+            continue
+        if panel.title and len(panels) > 1:
+            place.suptitle(plain(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
+        ratios = list(panel.parts) or [1.0] * len(panel.charts)
+        grid = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+        for axes, one in zip(grid, panel.charts, strict=True):
+            chart(axes, one, min(1.0, sheet.get_figwidth() / columns / WIDTH))
+            if axes is not grid[-1]:
+                axes.set_xlabel("")
+                axes.tick_params(labelbottom=False)
+    return sheet
+
+
+def grid(
+    title: str, result: xr.Dataset, charts: Sequence[Chart], columns: int, height: float, note: str = ""
+) -> Figure:
+    """Small charts in rows of so many columns, each so high (inches); note: of what is not drawn."""
+    rows = -(-len(charts) // columns)
+    sheet = new(title, result, 1.0 + rows * height)
+    places = sheet.subplots(rows, columns, squeeze=False).ravel()
+    for axes in places[len(charts) :]:
+        axes.set_visible(False)
+    for axes, one in zip(places, charts, strict=False):
+        chart(axes, one)
+    if note:
+        sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
+    return sheet
+
+
+def chart(axes: Axes, one: Chart, wide: float = 1.0) -> None:
+    """One chart on axes; wide: of the width of all figures, which its legend has room in."""
+    if isinstance(one.x, Abscissa):
+        along(axes, one.x, _lines(one.y.title), zero=one.zero)
+    else:
+        dress(axes, _lines(one.x.title), _lines(one.y.title))
+        _axis(axes, "x", one.x)
+        if one.zero:
+            axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
+    _axis(axes, "y", one.y)
+    for mark in sorted(one.marks, key=lambda mark: isinstance(mark, Rule)):
+        if isinstance(mark, Rule):  # in view or not: the limits must stand
+            _limits(axes, one)
+        _mark(mark, axes, one)
+    _limits(axes, one)
+    _titles(axes, one)
+    if one.legend is not None:
+        legend(axes, one.legend.most, int(wide * one.legend.room), one.legend.least)
+
+
+def _titles(axes: Axes, one: Chart) -> None:
+    if one.bare:
+        axes.spines["left"].set_visible(False)
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+    if one.title:
+        axes.set_title(_lines(one.title), fontsize=8.5, color=INK, loc="left")
+    if one.aside:
+        axes.set_title(plain(one.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
+
+
+# ---- axes ---------------------------------------------------------------------------------------------------------
+
+
+def _lines(text: str) -> str:
+    return "\n".join(map(plain, text.split("\n")))
+
+
+def _axis(axes: Axes, name: str, axis: Axis) -> None:
+    """Scale and marks of an axis."""
+    side = axes.xaxis if name == "x" else axes.yaxis
+    if axis.log:
+        (axes.set_xscale if name == "x" else axes.set_yscale)("log")
+    if axis.places is not None:
+        side.set_ticks([at for at, _ in axis.places], [plain(text) for _, text in axis.places])
+        if axis.turned:
+            side.set_tick_params(labelrotation=axis.turned)
+    elif axis.log and axis.count:
+        subs = (1.0, 2.0, 5.0) if axis.count > 1 else (1.0,)
+        side.set_major_locator(LogLocator(subs=subs, numticks=6))
+        side.set_minor_formatter(NullFormatter())
+    elif axis.count or axis.whole:
+        side.set_major_locator(MaxNLocator(integer=axis.whole, nbins=axis.count or 6))
+    if axis.form is not None:
+        written: Callable[[float], str] = axis.form
+        side.set_major_formatter(FuncFormatter(lambda value, _: written(value)))
+    elif axis.count and not axis.log:
+        axes.ticklabel_format(axis=name, useOffset=False)  # type: ignore[arg-type]  # "x" or "y"
+
+
+def _limits(axes: Axes, one: Chart) -> None:
+    """Ends of both axes."""
+    for name, axis in (("x", one.x), ("y", one.y)):
+        if isinstance(axis, Axis):
+            if axis.margin is not None:
+                axes.margins(**{name: axis.margin})  # type: ignore[arg-type]  # x or y
+            low, high = axis.limits
+            if low is not None or high is not None:
+                (axes.set_xlim if name == "x" else axes.set_ylim)(low, high)
+
+
+# ---- marks --------------------------------------------------------------------------------------------------------
+
+
+def colour(name: int | str) -> str:
+    """A colour of the palette, of its names, or as it is."""
+    return PALETTE[name % len(PALETTE)] if isinstance(name, int) else COLOURS.get(name, name)
+
+
+def line_style(look: Look) -> dict[str, Any]:
+    """The look of a line as matplotlib takes it."""
+    paint = colour(look.colour)
+    style: dict[str, Any] = {"color": paint, "linewidth": look.width, "linestyle": DASHES[look.dash],
+                             "zorder": look.order, "alpha": look.alpha}  # fmt: skip
+    if look.mark:
+        style |= {"marker": look.mark, "markersize": look.size}
+    if look.hollow:
+        style |= {"markerfacecolor": "white", "markeredgewidth": 1.3}
+    return style
+
+
+def _area(look: Look) -> dict[str, Any]:
+    """The look of an area; hatched instead of filled where it has a hatch and a rule for a colour."""
+    if look.hatch and look.colour in ("rule", "shade"):
+        return {"facecolor": "none", "edgecolor": colour("rule"), "hatch": look.hatch, "linewidth": 0,
+                "zorder": look.order}  # fmt: skip
+    hatch = {"hatch": look.hatch} if look.hatch else {}
+    return {"facecolor": colour(look.colour), "alpha": look.alpha, "linewidth": 0, "zorder": look.order, **hatch}
+
+
+def _name(name: str | None) -> str | None:
+    return None if name is None else plain(name)
+
+
+def _closed(one: Chart, x: Array, close: bool, *rows: Array) -> list[Array]:
+    """x and rows, over a whole turn led on to their first values."""
+    if not (close and isinstance(one.x, Abscissa) and one.x.closed):
+        return [x, *rows]
+    return [np.append(x, x[0] + one.x.period), *(np.append(row, row[0]) for row in rows)]
+
+
+@singledispatch
+def _mark(mark: object, axes: Axes, one: Chart) -> None:
+    raise TypeError(mark)
+
+
+@_mark.register(Line)
+def _line(mark: Line, axes: Axes, one: Chart) -> None:
+    style, (x, y) = line_style(mark.look), _closed(one, mark.x, mark.close, np.asarray(mark.y, float))
+    if mark.low is not None and mark.high is not None:
+        axes.errorbar(x, y, [mark.low, mark.high], label=_name(mark.name), capsize=3, elinewidth=1.1,
+                      fmt="none" if not mark.look.mark else "", **style)  # fmt: skip
+        return
+    if isinstance(one.x, Abscissa) and mark.look.dash != "none":  # a dense course, without losing a peak
+        picked = thin(y)
+        x, y = x[picked], y[picked]
+    drawstyle: dict[str, Any] = {"drawstyle": "steps-post"} if mark.steps else {}
+    axes.plot(x, y, label=_name(mark.name), solid_joinstyle="round", **style, **drawstyle)
+    finite = np.isfinite(y)
+    alone = finite & ~np.append(False, finite[:-1]) & ~np.append(finite[1:], False)
+    if alone.any() and not mark.look.mark:  # a single position makes no line; a dashed curve's dots are open
+        face = "none" if mark.look.dash != "solid" else style["color"]
+        axes.plot(x[alone], y[alone], "o", markersize=4.5, color=style["color"], markerfacecolor=face)
+
+
+@_mark.register(Band)
+def _band(mark: Band, axes: Axes, one: Chart) -> None:
+    x, low, high = _closed(one, mark.x, mark.close, mark.low, mark.high)
+    axes.fill_between(x, low, high, label=_name(mark.name), **_area(mark.look))
+
+
+@_mark.register(Stairs)
+def _stairs(mark: Stairs, axes: Axes, one: Chart) -> None:
+    drawn = axes.stairs(mark.counts, mark.edges, fill=True, color=colour(mark.look.colour), zorder=mark.look.order,
+                        label=_name(mark.name))  # fmt: skip
+    if mark.window is not None:
+        low, high = mark.window
+        top = 2 * float(mark.counts.max())
+        drawn.set_clip_path(Rectangle((low, 0), max(high - low, 0.0), top, transform=axes.transData))
+
+
+@_mark.register(Bars)
+def _bars(mark: Bars, axes: Axes, one: Chart) -> None:
+    spread = None if mark.low is None or mark.high is None else np.stack([mark.low, mark.high])
+    axes.barh(mark.at, mark.sizes, mark.thickness, color=colour(mark.look.colour), label=_name(mark.name),
+              zorder=mark.look.order, xerr=spread,
+              error_kw={"ecolor": INK, "elinewidth": 1.0, "capsize": 2.5})  # fmt: skip
+
+
+@_mark.register(Rule)
+def _rule(mark: Rule, axes: Axes, one: Chart) -> None:
+    if not mark.upright:
+        axes.axhline(mark.at, label=_name(mark.name), **line_style(mark.look))
+        return
+    low, high = sorted(axes.get_xlim())
+    if low <= mark.at <= high:
+        axes.axvline(mark.at, label=_name(mark.name), **line_style(mark.look))
+
+
+@_mark.register(Stripe)
+def _stripe(mark: Stripe, axes: Axes, one: Chart) -> None:
+    axes.axvspan(mark.low, mark.high, label=_name(mark.name), **_area(mark.look))
+    if mark.text:
+        axes.text((mark.low + mark.high) / 2, 0.5, plain(mark.text), transform=axes.get_xaxis_transform(), rotation=90,
+                  ha="center", va="center", fontsize=8, color=MUTED, zorder=3, clip_on=True)  # fmt: skip
+
+
+@_mark.register(Note)
+def _note(mark: Note, axes: Axes, one: Chart) -> None:
+    axes.annotate(
+        _lines(mark.text), (mark.x, mark.y), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
+        textcoords="offset points", ha=mark.across, va=mark.up, fontsize=mark.size, color=colour(mark.colour),
+        zorder=4, bbox=BOX if mark.boxed else None,
+    )  # fmt: skip
+
+
+@_mark.register(Cells)
+def _cells(mark: Cells, axes: Axes, one: Chart) -> None:
+    count = len(mark.names)
+    picture = axes.imshow(np.ma.masked_invalid(mark.values), vmin=-1, vmax=1, cmap=colormaps["RdBu_r"])
+    axes.grid(False)
+    axes.set_facecolor(SHADE)
+    names = [plain(name) for name in mark.names]
+    level = count < 4
+    axes.xaxis.set_ticks(range(count), names, fontsize=8.5, rotation=0 if level else 35,
+                         ha="center" if level else "right")  # fmt: skip
+    axes.yaxis.set_ticks(range(count), names, fontsize=8.5)
+    axes.tick_params(length=0)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    for (p, q), value in np.ndenumerate(mark.values) if mark.written else ():
+        text = "—" if np.isnan(value) else f"{value:.2f}".replace("-", "−")
+        paint = MUTED if np.isnan(value) else "white" if abs(value) > 0.6 else INK
+        axes.text(q, p, text, ha="center", va="center", fontsize=8, color=paint)
+    bar = axes.figure.colorbar(picture, ax=axes, shrink=0.8, aspect=25)
+    bar.ax.tick_params(labelsize=8, colors=MUTED, labelcolor=INK)

@@ -1,0 +1,339 @@
+"""What a tolerance analysis or an allocation holds of a measure: a `MeasureReading` for each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.errors import Status
+from trunnion.results.attributes import attribute
+from trunnion.results.dataset import units_along
+from trunnion.results.quantities import joined, scale_of
+from trunnion.results.scales import without_noise
+from trunnion.views.common.cycle import Abscissa, Array, names
+from trunnion.views.texts import fixed, limits_in, limits_text, rounded
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["OUTER", "ContributionRow", "MeasureReading", "failures", "readings"]
+
+APART = 5e-4  # two shares that differ by more are written each
+OUTER = (0.00135, 0.99865)  # quantiles of the 99.73 % range
+DEGREE = ("°", "deg")
+LEAST, LEAST_INDEX = 1e-3, 5e-3  # shares below which a number has no row and no bar of its own
+
+
+@dataclass(frozen=True)
+class ContributionRow:
+    """What one toleranced number has in a measure, in SI; shares from 0 to 1, NaN where they are not known.
+
+    name: its path; short: without the section, where that names one number only; limits: as in a drawing;
+    sensitivity: of the measure by the number; rss_share: of the square of RSS, variance_share: of the variance, below
+    0 where a correlated number takes away from what the others do.
+    """
+
+    name: str
+    short: str
+    unit: str
+    limits: str
+    sensitivity: float
+    worst: float
+    worst_share: float
+    rss_share: float
+    variance_share: float
+
+    @property
+    def largest_share(self) -> float:
+        """The largest of its shares, whatever its sign; 0 where none is known."""
+        shares = (self.worst_share, self.rss_share, self.variance_share)
+        return max(abs(part) if math.isfinite(part) else 0.0 for part in shares)
+
+
+@dataclass(frozen=True)
+class MeasureReading:
+    """One measure of a result, (parameter, position, quantile, …), its unit and its limits.
+
+    All its numbers are written in one unit, with as many decimals as its spread needs: 112.3000° beside 0.0486°.
+    limits: (lower, upper) of the deviation from nominal, bounds: of the measure itself; SI, infinite without.
+    rule: what makes the figure of the course, empty if it is not stated; course: what the course is, in words.
+    """
+
+    result: xr.Dataset
+    name: str
+    text: str
+    unit: str
+    limits: tuple[float, float]
+    bounds: tuple[float, float]
+    rule: str = ""
+    course: str = ""
+
+    def value(self, key: str) -> float:
+        """One number, NaN if the result lacks it."""
+        return float(self.result[key].values) if key in self.result else math.nan
+
+    def row(self, key: str) -> Array:
+        """Numbers over a dimension; none if the result lacks them."""
+        return np.asarray(self.result[key].values, float) if key in self.result else np.empty(0)
+
+    def has(self, key: str) -> bool:
+        """Whether there is any such number."""
+        return bool(np.isfinite(self.row(key)).any())
+
+    @cached_property
+    def nominal(self) -> float:
+        """The figure of the mechanism without deviations; 0 if it is not known."""
+        value = self.value("nominal")
+        return value if math.isfinite(value) else 0.0
+
+    @cached_property
+    def is_size(self) -> bool:
+        """Whether the figure is the size of a deviation: nominally 0 and never below."""
+        least = self.value("least") if self.has("least") else self.value("worst_case_lower")
+        return self.nominal == 0.0 and not least < 0.0
+
+    @cached_property
+    def room(self) -> tuple[float, float]:
+        """(lower, upper) that the figure may deviate from nominal; the size of a deviation has no lower limit."""
+        lower = max(self.limits[0], self.bounds[0] - self.nominal)
+        upper = min(self.limits[1], self.bounds[1] - self.nominal)
+        return (-math.inf if self.is_size else lower), upper
+
+    @property
+    def limited(self) -> bool:
+        """Whether the measure has any limit."""
+        return any(math.isfinite(limit) for limit in (*self.limits, *self.bounds))
+
+    @property
+    def correlated(self) -> bool:
+        """Whether numbers go with each other, of which RSS does not know."""
+        return bool(self.result.attrs.get("correlated", 0))
+
+    @property
+    def rss_label(self) -> str:
+        """RSS, with what it leaves out."""
+        return "RSS, uncorrelated" if self.correlated else "RSS"
+
+    @property
+    def independent(self) -> bool:
+        """Whether the samples are, so that an interval shrinks with the root of their number."""
+        return str(self.result.attrs.get("sampling", "monte-carlo")) == "monte-carlo"
+
+    @property
+    def heading(self) -> str:
+        """Name, and what it is."""
+        return f"{self.name}: {self.text}" if self.text else self.name
+
+    # ---- unit ---------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def spread(self) -> float:
+        """The size of what is written of the measure beside its nominal."""
+        sizes = [abs(self.value(key)) for key in ("worst_case_lower", "worst_case_upper", "rss")]
+        sizes += [3 * self.value("deviation"), *map(abs, self.limits)]
+        return max((size for size in sizes if math.isfinite(size) and size > 0), default=abs(self.nominal))
+
+    @cached_property
+    def scale(self) -> tuple[float, str]:
+        """Factor and unit for all numbers of the measure."""
+        return scale_of(self.nominal, [self.spread], self.unit)
+
+    @property
+    def factor(self) -> float:
+        """From SI to the unit that is shown."""
+        return self.scale[0]
+
+    @property
+    def label(self) -> str:
+        """The unit that is shown, not to be broken; empty for a pure number."""
+        return self.scale[1].replace(" ", "\u00a0")
+
+    @property
+    def in_unit(self) -> str:
+        """The unit behind a title: " [°]"; empty for a pure number."""
+        return f" [{self.label}]" if self.label else ""
+
+    @cached_property
+    def decimals(self) -> int:
+        """As many as give the spread four digits."""
+        size = self.spread * self.factor
+        return min(max(3 - math.floor(math.log10(size)), 0), 9) if size > 0 and math.isfinite(size) else 4
+
+    def say(self, value: float, sign: bool = False) -> str:
+        """A value of the measure with its unit; sign: a plus before what is above 0."""
+        text = fixed(value * self.factor, self.decimals)
+        return joined(f"{'+' if sign and value > 0 else ''}{text}", self.label) if math.isfinite(value) else text
+
+    def written(self, key: str) -> str:
+        """A number of the result with its unit; empty if it is not known."""
+        value = self.value(key)
+        return "" if math.isnan(value) else self.say(value)
+
+    def between(self, low: float, high: float) -> str:
+        """Two values with their unit once; empty if one is not known."""
+        unknown = math.isnan(low) or math.isnan(high)
+        return "" if unknown else f"{fixed(low * self.factor, self.decimals)} to {self.say(high)}"
+
+    def deviations(self, low: float, high: float) -> str:
+        """Deviations from nominal as limits are written: "±0.2375°", "−0.1732 to +0.1599°"; the end of a size."""
+        if math.isnan(low) and math.isnan(high):
+            return ""
+        if low == 0.0 and self.nominal == 0.0:
+            return self.say(high)
+        upper = self.say(high, sign=True)
+        if upper.startswith("+") and self.say(-low, sign=True) == upper:
+            return f"±{upper[1:]}"
+        return f"{'+' if low > 0 else ''}{fixed(low * self.factor, self.decimals)} to {upper}"
+
+    @property
+    def limits_said(self) -> str:
+        """The limits in words; empty if there are none."""
+        parts = []
+        lower, upper = self.limits
+        if math.isfinite(lower) or math.isfinite(upper):
+            parts.append(joined(limits_text(lower * self.factor, upper * self.factor), self.label))
+        for word, bound in zip(("at least", "at most"), self.bounds, strict=True):
+            if math.isfinite(bound):
+                parts.append(f"{word} {joined(rounded(bound * self.factor), self.label)}")
+        return ", ".join(parts)
+
+    # ---- over the drive -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def places(self) -> tuple[Abscissa, Array] | None:
+        """What its curve is drawn over, and which positions (−1: a gap).
+
+        None if it is known at less than two, or if the figure is a place itself, another quantity than its course.
+        """
+        is_place = self.rule.startswith(("place", "dead"))
+        if is_place or "drive" not in self.result.coords or not self.has("curve"):
+            return None
+        drive = np.asarray(self.result["drive"].values, float)
+        solved = np.flatnonzero(np.isfinite(self.row("curve")) & np.isfinite(drive))
+        order = solved[np.argsort(drive[solved], kind="stable")]
+        if len(order) < 2 or not np.ptp(drive[order]) > 0:
+            return None
+        unit, driver = str(self.result.attrs.get("drive_unit", "")), str(self.result.attrs.get("drive", ""))
+        unit = "°" if unit in DEGREE else unit
+        x, step = drive[order], float(np.median(np.diff(drive[order])))
+        unsolved = np.asarray(self.result["status"].values) >= Status.NOT_CONVERGED
+        holes = np.unique(np.searchsorted(x, drive[unsolved & ~np.isfinite(self.row("curve"))]))
+        holes = holes[(holes > 0) & (holes < len(x))]
+        over = np.insert(x, holes, 0.5 * (x[holes - 1] + x[holes]))
+        round_trip = unit == "°" and bool(self.result.attrs.get("periodic", 0))
+        closed = round_trip and abs(float(np.ptp(x)) + step - 360.0) < 0.5 * step
+        label = f"drive {'angle' if unit == '°' else 'slide'} {driver}" if driver else "time"
+        return Abscissa(label, unit, over, closed, 360.0 * closed), np.insert(order, holes, -1)
+
+    def along(self, values: Array) -> Array:
+        """Numbers over all positions as `places` has them, (…, place), in the unit that is shown."""
+        assert self.places is not None
+        picked = self.places[1]
+        return np.where(picked < 0, np.nan, values[..., picked]) * self.factor
+
+    @cached_property
+    def place(self) -> float:
+        """Coordinate of the drive, in its shown unit, at which the figure is taken; NaN if there is no one such."""
+        turned = str(self.result["place"].attrs.get("units", "")) if "place" in self.result else ""
+        return self.value("place") * {"rad": 180 / math.pi, "m": 1e3}.get(turned, 1.0)
+
+    @property
+    def at_place(self) -> str:
+        """The place with its unit: " at 212°"; empty if there is none."""
+        unit = str(self.result.attrs.get("drive_unit", ""))
+        if not math.isfinite(self.place) or self.places is None:
+            return ""
+        return f" at {self.place:.4g}°" if unit in DEGREE else f" at {self.place:.4g}\u00a0{unit}".rstrip()
+
+    @property
+    def is_extreme(self) -> bool:
+        """Whether the figure is that of the position where the course is largest or least."""
+        return self.rule in ("maximum", "minimum", "largest")
+
+    # ---- shares ---------------------------------------------------------------------------------------------------
+
+    @property
+    def interval(self) -> tuple[float, float, float]:
+        """Yield with the ends of its 95 % interval; NaN if it is not known."""
+        return self.value("yield"), self.value("yield_low"), self.value("yield_high")
+
+    @property
+    def outer(self) -> tuple[float, float] | None:
+        """Ends of the range of 99.73 % of the samples."""
+        if not self.has("quantile_value"):
+            return None
+        levels, values = np.asarray(self.result["quantile"].values, float), self.row("quantile_value")
+        ends = [float(values[np.argmin(np.abs(levels - end))]) for end in OUTER if np.isclose(levels, end).any()]
+        return (ends[0], ends[1]) if len(ends) == 2 else None
+
+    @property
+    def shares_apart(self) -> bool:
+        """Whether the shares in the variance are others than those in RSS²."""
+        return any(abs(row.variance_share - row.rss_share) > APART for row in self.contributions)
+
+    @cached_property
+    def contributions(self) -> list[ContributionRow]:
+        """Of every toleranced number, the largest share first."""
+        units = units_along(self.result["parameter_nominal"], "parameter")
+        paths = names(self.result, "parameter")
+        keys = ("sensitivity", "contribution_worst_case", "contribution_rss", "contribution_variance",
+                "parameter_lower", "parameter_upper")  # fmt: skip
+        unknown = np.full(len(paths), np.nan)
+        slope, worst, rss, variance, lower, upper = (self.row(k) if k in self.result else unknown for k in keys)
+        total = float(np.nansum(worst))
+        ends = [path.partition(".")[2] or path for path in paths]
+        rows = [
+            ContributionRow(
+                path, end if ends.count(end) == 1 else path, unit, limits_in(lower[j], upper[j], unit, path),
+                float(slope[j]), float(worst[j]), float(worst[j]) / total if total > 0 else math.nan,
+                float(rss[j]), float(variance[j]),
+            )
+            for j, (path, end, unit) in enumerate(zip(paths, ends, units, strict=True))
+        ]  # fmt: skip
+        return sorted(rows, key=lambda row: [-part if math.isfinite(part) else 1.0
+                                             for part in (row.rss_share, row.worst_share)])  # fmt: skip
+
+    def largest(self, most: int) -> tuple[list[ContributionRow], list[ContributionRow]]:
+        """At most so many contributions that have a row or bar of their own, and the rest."""
+        rows = self.contributions
+        large = [row for row in rows if row.largest_share >= LEAST][:most] or rows[:1]
+        if len(rows) == len(large) + 1:  # the last takes no more room than its being left out
+            large = rows
+        return large, [row for row in rows if row not in large]
+
+    def sobol_order(self, most: int) -> list[int]:
+        """Numbers whose Sobol indices are shown, the largest first."""
+        total = np.where(np.isfinite(self.row("total_order")), self.row("total_order"), -1.0)
+        order = [int(k) for k in np.argsort(-total, kind="stable")]
+        return [k for k in order if total[k] >= LEAST_INDEX][:most] or order[:1]
+
+
+def readings(result: xr.Dataset) -> list[MeasureReading]:
+    """Every measure of a result."""
+    keys = ("limits", "bounds", "measure_texts", "measure_rules", "curve_texts")
+    result = without_noise(result)
+    units = units_along(result["nominal"], "measure")
+    limits, bounds, *words = (attribute(result, key) for key in keys)
+    reads = []
+    for i, name in enumerate(names(result, "measure")):
+        ends = [(row[i] if i < len(row) else None) or (None, None) for row in (limits, bounds)]
+        pairs = [(-math.inf if low is None else float(low), math.inf if high is None else float(high))
+                 for low, high in ends]  # fmt: skip
+        text, rule, course = (str(row[i]) if i < len(row) else "" for row in words)
+        reads.append(
+            MeasureReading(result.isel(measure=i), name, text, str(units[i]), pairs[0], pairs[1], rule, course)
+        )
+    return reads
+
+
+def failures(result: xr.Dataset) -> list[tuple[str, int]]:
+    """Why samples have no figures, and how many; all together first."""
+    if "failed" not in result:
+        return []
+    numbers = dict(zip(names(result, "cause"), np.asarray(result["failed"].values).astype(int).tolist(), strict=True))
+    rest = [(cause.replace("_", " ").split(":")[0], n) for cause, n in numbers.items() if cause != "all" and n]
+    return [("all", numbers.get("all", sum(n for _, n in rest))), *rest]

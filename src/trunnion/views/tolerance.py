@@ -1,0 +1,630 @@
+"""Views of a tolerance analysis: tables, charts, figures, the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import drawn_in, number
+from trunnion.statistics import intervals
+from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, Stripe
+from trunnion.views.common.cycle import Array, names
+from trunnion.views.page import Section, Summary, counts, page
+from trunnion.views.readings import OUTER, ContributionRow, MeasureReading, failures, readings
+from trunnion.views.table import Table
+from trunnion.views.texts import ending, limits_in, share, share_interval, share_parts, value_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["KINDS", "MOST_PANELS", "NOTES", "check_kind", "drawable", "figure", "report", "sheet", "tables"]
+
+MOST_HEADS = 6  # measures whose figures are read first
+MOST_ROWS, MOST_BARS = 20, 16  # contributions with a row and a bar of their own
+
+
+# ---- tables -------------------------------------------------------------------------------------------------------
+
+Cells = dict[str, str]  # text by column; a column without any text is left out
+COLUMNS = {"linear": "linear", "searched": "searched", "sampled": "samples", "interval": "95 % interval"}
+
+
+def tables(result: xr.Dataset) -> list[Table]:
+    """Of each measure its figures and contributions; then the samples that failed, and the yield of all limits."""
+    parts = []
+    for read in readings(result):
+        parts += _measure_tables(read, read.heading + (f"; limits {read.limits_said}" if read.limited else ""))
+    yields = _overall(result)
+    if yields:
+        parts += failed(result)
+        return [*parts, Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])]
+    return [*parts, *failed(result)]
+
+
+def _measure_tables(read: MeasureReading, title: str) -> list[Table]:
+    """Figures, contributions and Sobol indices, as there are."""
+    parts = [figures(read).titled(title)]
+    if read.contributions and read.has("contribution_worst_case"):
+        parts.append(contributions(read))
+    return [*parts, indices(read)] if read.has("total_order") else parts
+
+
+def cells_of(read: MeasureReading) -> dict[str, Cells]:
+    """Nominal, mean, deviation, worst case, RSS, extremes, range, yield and capability, by row and column."""
+    linear = {} if read.is_size else {"linear": read.written("deviation_linear")}
+    shift, sigma = read.value("shift_linear"), read.value("deviation_linear")
+    middle = read.nominal + shift
+    mean = "" if math.isnan(shift) or read.is_size else read.say(middle)
+    three = "" if read.is_size else read.between(middle - 3 * sigma, middle + 3 * sigma)
+    at = read.at_place if read.is_extreme and read.nominal != 0.0 else ""
+    least, most = read.value("least"), read.value("most")
+    extremes = read.written("most") if read.is_size else read.deviations(least - read.nominal, most - read.nominal)
+    rss = read.written("rss")
+    passed: Cells = {}
+    if read.limited and not math.isnan(read.interval[0]):
+        passed = dict(zip(("sampled", "interval"), share_parts(*read.interval)[:2], strict=True))
+    worst = {column: read.deviations(*(read.value(f"{key}_{end}") for end in ("lower", "upper")))
+             for column, key in (("linear", "worst_case"), ("searched", "searched"))}  # fmt: skip
+    interval = {key: read.between(read.value(f"{key}_low"), read.value(f"{key}_high")) for key in ("mean", "deviation")}
+    return {
+        "nominal": {"linear": f"{read.written('nominal')}{at}"},
+        "mean": {"linear": mean, "sampled": read.written("mean"), "interval": interval["mean"]},
+        "deviation σ": {**linear, "sampled": read.written("deviation"), "interval": interval["deviation"]},
+        "worst case": worst,
+        read.rss_label: {"linear": f"±{rss}" if rss else ""},
+        "extremes": {"sampled": extremes},
+        "99.73 % range": {"linear": three, "sampled": read.between(*read.outer) if read.outer else ""},
+        "yield": passed,
+        **{label: {"sampled": "" if math.isnan(read.value(key)) else number(read.value(key), 3)}
+           for label, key in (("Cp", "cp"), ("Cpk", "cpk"))},
+    }  # fmt: skip
+
+
+def figures(read: MeasureReading) -> Table:
+    """The figures of a measure, a column for each method; "undefined" where there are none, of which findings speak."""
+    rows = {label: cells for label, cells in cells_of(read).items() if any(cells.values())}
+    if not rows:
+        return Table("results", ["", "linear"], [["nominal", "undefined"]])
+    columns = [key for key in COLUMNS if any(cells.get(key) for cells in rows.values())]
+    sampling = "Monte Carlo" if read.independent else "quasi-Monte Carlo"
+    head = ["", *(sampling if key == "sampled" else COLUMNS[key] for key in columns)]
+    return Table("results", head, [[label, *(cells.get(k, "") for k in columns)] for label, cells in rows.items()])
+
+
+def contributions(read: MeasureReading) -> Table:
+    """Each toleranced number: its limits, sensitivity, worst case and shares, the largest first; the small ones are
+    counted."""
+    large, rest = read.largest(MOST_ROWS)
+    shares = {"share": "worst_share", "of RSS²": "rss_share"}
+    shares |= {"of variance": "variance_share"} if read.shares_apart else {}
+    head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
+    rows = [
+        [row.short, row.limits, _sensitivity(read, row), read.say(row.worst),
+         *(share(getattr(row, key), 1) for key in shares.values())]
+        for row in large
+    ]  # fmt: skip
+    if rest:
+        sums = (float(np.nansum([getattr(row, key) for row in rest])) for key in shares.values())
+        scatters = any(abs(read.value(key)) > 0 for key in ("deviation", "searched_lower", "searched_upper"))
+        effect = "small"
+        if all(row.worst == 0 for row in rest):
+            second = scatters and not any(row.worst for row in read.contributions)
+            effect = "no effect to first order" if second else "no effect"
+        rows.append([f"{len(rest)} others, {effect}", "", "", "", *(share(part, 1) for part in sums)])
+    return Table(f"contributions to {read.name}{read.at_place}", head, rows)
+
+
+def _sensitivity(read: MeasureReading, row: ContributionRow) -> str:
+    """Change of the measure by the number, in the units in which both are written: "0.01365 °/mm"."""
+    if math.isnan(row.sensitivity):
+        return "—"
+    half = row.worst / abs(row.sensitivity) if row.sensitivity else math.nan  # whose unit is that of the limits
+    factor, shown = drawn_in(half if half > 0 else 1.0, row.unit)
+    shown = shown.replace(" ", "\u00a0")
+    unit = f"{read.label or '1'}/{shown}" if shown else read.label
+    return f"{number(row.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
+
+
+def indices(read: MeasureReading) -> Table:
+    """Sobol indices with their 95 % intervals, the largest total first; those below half a per cent are counted."""
+    short = {row.name: row.short for row in read.contributions}
+    paths = names(read.result, "parameter")
+    order = read.sobol_order(len(paths))
+    ends = [[read.row(f"{key}{end}") for end in ("", "_low", "_high")] for key in ("first_order", "total_order")]
+    rows = [
+        [short[paths[j]], *(share_interval(*(float(row[j]) for row in key)).replace("-", "−") for key in ends)]
+        for j in order
+    ]
+    rows += [[f"{len(paths) - len(order)} others", "", ""]] if len(order) < len(paths) else []
+    return Table(f"Sobol indices of {read.name}", ["share of the variance", "alone", "with interactions"], rows)
+
+
+def corners(read: MeasureReading) -> Table | None:
+    """The numbers at which the searched worst case stands; None if it was not searched."""
+    searched = {end: read.value(f"searched_{end}") for end in ("lower", "upper") if read.has(f"corner_{end}")}
+    searched = {end: value for end, value in searched.items() if math.isfinite(value) and value != 0.0}
+    if not searched:
+        return None
+    about = {row.name: row for row in read.contributions}
+    head = ["worst corner", *(read.say(read.nominal + value) for value in searched.values())]
+    rows = [
+        [path, *(value_text(float(read.row(f"corner_{end}")[j]), about[path].unit) for end in searched)]
+        for j, path in enumerate(names(read.result, "parameter"))
+        if about[path].worst != 0
+    ]
+    return Table(f"worst corners of {read.name}, of the nonlinear model", head, rows)
+
+
+def overview(result: xr.Dataset) -> Table:
+    """A row for each measure: what is asked and what comes out."""
+    rows, head = [], list[str]()
+    for read in readings(result):
+        cells = cells_of(read)
+        sampled = [cells[key].get("sampled") or cells[key].get("linear", "") for key in ("mean", "deviation σ", "yield",
+                                                                                        "Cpk")]  # fmt: skip
+        rows.append([read.name, read.limits_said, cells["nominal"]["linear"], _worst(cells),
+                     cells[read.rss_label]["linear"], *sampled])  # fmt: skip
+        head = ["measure", "limits", "nominal", "worst case", read.rss_label, "mean", "deviation σ", "yield", "Cpk"]
+    return Table("measures", head, rows).without_empty()
+
+
+def _worst(cells: dict[str, Cells]) -> str:
+    return cells["worst case"].get("searched") or cells["worst case"].get("linear", "")
+
+
+def headline(result: xr.Dataset) -> Summary:
+    """What is read first: of each measure the yield, the nominal value and the worst case; then of all limits."""
+    summary = []
+    for read in sorted(readings(result), key=lambda read: not read.limited)[:MOST_HEADS]:
+        cells = cells_of(read)
+        order = "" if cells["worst case"].get("searched") else ", first order"
+        pairs = [
+            (cells["yield"].get("sampled", ""), f"yield, {cells['yield'].get('interval', '')}"),
+            ("" if read.is_size else cells["nominal"]["linear"], "nominal"),
+            (_worst(cells), f"worst case{order}" if read.is_size else f"worst-case deviation{order}"),
+            (cells["Cpk"].get("sampled", ""), "Cpk"),
+        ]
+        summary.append((read.name, [pair for pair in pairs if pair[0]]))
+    yields = _overall(result)
+    summary += [("All limits together", [(share_parts(*yields)[0], "yield")])] if yields else []
+    return [part for part in summary if part[1]]
+
+
+def failed(result: xr.Dataset) -> list[Table]:
+    """Samples without figures, by cause; no table if there are none."""
+    causes = failures(result)
+    if not causes or not causes[0][1]:
+        return []
+    count = int(result["samples"].values) if "samples" in result else 0
+    rows = [[cause, f"{n:,}", share(n / count, 2) if count else ""] for cause, n in causes]
+    return [Table("failed samples: outside every limit, excluded from mean and quantiles", ["", "samples", ""], rows)]
+
+
+def _overall(result: xr.Dataset) -> tuple[float, float, float] | None:
+    """The yield of all limits and its interval, where more than one measure has limits."""
+    if "yield_all" not in result or sum(read.limited for read in readings(result)) < 2:
+        return None
+    value, low, high = (float(result[f"yield_all{end}"].values) for end in ("", "_low", "_high"))
+    return None if math.isnan(value) else (value, low, high)
+
+
+def inputs(result: xr.Dataset) -> Table:
+    """Every toleranced number: nominal, limits, standard deviation, shift of its mean."""
+    read = readings(result)[0]
+    units = {row.name: row.unit for row in read.contributions}
+    keys = ("parameter_nominal", "parameter_lower", "parameter_upper", "parameter_deviation", "parameter_shift")
+    nominal, lower, upper, *others = (read.row(key) for key in keys)
+    rows = []
+    for j, path in enumerate(names(result, "parameter")):
+        unit = units[path]
+        cells = [value_text(float(nominal[j]), unit), limits_in(float(lower[j]), float(upper[j]), unit, path)]
+        rows.append([path, *cells, *(value_text(float(row[j]), unit, 4) if row.size else "" for row in others)])
+    return Table("toleranced parameters", ["number", "nominal", "limits", "standard deviation", "shift of mean"], rows)
+
+
+# ---- charts -------------------------------------------------------------------------------------------------------
+
+WITHIN, BEYOND = 0, 1
+LIMIT = Look("limit", 1.3, "dotted", order=3)
+FEWEST, MOST = 20, 60  # bars of a histogram
+CORE = 0.01  # share of the samples at either end beyond the core
+FAR = 1.5  # of the width of the core, beyond which no sample decides how far the picture goes
+READABLE = 0.02  # of nominal: a spread below it is drawn as a deviation
+INSIDE = 0.14  # share of a bar that holds its number
+NAME = 34  # characters of a name beside a bar
+
+
+def histogram(read: MeasureReading) -> Panel:
+    """Counts of the samples within and beyond the limits, with nominal, mean and the range of 99.73 %."""
+    tally, edges = read.row("histogram"), read.row("edge")
+    low, high = _core(tally, edges)
+    shift, title = 0.0, f"{read.name}{read.in_unit}"
+    if 0 < high - low <= READABLE * abs(read.nominal) or (low == high and read.nominal):
+        shift, title = read.nominal, f"deviation of {read.name} from nominal {read.say(read.nominal)}{read.in_unit}"
+    low, high = _window(read, low, high)
+    heights, bins = _rebinned(tally, edges, low, high)
+    x = (bins - shift) * read.factor
+    marks: list[Mark] = [Stairs(heights, x, "samples", Look(WITHIN))]
+    if read.limited:
+        lower, upper = ((read.nominal + end - shift) * read.factor for end in read.room)
+        passed, _, decimals = read.interval[0], *share_parts(*read.interval)[1:]
+        lost = "beyond, or failed," if any(n for _, n in failures(read.result)) else "beyond"
+        beyond = None if passed == 1.0 else f"{lost} {share(1 - passed, decimals)}"
+        window = (max(lower, float(x[0])), min(upper, float(x[-1])))
+        marks = [Stairs(heights, x, f"within {share_interval(*read.interval)}", Look(WITHIN, order=2.1), window),
+                 Stairs(heights, x, beyond, Look(BEYOND))]  # fmt: skip
+    marks += _histogram_lines(read, shift)
+    outside = int(tally[(edges[1:] <= low) | (edges[:-1] >= high)].sum())
+    if outside:
+        least, most = read.value("least"), read.value("most")
+        ends = [f"down to {read.say(least)}"] if least < low else []
+        ends += [f"up to {read.say(most)}"] if most > high else []
+        text = f"{outside:,} sample{'s' if outside > 1 else ''} outside, {' and '.join(ends)}"
+        marks.append(Note(text, 0.99, 0.97, "right", "top", boxed=True))
+    top = 1.06 * max(float(heights.max(initial=0.0)), 1.0)
+    across = Axis(title, ((low - shift) * read.factor, (high - shift) * read.factor))
+    return Panel("", [Chart(across, Axis("samples", (0, top), whole=True), marks, legend=Legend(3))])
+
+
+def _core(tally: Array, edges: Array) -> tuple[float, float]:
+    """Where the samples lie, without what lies far beyond nearly all of them."""
+    filled = np.flatnonzero(tally)
+    if not filled.size:
+        return float(edges[0]), float(edges[-1])
+    ends, total = edges[[filled[0], filled[-1] + 1]], np.append(0.0, np.cumsum(tally))
+    low, high = np.interp([CORE * total[-1], (1 - CORE) * total[-1]], total, edges)
+    room = FAR * (high - low)
+    return max(float(ends[0]), low - room), min(float(ends[1]), high + room)
+
+
+def _window(read: MeasureReading, low: float, high: float) -> tuple[float, float]:
+    """Ends of the axis: the core, and what lies within one more width of it to either side: limits, nominal."""
+    width = high - low or abs(high) or 1.0
+    marks = [read.nominal, *(read.nominal + end for end in read.room)]
+    near = [mark for mark in marks if low - width < mark < high + width]
+    low, high = min([low, *near]), max([high, *near])
+    margin = 0.04 * (high - low)
+    return (low if read.is_size and low <= 0 else low - margin), high + margin
+
+
+def _rebinned(tally: Array, edges: Array, low: float, high: float) -> tuple[Array, Array]:
+    """The counts over some 20 to 60 even bars in the picture, the more the more samples there are."""
+    seen = np.flatnonzero((edges[1:] > low) & (edges[:-1] < high))
+    widths = np.diff(edges)[seen]
+    bars = int(np.clip(np.sqrt(tally.sum()), FEWEST, MOST))
+    if not widths.size or seen.size <= 1.5 * bars:
+        return tally, edges
+    if np.ptp(widths) <= 0.01 * widths.max():  # even: some of them together
+        some = max(round(seen.size / bars), 1)
+        starts = np.arange(seen[0] % some, len(tally) - some + 1, some)
+        return np.add.reduceat(tally[: starts[-1] + some], starts), edges[np.append(starts, starts[-1] + some)]
+    even = np.linspace(low, high, bars + 1)
+    return np.diff(np.interp(even, edges, np.append(0.0, np.cumsum(tally)))), even
+
+
+def _histogram_lines(read: MeasureReading, shift: float) -> list[Mark]:
+    """Upright lines: limits, nominal, mean, ends of the range of 99.73 %."""
+    limits = [read.nominal + end for end in read.room if math.isfinite(end)]
+    text = f"limit{'s' if len(limits) > 1 else ''} {read.limits_said}"
+    places: list[tuple[float, str | None, Look]] = [(end, None if k else text, LIMIT) for k, end in enumerate(limits)]
+    if read.has("nominal") and not read.is_size:
+        places.append((read.nominal, f"nominal {read.say(read.nominal)}", Look("ink", 1.3, order=3)))
+    mean = read.value("mean")
+    places.append((mean, f"mean {read.say(mean)}", Look("ink", 1.3, "long", order=3)))
+    for k, end in enumerate(read.outer or ()):
+        text = f"99.73 %: {' to '.join(map(read.say, read.outer or ()))}"
+        places.append((end, None if k else text, Look("muted", 1.0, "short", order=3)))
+    return [Rule((at - shift) * read.factor, name, look) for at, name, look in places]
+
+
+def contribution_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
+    """Share of each number in the sum of squares, sorted, with the running total; beside it those in the worst case,
+    and in the variance where they are others."""
+    large, rest = read.largest(most)
+    labels = [f"{ending(row.short, NAME)}  {row.limits}".rstrip() for row in large]
+    labels += [f"{len(rest)} others"] if rest else []
+    rss, worst, variance = (
+        100 * np.array([*(getattr(row, key) for row in large),
+                        *([np.nansum([getattr(row, key) for row in rest])] if rest else [])], float)
+        for key in ("rss_share", "worst_share", "variance_share")
+    )  # fmt: skip
+    at = np.arange(float(len(labels)))
+    marks: list[Mark] = [Bars(at - 0.17, rss, 0.4, "RSS², uncorrelated" if read.correlated else "RSS²", Look(0))]
+    if read.shares_apart:
+        marks += [Bars(at + 0.12, variance, 0.18, "variance", Look(2)),
+                  Bars(at + 0.3, worst, 0.18, "worst case", Look("pale"))]  # fmt: skip
+    else:
+        marks.append(Bars(at + 0.23, worst, 0.28, "worst case", Look("pale")))
+    running = np.nancumsum(rss)
+    marks.append(Line(running, at - 0.17, "RSS², added up", Look("ink", 1.2, mark="o", size=3.5, order=3)))
+    for y, part in zip(at, rss, strict=True):
+        if math.isfinite(part):
+            inside = part > 100 * INSIDE
+            marks.append(Note(f"{part:.1f}", float(part), y - 0.17, "right" if inside else "left", data=True, size=7.5,
+                              colour="white" if inside else "ink", shift=(-6 if inside else 4, 0)))  # fmt: skip
+    ends = [part for part in variance if math.isfinite(part)] if read.shares_apart else []
+    return _bar_panel("share [%]", labels, marks, max([100.0, *running, *ends]), min([0.0, *ends]))
+
+
+def sobol_bars(read: MeasureReading, most: int = MOST_BARS) -> Panel:
+    """First-order and total share of each number in the variance, with 95 % intervals, sorted by the total."""
+    order, short = read.sobol_order(most + 1), {row.name: row.short for row in read.contributions}
+    paths, at = names(read.result, "parameter"), np.arange(float(len(order)))
+    marks: list[Mark] = []
+    tops = [5.0]
+    for key, offset, look, label in (
+        ("total_order", 0.2, Look("pale"), "total, with all interactions"),
+        ("first_order", -0.2, Look(0), "first order, alone"),
+    ):
+        value, low, high = (100 * read.row(f"{key}{end}") for end in ("", "_low", "_high"))
+        ends = [np.nan_to_num(np.maximum(gap[order], 0)) for gap in (value - low, high - value)] if low.size else None
+        marks.append(Bars(at + offset, value[order], 0.36, label, look, *(ends or (None, None))))
+        tops += [float(np.nanmax(part, initial=0.0)) for part in (value, high) if part.size]
+    if len(order) < len(paths):
+        marks.append(Note(f"{len(paths) - len(order)} smaller are not shown", 0.99, 0.02, "right", "bottom"))
+    return _bar_panel("share of the variance [%]", [ending(short[paths[k]], NAME) for k in order], marks, max(tops))
+
+
+def _bar_panel(title: str, labels: list[str], marks: list[Mark], most: float, least: float = 0.0) -> Panel:
+    """Bars with their names down the side, the largest on top, and room for them."""
+    side = Axis("", (len(labels) - 0.4, -0.6), list(enumerate(labels)))
+    marks.append(Rule(0.0, None, Look("muted", 0.8)))
+    chart = Chart(Axis(title, (1.04 * least, 1.04 * most)), side, marks, legend=Legend(room=44), bare=True)
+    return Panel("", [chart], max(1.4 + 0.34 * len(labels), 2.6))
+
+
+def envelope(read: MeasureReading) -> Panel:
+    """Deviation of the course from nominal over the drive: worst case, bands of the samples, RSS, limits."""
+    assert read.places is not None
+    over, picked = read.places
+    x = over.values
+    marks: list[Mark] = [Stripe(x[k - 1], x[k + 1], "not solved") for k in np.flatnonzero(picked < 0)]
+    if read.has("curve_worst_case_upper"):
+        ends = [read.along(read.row(f"curve_worst_case_{end}")) for end in ("lower", "upper")]
+        marks.append(Band(x, ends[0], ends[1], "worst case, linear", Look(4, alpha=0.16, order=1), close=True))
+        marks += [Line(x, end, None, Look("muted", 0.9), close=True) for end in ends]
+    marks += _sample_bands(read, x)
+    if read.has("curve_rss"):
+        rss = read.along(read.row("curve_rss"))
+        middle = read.along(read.row("curve_shift")) if read.has("curve_shift") else 0.0
+        marks += [Line(x, middle + sign * rss, name, Look("ink", 1.1, "long"), close=True)
+                  for sign, name in ((1, read.rss_label), (-1, None))]  # fmt: skip
+    corner = max((read.value(f"searched_{end}") for end in ("lower", "upper")), key=abs)
+    if read.nominal == 0.0 and math.isfinite(corner + read.value("searched_lower") + read.place) and corner != 0.0:
+        label = f"worst corner, searched: {read.say(corner, sign=True)}{read.at_place}"
+        look = Look("ink", dash="none", mark="D", size=5, hollow=True, order=5)
+        marks.append(Line(np.array([read.place]), np.array([corner * read.factor]), label, look))
+    if read.nominal == 0.0 and (read.rule in ("", "deviation") or read.is_extreme):  # limits of the course, too
+        limits = [limit for limit in read.limits if math.isfinite(limit)]
+        marks += [Rule(limit * read.factor, None if k else f"limits {read.limits_said}", LIMIT, upright=False)
+                  for k, limit in enumerate(limits)]  # fmt: skip
+    title = f"deviation of {read.course or read.name}{read.in_unit}"
+    return Panel("", [Chart(over, Axis(title, margin=0.07), marks, zero=True, legend=Legend(4))], 3.8)
+
+
+def _sample_bands(read: MeasureReading, x: Array) -> list[Mark]:
+    """Ranges that hold 99.73 % and 90 % of the samples at each position, and their median."""
+    if not read.has("band"):
+        return []
+    levels, band = np.asarray(read.result["quantile"].values, float), read.row("band")
+    if str(read.result["band"].attrs.get("of", "deviation")) == "value":
+        band = band - read.row("curve")
+
+    def at(level: float) -> Array:
+        return read.along(band[int(np.argmin(np.abs(levels - level)))])
+
+    return [
+        Band(x, at(OUTER[0]), at(OUTER[1]), "99.73 % of the samples", Look(WITHIN, alpha=0.28, order=1.2), close=True),
+        Band(x, at(0.05), at(0.95), "90 %", Look(WITHIN, alpha=0.45, order=1.2), close=True),
+        Line(x, at(0.5), None, Look(WITHIN, 1.0), close=True),
+    ]
+
+
+def convergence(read: MeasureReading) -> Panel:
+    """Mean, standard deviation and yield of the first samples, 2ᵏ of them, with their 95 % intervals."""
+    size = read.row("convergence_samples")
+    rows = [("mean", f"mean{read.in_unit}", read.factor), ("deviation", f"deviation σ{read.in_unit}", read.factor)]
+    rows += [("yield", "yield [%]", 100.0)] if read.limited else []
+    across = Axis("samples", log=True, count=2 if size[-1] < 50 * size[0] else 1,
+                  form=lambda value: f"{value:,.0f}".replace(",", "\u202f"))  # fmt: skip
+    charts: list[Chart] = []
+    for key, title, factor in rows:
+        values = read.row(f"convergence_{key}") * factor
+        low, high = (factor * end for end in _running_interval(read, key, values / factor, size))
+        bounded = np.isfinite(low)
+        marks: list[Mark] = [Line(size, values, "of the first samples", Look(WITHIN, mark="o", size=3.2))]
+        if bounded.sum() > 1:
+            marks.append(Band(size, low, high, "95 % interval", Look(WITHIN, alpha=0.18)))
+        elif bounded.any():
+            middle, half = (0.5 * (high + sign * low)[bounded] for sign in (1, -1))
+            marks.append(Line(size[bounded], middle, "95 % interval", Look(WITHIN, 1.3, "none"), half, half))
+        if np.isfinite(values).any():
+            last = float(values[np.isfinite(values)][-1])
+            marks.append(Rule(last, None, Look("muted", 0.8, "dashed", order=1.5), upright=False))
+        charts.append(Chart(across, Axis(title, count=4), marks, legend=None if charts else Legend()))
+    return Panel("", charts, 4.5)
+
+
+def _running_interval(read: MeasureReading, key: str, values: Array, size: Array) -> tuple[Array, Array]:
+    """95 % intervals at every number of samples; of other than independent ones only of the last."""
+    low, high = read.value(f"{key}_low"), read.value(f"{key}_high")
+    if not read.independent:
+        last = np.arange(len(size)) == len(size) - 1
+        return np.where(last, low, np.nan), np.where(last, high, np.nan)
+    if key == "yield":
+        ends = intervals.share(np.rint(values * size), size)
+        return np.asarray(ends[0], float), np.asarray(ends[1], float)
+    half = 0.5 * (high - low) * np.sqrt(size[-1] / size)
+    return values - half, values + half
+
+
+# ---- figures ------------------------------------------------------------------------------------------------------
+
+MOST_PANELS = 6  # measures of a figure
+TALL, SHORT = 16.0, 2.5  # heights of a whole sheet and of a panel on it, inches
+FEW_BARS = 4  # of a sheet of several measures
+
+
+class Kind(NamedTuple):
+    """A kind of figure: its title, what draws it, whether a measure has it, and what to do if not."""
+
+    title: str
+    panel: Callable[[MeasureReading], Panel]
+    ready: Callable[[MeasureReading], bool]
+    remedy: str
+
+
+KINDS: dict[str, Kind] = {
+    "histogram": Kind("Distribution", histogram, lambda read: read.has("histogram"),
+                      "add samples: --method monte-carlo"),
+    "contributions": Kind("Contributions", contribution_bars, lambda read: read.has("contribution_rss"),
+                          "add --method linear"),
+    "envelope": Kind("Envelope over the drive", envelope, lambda read: read.places is not None,
+                     "use a measure at every position instead of one position"),
+    "convergence": Kind("Convergence", convergence, lambda read: len(read.row("convergence_samples")) > 1,
+                        "add samples: --method monte-carlo"),
+    "sobol": Kind("Sobol indices", sobol_bars, lambda read: read.has("total_order"), "add --method sobol"),
+}  # fmt: skip
+
+
+def drawable(read: MeasureReading) -> list[str]:
+    """The kinds of figures that a measure has something for."""
+    return [name for name, kind in KINDS.items() if kind.ready(read)]
+
+
+def check_kind(kind: str) -> None:
+    """MechanismError if there is no such kind of figure."""
+    if kind not in KINDS:
+        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
+
+
+def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None) -> Figure:
+    """One kind of figure, a panel for each measure, at most MOST_PANELS; all that have it if none is named.
+
+    Raises
+    ------
+    MechanismError : if there is no such kind, none of the measures has it, or they are too many
+    """
+    from trunnion.views.draw import figure as draw
+
+    check_kind(kind)
+    about = KINDS[kind]
+    reads = [read for read in _named(result, measures) if about.ready(read)]
+    if not reads:
+        raise MechanismError(Finding(f"no measure has a figure '{kind}'", "--kind", about.remedy))
+    title = about.title if len(reads) > 1 else f"{about.title}: {reads[0].name}"
+    return draw(title, result, [replace(about.panel(read), title=read.heading) for read in reads])
+
+
+def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
+    """All kinds of figures of one measure; of several, at most MOST_PANELS, the main ones, a row for each measure."""
+    from trunnion.views.draw import figure as draw
+
+    reads = [read for read in _named(result, measures) if drawable(read)]
+    if not reads:
+        raise MechanismError(Finding("no measure has a figure", remedy="add --method linear"))
+    if len(reads) == 1:
+        (read,) = reads
+        panels = [replace(KINDS[kind].panel(read), title=KINDS[kind].title) for kind in drawable(read)]
+        return draw(read.heading, result, panels, columns=2)
+    few = {"histogram": histogram, "contributions": lambda read: contribution_bars(read, FEW_BARS),
+           "envelope": envelope}  # fmt: skip
+    kinds = [kind for kind in few if any(KINDS[kind].ready(read) for read in reads)]
+    height = max(min(3.3, TALL / len(reads)), SHORT)
+    panels = []
+    for k, read in enumerate(reads):
+        for kind in kinds:
+            charts = few[kind](read).charts if KINDS[kind].ready(read) else []
+            if k and kind != "histogram":  # whose colours mean the same as in the first row
+                charts = [replace(chart, legend=None) for chart in charts]
+            panels.append(Panel(f"{read.name}: {KINDS[kind].title.lower()}", charts, height + (0.9 if k == 0 else 0)))
+    return draw("Effect of the tolerances", result, panels, columns=len(kinds))
+
+
+def _named(result: xr.Dataset, measures: Sequence[str] | None) -> list[MeasureReading]:
+    """The measures that are named, or all. MechanismError if they do not fit one figure."""
+    reads = [read for read in readings(result) if measures is None or read.name in measures]
+    if len(reads) > MOST_PANELS:
+        what = f"{len(reads)} measures do not fit one figure"
+        raise MechanismError(Finding(what, "--out", f"name at most {MOST_PANELS} by --measure"))
+    return reads
+
+
+# ---- report -------------------------------------------------------------------------------------------------------
+
+# method: heading, what was done
+NOTES: dict[str, tuple[str, str]] = {
+    "linear": (
+        "Linear",
+        "Sensitivities are derivatives of the measure by every toleranced number, carried exactly through motion and "
+        "forces by dual numbers. The worst case adds their sizes times the limits; RSS is the root of the sum of the "
+        "squares, with the means where the distributions have them. A clearance contributes through the load that "
+        "the pin bears under a unit load at the measure.",
+    ),
+    "worst-case": (
+        "Worst case by search",
+        "The corner that the sensitivities point to is put into the nonlinear model and improved from there; the "
+        "worst corner that was found is run again, and its figure is the one reported. A search finds a bad corner; "
+        "it does not prove that none is worse.",
+    ),
+    "monte-carlo": (
+        "Monte Carlo",
+        "Each sample is a mechanism of its own, drawn from the distributions, assembled and run through the same "
+        "analysis as the nominal one. The numbers come from a counter-based generator (Salmon et al., 2011, "
+        "doi:10.1145/2063384.2063405), so that the same seed gives the same samples however the work is divided.",
+    ),
+    "quasi-monte-carlo": (
+        "Quasi-Monte Carlo",
+        "The samples are points of Sobol's sequence, which fill the space of the tolerances more evenly than random "
+        "ones, scrambled for each of several replicates; the intervals come from the scatter between them by "
+        "Student's t.",
+    ),
+    "sobol": (
+        "Sobol indices",
+        "The share of the variance due to a parameter alone, and with all its interactions (Sobol, 2001, "
+        "doi:10.1016/S0378-4754(00)00270-6). They hold for large and nonlinear deviations, but assume independent "
+        "numbers.",
+    ),
+}
+ON_SAMPLES = (
+    "Samples that cannot be assembled, lock or do not converge count as outside every limit; means, deviations and "
+    "quantiles are those of the others. The interval of a yield is Wilson's (1927, "
+    "doi:10.1080/01621459.1927.10502953), at 95 %. Cp compares the width of the limits with six standard deviations, "
+    "Cpk the distance from the mean to the nearer limit with three."
+)
+
+
+def report(result: xr.Dataset, first: Sequence[Section] = (), kicker: str = "Tolerance analysis of a linkage") -> str:
+    """The whole report as HTML; first: parts that stand before those of the measures, as an allocation has them."""
+    methods = [name for name in map(str, attribute(result, "methods")) if name in NOTES]
+    reads, sampled = readings(result), any("monte-carlo" in name for name in methods)
+    facts = counts((result.sizes["measure"], "measure"), (result.sizes["parameter"], "toleranced parameter"))
+    if sampled:
+        count = int(result["samples"].values) if "samples" in result else int(result.attrs.get("samples", 0))
+        facts += [*counts((count, "sample")), (f"seed {result.attrs.get('seed', '')}", "")]
+    facts.append(("", ", ".join(NOTES[name][0] for name in methods)))
+    lines = set(attribute(result, "missed"))  # what is wrong stands first, once, with its remedy
+    missed = [row for row in attribute(result, "findings") if f"{row['where']}: {row['what']}".lstrip(": ") in lines]
+    together = [*([overview(result)] if len(reads) > 1 else []), *failed(result)]
+    parts = [Section("Measures", tables=together)] if together else []
+    end = [Section("Toleranced parameters", tables=[inputs(result)])]
+    terms = [NOTES[name] for name in methods] + ([("Samples", ON_SAMPLES)] if sampled else [])
+    end += [Section("Methods", terms=terms)] if terms else []
+    parts += [*first, *(_section(result, read) for read in reads)]
+    return page(result, kicker, facts, parts, summary=headline(result), missed=missed, end=end)
+
+
+def _section(result: xr.Dataset, read: MeasureReading) -> Section:
+    """What there is of one measure."""
+    about = "; ".join(part for part in (read.text, f"limits {read.limits_said}" if read.limited else "") if part)
+    pictures = [(f"{KINDS[kind].title} of {read.name}", figure(result, kind, [read.name])) for kind in drawable(read)]
+    corner = corners(read)
+    first, *others = _measure_tables(read, "results")
+    return Section(read.name, about, pictures, [first, *others[:1]], [*others[1:], *([corner] if corner else [])])

@@ -538,12 +538,14 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
            "envelope": envelope}  # fmt: skip
     kinds = [kind for kind in few if any(KINDS[kind].ready(read) for read in reads)]
     height = max(min(3.3, TALL / len(reads)), SHORT)
-    panels = []
+    panels, explained = [], {kind: set[str]() for kind in kinds}
     for k, read in enumerate(reads):
         for kind in kinds:
             charts = few[kind](read).charts if KINDS[kind].ready(read) else []
-            if k and kind != "histogram":  # whose colours mean the same as in the first row
+            labels = {getattr(mark, "name", None) for chart in charts for mark in chart.marks}
+            if kind != "histogram" and labels <= explained[kind]:
                 charts = [replace(chart, legend=None) for chart in charts]
+            explained[kind] |= labels
             panels.append(Panel(f"{read.name}: {KINDS[kind].title.lower()}", charts, height + (0.9 if k == 0 else 0)))
     return draw("Effect of the tolerances", result, panels, columns=len(kinds))
 

@@ -53,7 +53,7 @@ def test_four_bar_has_the_allocation_of_theory_and_six_starts_agree() -> None:
     assert answer.gap < 1e-9
     assert answer.cost * (1 - 1e-9) <= answer.bound <= answer.cost
     falls = 0.45 * np.array(PRICES) * answer.tolerances**-1.45  # −dC/dt is what the rows take, at their prices
-    assert answer.price @ problem.effects.worst == pytest.approx(falls, rel=1e-8)
+    assert answer.price @ problem.effects.worst == pytest.approx(falls, rel=1e-6)
     rng = np.random.default_rng(0)
     for _ in range(6):
         cost, t = slsqp(problem, np.exp(rng.uniform(-9, -5, 4)))

@@ -29,7 +29,7 @@ DRAG = """async ([name, seconds]) => {
   const sent = (kind, dx, target) => target.dispatchEvent(new PointerEvent(kind, {
     bubbles: true, cancelable: true, pointerId: 1, pointerType: "mouse", isPrimary: true,
     button: kind === "pointermove" ? -1 : 0, buttons: kind === "pointerup" ? 0 : 1,
-    clientX: x + dx, clientY: y - dx / 2 }));
+    altKey: true, clientX: x + dx, clientY: y - dx / 2 })); // with Alt it changes lengths on its path too
   const target = handle;
   handle.setPointerCapture = () => {};
   sent("pointerdown", 0, target);

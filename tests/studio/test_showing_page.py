@@ -4,6 +4,7 @@ between its positions, figures without rounding, the frame of the sheet, and no 
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -159,6 +160,39 @@ if CHROMIUM:  # not a skip: what must hold everywhere is tested without a browse
         user.page.mouse.up()
         user.until("s.live.value === null")
         assert user.state("s.text.value") == text
+
+    def test_one_question_of_a_drag_is_under_way_and_the_newest_is_asked_next(user):
+        asked, most = [], [0]
+
+        def watch(socket):
+            socket.on("framesent", lambda content: sent(json.loads(content)))
+            socket.on("framereceived", lambda content: b'"ask": "drag"' in content[:80] and asked.append(None))
+
+        def sent(question):
+            if question["ask"] == "drag":
+                asked.append(question["to"])
+                under_way = sum(1 if one else -1 for one in asked)
+                most[0] = max(most[0], under_way)
+
+        user.page.on("websocket", watch)
+        user.page.reload()
+        user.until("s.solved.value && s.about.value.version")
+        x, y = user.handle("C")
+        user.page.mouse.move(x, y)
+        user.page.keyboard.down("Alt")
+        user.page.mouse.down()
+        for step in range(60):
+            user.page.mouse.move(x - step / 2, y - step)
+        user.until("s.live.value")
+        places = [place for place in asked if place]
+        user.page.mouse.up()
+        user.page.keyboard.up("Alt")
+        user.until("s.live.value === null && s.past.value.length === 1")
+        assert most[0] == 1
+        assert 1 < len(places) < 60
+        assert places[-1][1] == max(place[1] for place in places)
+        there = user.handle("C")
+        assert np.hypot(there[0] - x + 29.5, there[1] - y + 59) < 2
 
     def test_an_answer_to_what_was_changed_since_is_dropped(user):
         """A step that is answered after the text was changed, and a cycle of a text that is no longer there."""

@@ -205,7 +205,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
     if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
         near = index
     head = {"solved": True, "index": near, "changes": _told(sketch, changes)}
-    return head | columns | {"margin": live_margin(back, steps, near)}
+    return head | columns | {"margin": live_margin(back, columns["status"], near)}
 
 
 def _keeps(sketch: Sketch, points: Mapping[str, Mapping[str, Array]], index: int) -> bool:
@@ -223,7 +223,8 @@ def _try(asked: Asked) -> dict[str, Any]:
     index = int(asked.get("index") or 0) % steps
     values = {str(path): float(value) for path, value in dict(asked["values"]).items()}
     back = solved_with(state, values, steps, asked.get("friction") != "off")
-    return {"solved": True, "index": index} | live_columns(back, steps) | {"margin": live_margin(back, steps, index)}
+    columns = live_columns(back, steps)
+    return {"solved": True, "index": index} | columns | {"margin": live_margin(back, columns["status"], index)}
 
 
 def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:

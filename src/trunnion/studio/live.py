@@ -5,7 +5,7 @@ What does not change from answer to answer, as the positions before the drag, is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -92,9 +92,10 @@ def live_columns(back: Backward, steps: int) -> dict[str, Any]:
 
 
 @np.errstate(all="ignore")
-def live_margin(back: Backward, steps: int, index: int) -> dict[str, Any]:
-    """The locking margin of one position, where it has one, and whether it is beyond that."""
-    if status_of(back, (steps,))[index] > Status.LOCKED:
+def live_margin(back: Backward, status: Sequence[int], index: int) -> dict[str, Any]:
+    """The locking margin of one position, where it has one, and whether it is beyond that; status: of all positions."""
+    steps = len(status)
+    if status[index] > Status.LOCKED:
         return {"value": None, "beyond": False}
     margin = np.broadcast_to(np.asarray(margin_in(back, NEAR, np.arange(steps) == index), float), (steps,))
     return {"value": min(float(margin[index]), NEAR), "beyond": bool(margin[index] > NEAR)}

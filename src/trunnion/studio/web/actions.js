@@ -145,16 +145,25 @@ export function changed(kind, fields) {
   return link.ask(kind, { text: state.text.value, steps: STEPS, friction, locked: state.locked.value, fine: sheet.fine(), ...fields });
 }
 
-/** Calls `act` with what is given to it, one after another and only with the newest; the promise ends when it rests. */
-export function newest(act) {
+/**
+ * A function that asks about the newest of what it is called with, one question at a time, until the hand rests. An answer is shown,
+ * `show(answer, asked)`, while Python works at the next.
+ */
+export function newest(ask, show) {
   let [wanted, working] = [null, null];
   const work = async () => {
+    let last = () => {};
     while (wanted !== null) {
-      const next = wanted;
+      const asked = wanted;
       wanted = null;
-      await act(next);
+      const coming = ask(asked);
+      await null; // it is sent
+      last();
+      const answer = await coming;
+      last = () => answer && show(answer, asked);
     }
     working = null;
+    last();
   };
   return (next) => {
     wanted = next;

@@ -17,7 +17,7 @@ export function listenToPointer(root, view) {
   const hand = { held: null };
   const fingers = new Map(); // where they are, px, by pointer
   const placed = (event) => {
-    const box = root.getBoundingClientRect();
+    const box = hand.held?.box ?? root.getBoundingClientRect(); // to measure it at each step of a drag takes longer than to draw
     return [event.clientX - box.left, event.clientY - box.top];
   };
   const follow = (event) => {
@@ -34,7 +34,7 @@ export function listenToPointer(root, view) {
     if (fingers.size > 1) return letGo(hand);
     if (event.button > 2 || hand.held) return;
     root.setPointerCapture(event.pointerId);
-    hand.held = { start: placed(event), last: placed(event), spot, part, panning, moved: false };
+    hand.held = { box: root.getBoundingClientRect(), start: placed(event), last: placed(event), spot, part, panning, moved: false };
   });
   root.addEventListener("pointermove", (event) => {
     if (fingers.size > 1 && fingers.has(event.pointerId)) return spread(fingers, event.pointerId, placed(event));
@@ -114,7 +114,8 @@ function takeHold(view, held) {
   const { sketched, scene } = shown.peek();
   const path = sketched || state.locked.value.length ? null : pathOf(scene, key); // a locked joint stays where it is
   held.joint = { name, key, index: view.posed, asked: null, told: "", sketched, base, together: sketched ? together(kind, name, base.places) : [], path, scene, crank: Boolean(path) && driven(scene, name, key) };
-  held.joint.ask = newest((to) => follow(held.joint, to));
+  const { joint } = held;
+  joint.ask = newest((to) => changed("drag", { point: name, index: joint.index, to, keep: joint.keep }), (found, to) => follow(joint, found, to));
   state.selection.value = { kind, name };
 }
 
@@ -175,10 +176,9 @@ function dragTo(joint, at, scale, alt) {
   joint.asked = joint.ask(joint.to);
 }
 
-/** Show the mechanism with a joint at a place. */
-async function follow(joint, to) {
-  const found = await changed("drag", { point: joint.name, index: joint.index, to, keep: joint.keep });
-  if (!found || joint.posed || joint.left) return;
+/** Show the mechanism with a joint at a place, as it was found. */
+function follow(joint, found, to) {
+  if (joint.posed || joint.left) return;
   if (found.error) return state.say(found.error, true);
   joint.told = wordsOf(found);
   batch(() => {

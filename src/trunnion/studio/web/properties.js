@@ -154,12 +154,16 @@ function Parts({ kind, names }) {
   </div>`;
 }
 
-/** Show the mechanism with a dimension so many times as long. */
-async function tried(name, times) {
-  const path = `dimensions.${name}`;
+/** A dimension of the present text that is so many times as long, SI. */
+function dimensionTimes(name, times) {
   const { text, numbers } = state.answer.value;
-  const found = await changed("try", { values: { [path]: times * numbers[path] }, index: state.index.peek() });
-  if (!found || text !== state.text.value) return;
+  const path = `dimensions.${name}`;
+  return { text, path, value: times * numbers[path] };
+}
+
+/** Show the mechanism with a number that was tried, unless the text has changed since. */
+function showTried(found, text) {
+  if (text !== state.text.value) return;
   if (found.error) state.say(found.error, true);
   else state.live.value = found;
 }
@@ -171,11 +175,14 @@ function Dimension({ name, value, findings }) {
   const [pulled, setPulled] = useState(null);
   const start = pulled?.from ?? number;
   const [shown, asked] = [useRef(null), useRef(null)];
-  shown.current ??= newest(({ value, before }) => tried(name, value / before));
+  shown.current ??= newest(
+    ({ path, value }) => changed("try", { values: { [path]: value }, index: state.index.peek() }),
+    (found, { text }) => showTried(found, text),
+  );
   const typedBy = ({ target }) => Number(Number(target.value).toPrecision(4));
   const pull = (event) => {
     setPulled({ from: start, text: `${typedBy(event)} ${start.rest}`.trim() });
-    if (state.solved.value && !state.spatial.value) asked.current = shown.current({ value: typedBy(event), before: start.value });
+    if (state.solved.value && !state.spatial.value) asked.current = shown.current(dimensionTimes(name, typedBy(event) / start.value));
   };
   const back = async (event) => {
     if (typedBy(event) !== start.value) return; // it is released elsewhere

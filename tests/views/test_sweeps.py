@@ -10,9 +10,9 @@ import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 from trunnion import MechanismError, Status, save
+from trunnion.views.scales import Scale, arrange, written
 from trunnion.views.sweep.figure import figure
 from trunnion.views.sweep.panels import on_scale
-from trunnion.views.sweep.scales import Scale, arrange, written
 from trunnion.views.sweep.tables import tables
 
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}

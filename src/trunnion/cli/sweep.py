@@ -97,7 +97,7 @@ def sweep(
     Efficiency, drive effort, reactions, friction, locking margin and measures of the model.
     """
     from trunnion.studies.sweep.study import sweep as run
-    from trunnion.views.sweep.scales import check_measure
+    from trunnion.views.scales import check_measure
 
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
@@ -137,7 +137,7 @@ def sweep(
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
     """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
-    from trunnion.views.sweep.scales import check_axes, check_kind
+    from trunnion.views.scales import check_axes, check_kind
 
     check_kind(kind)
     counts = {name: points({name: values}) for name, values in grid.items()}

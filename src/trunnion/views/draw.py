@@ -8,24 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from trunnion.views.charts import Axis, Band, Bars, Cells, Chart, Line, Look, Note, Panel, Rule, Stairs, Stripe
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, MUTED, PALETTE, RULE, SHADE, WIDTH, along, dress, legend, new
-from trunnion.views.common.lettering import plain
+from trunnion.views.common.lettering import Sheet, plain
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["chart", "figure", "grid", "line_style"]
+__all__ = ["chart", "colour", "figure", "grid", "line_style", "small"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
                           "dotted": (0, (1, 1.5)), "none": "none"}  # fmt: skip
+# without the end that fades on white
+RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
 BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
@@ -50,15 +56,30 @@ def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int
         if not panel.charts:  # of a measure that lacks this figure
             continue
         if panel.title and len(panels) > 1:
-            place.suptitle(plain(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
-        ratios = list(panel.parts) or [1.0] * len(panel.charts)
-        grid = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-        for axes, one in zip(grid, panel.charts, strict=True):
-            chart(axes, one, min(1.0, sheet.get_figwidth() / columns / WIDTH))
-            if axes is not grid[-1]:
-                axes.set_xlabel("")
-                axes.tick_params(labelbottom=False)
+            place.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
+        _panel(place, panel, min(1.0, sheet.get_figwidth() / columns / WIDTH))
     return sheet
+
+
+def small(panel: Panel, width: float = 4.4) -> Figure:
+    """One panel for a page that has several side by side, without the name of the mechanism."""
+    layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, hspace=0.03, wspace=0.03)
+    sheet = Sheet(figsize=(width, panel.height), dpi=150, facecolor="white", layout=layout)
+    FigureCanvasAgg(sheet)
+    sheet.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9, color=INK)
+    _panel(sheet, panel, width / WIDTH)
+    return sheet
+
+
+def _panel(place: FigureBase, panel: Panel, wide: float) -> None:
+    """The charts of a panel below one another."""
+    ratios = list(panel.parts) or [1.0] * len(panel.charts)
+    axes_of = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    for axes, one in zip(axes_of, panel.charts, strict=True):
+        chart(axes, one, wide)
+        if axes is not axes_of[-1]:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
 
 
 def grid(
@@ -93,6 +114,12 @@ def chart(axes: Axes, one: Chart, wide: float = 1.0) -> None:
         _mark(mark, axes, one)
     _limits(axes, one)
     _titles(axes, one)
+    if one.colours is not None:
+        scale = one.colours
+        norm = (LogNorm if scale.log else Normalize)(scale.low, scale.high)
+        bar = axes.figure.colorbar(ScalarMappable(norm, RISING), ax=axes, pad=0.02, aspect=30)
+        bar.set_label(plain(scale.title), fontsize=9, color=INK)
+        bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
     if one.legend is not None:
         legend(axes, one.legend.most, int(wide * one.legend.room), one.legend.least)
 
@@ -122,8 +149,8 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
         (axes.set_xscale if name == "x" else axes.set_yscale)("log")
     if axis.places is not None:
         side.set_ticks([at for at, _ in axis.places], [plain(text) for _, text in axis.places])
-        if axis.turned:
-            side.set_tick_params(labelrotation=axis.turned)
+        for label in side.get_ticklabels() if axis.turned else ():
+            label.set(rotation=axis.turned, ha="right" if axis.turned < 90 else "center", rotation_mode="anchor")
     elif axis.log and axis.count:
         subs = (1.0, 2.0, 5.0) if axis.count > 1 else (1.0,)
         side.set_major_locator(LogLocator(subs=subs, numticks=6))
@@ -151,8 +178,10 @@ def _limits(axes: Axes, one: Chart) -> None:
 # ---- marks --------------------------------------------------------------------------------------------------------
 
 
-def colour(name: int | str) -> str:
-    """A colour of the palette, of its names, or as it is."""
+def colour(name: int | float | str) -> str:
+    """A colour of the palette, of the scale of colours, of the names, or as it is."""
+    if isinstance(name, float):
+        return to_hex(RISING(name))
     return PALETTE[name % len(PALETTE)] if isinstance(name, int) else COLOURS.get(name, name)
 
 

@@ -14,6 +14,7 @@ from trunnion.errors import Status
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, SHADE, outside, style_of
 from trunnion.views.common.lettering import plain
+from trunnion.views.scales import Scale, cause
 from trunnion.views.sweep.panels import (
     ALIKE,
     NOTHING,
@@ -27,7 +28,6 @@ from trunnion.views.sweep.panels import (
     tell,
     ticks,
 )
-from trunnion.views.sweep.scales import Scale, cause
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

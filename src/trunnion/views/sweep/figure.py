@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from trunnion.results.scales import without_noise
+from trunnion.views.scales import KINDS, check_kind
 from trunnion.views.sweep import curves as sweep_curves
 from trunnion.views.sweep import map as sweep_map
 from trunnion.views.sweep.panels import board, field
-from trunnion.views.sweep.scales import KINDS, check_kind
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -22,8 +22,8 @@ from matplotlib.ticker import MaxNLocator
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED, outside
+from trunnion.views.scales import Scale, cause
 from trunnion.views.sweep.panels import ALIKE, NOTHING, Board, Field, on_scale, ring, scale_of_colours, tell, ticks
-from trunnion.views.sweep.scales import Scale, cause
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

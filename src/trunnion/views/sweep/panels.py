@@ -19,7 +19,7 @@ from trunnion.views.common.lettering import plain
 from trunnion.views.common.peaks import ease_of_status, usual_peak
 from trunnion.views.cycle.deviations import angle_scale
 from trunnion.views.cycle.deviations_plot import LOST
-from trunnion.views.sweep.scales import Arrangement, Scale, arrange, grid, meaning, statuses, thinned, written
+from trunnion.views.scales import Arrangement, Scale, arrange, grid, meaning, statuses, thinned, written
 
 if TYPE_CHECKING:
     import xarray as xr

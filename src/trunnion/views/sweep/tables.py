@@ -14,7 +14,7 @@ from trunnion.errors import Status
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.sweep.scales import Arrangement, arrange, cause, grid, statuses, thinned
+from trunnion.views.scales import Arrangement, arrange, cause, grid, statuses, thinned
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

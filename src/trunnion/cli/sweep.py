@@ -118,13 +118,13 @@ def sweep(
 
     def draw(path: Path) -> Any:
         from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.sweep.figure import figure
+        from trunnion.views.sweep import figure
 
         return figure(whole_peaks(result, uncut), files[path], x or "", family or "", kind)
 
     def page() -> str:
         from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.sweep.report import report as html
+        from trunnion.views.sweep import report as html
 
         return html(whole_peaks(result, uncut), measures, x or "", family or "", kind)
 
@@ -182,7 +182,7 @@ def _plain(name: str) -> str:
 
 def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequence[str], x: str, family: str) -> None:
     """The tables, and how many points they leave out."""
-    from trunnion.views.sweep.tables import tables
+    from trunnion.views.sweep import tables
 
     shown = tables(result, measures, x, family, console().width)
     show_tables(mechanism.name or str(file), shown, apart=False)

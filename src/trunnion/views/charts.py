@@ -29,7 +29,8 @@ Array = NDArray[np.float64]
 class Look:
     """How a mark looks. colour: a number of the palette, a name, "#rrggbb", or a share of the scale
     of colours; mark: a sign at each point, hollow or
-    filled; hatch: of an area; order: what has a larger one lies above.
+    filled; hatch: of an area; order: what has a larger one lies above; beyond: also over
+    the frame.
     """
 
     colour: int | float | str = 0
@@ -41,6 +42,7 @@ class Look:
     alpha: float | None = None
     hatch: str = ""
     order: float = 2.0
+    beyond: bool = False
 
     def but(self, **changes: object) -> Look:
         """The same with something changed."""
@@ -141,8 +143,12 @@ Mark = Line | Band | Stairs | Bars | Rule | Stripe | Note | Cells
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a chart. limits: its ends, None where the marks decide; places: marks with their names; whole: marks
-    at whole numbers only; count: of marks; form: how a number is written; turned: names stand upright."""
+    """An axis of a chart.
+
+    limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
+    with names, which may be turned by so many degrees; whole: marked at whole numbers only; count: of its marks; form:
+    how a number is written; powers: very large and small numbers by a common power of ten.
+    """
 
     title: str = ""
     limits: tuple[float | None, float | None] = (None, None)
@@ -153,6 +159,7 @@ class Axis:
     form: Callable[[float], str] | None = None
     turned: float = 0.0
     margin: float | None = None
+    powers: bool = False
 
 
 class Legend(NamedTuple):

@@ -27,10 +27,10 @@ __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report
 REPORTS = {
     "cycle": "cycle.report", "tolerance": "tolerance", "allocation": "allocation",
     "comparison": "compare", "identification": "identify",
-    "motion": "motion.report", "play": "play", "sweep": "sweep.report", "assembly": "assembly.report",
+    "motion": "motion.report", "play": "play", "sweep": "sweep", "assembly": "assembly.report",
 }  # fmt: skip
 FIGURES = {
-    "cycle": "cycle.plots", "sweep": "sweep.figure", "play": "play", "assembly": "assembly.figure",
+    "cycle": "cycle.plots", "sweep": "sweep", "play": "play", "assembly": "assembly.figure",
     "tolerance": "tolerance", "allocation": "allocation", "comparison": "compare",
     "identification": "identify", "motion": "motion.figure",
 }  # fmt: skip

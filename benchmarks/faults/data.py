@@ -241,7 +241,7 @@ _RESULTS = (
 _VIEWS = (
     Fault(
         "efficiency-difference-sign",
-        "views/compare/tables.py",
+        "views/compare.py",
         "(measured, wide, model, measured - model)",
         "(measured, wide, model, model - measured)",
         ("tests/views/test_compare.py", "-k", "tables or difference"),

@@ -16,8 +16,7 @@ from manual.conftest import Outcome, Run
 from played import four_bar
 from trunnion.results.attributes import summary_of
 from trunnion.results.scales import scales_in
-from trunnion.views.play.figure import figure
-from trunnion.views.play.tables import tables
+from trunnion.views.play import figure, tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SLIDER = EXAMPLES / "toleranced-slider-crank.yaml"

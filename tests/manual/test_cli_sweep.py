@@ -13,8 +13,8 @@ import xarray as xr
 
 import trunnion
 from manual.conftest import Run
-from trunnion.views.sweep import figure as view
-from trunnion.views.sweep.tables import tables
+from trunnion.views import sweep as view
+from trunnion.views.sweep import tables
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FOUR_BAR = EXAMPLES / "durango-fourbar.yaml"

@@ -16,7 +16,7 @@ from measured_data.four_bar import FOUR_BAR, rocker
 from trunnion.cli.identify import _write_model
 from trunnion.rig.reading.measurement import Accuracy
 from trunnion.rig.reading.read import read_measured
-from trunnion.views.identify.tables import sensors
+from trunnion.views.identify import sensors
 
 CHANNELS = {
     "psi": {"column": "psi", "measures": "rotation:D", "unit": "deg"},

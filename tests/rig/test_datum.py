@@ -12,7 +12,7 @@ import trunnion
 from measured_data.recording import mapping, recorded, text_of
 from trunnion.rig.judge import Verdict
 from trunnion.rig.reading.read import read_measured
-from trunnion.views.compare.tables import sensors
+from trunnion.views.compare import sensors
 
 CRANK, ROD, AHEAD, DATUM = 40.0, 160.0, 10.0, 120.0  # mm
 GAIN, ZERO = 0.002, 0.2  # stated: relative, mm

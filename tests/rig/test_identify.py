@@ -27,7 +27,7 @@ from trunnion.rig.identification.unknowns import described, limits, unknowns
 from trunnion.rig.reading.measurement import Accuracy, Condition, Measurement, Signal
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import prepare
-from trunnion.views.identify.figure import KINDS, figure
+from trunnion.views.identify import KINDS, figure
 
 FRICTION = "joint_defaults.friction.coefficient"
 SPEEDS = [{"A.speed": speed} for speed in (2.0, 4.0, 6.0, 8.0, 10.0)]

@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
 
 import trunnion
 from trunnion.errors import Finding
-from trunnion.views.identify.figure import figure
-from trunnion.views.identify.report import report
+from trunnion.views.identify import figure, report
 
 GUIDE = "S.friction.coefficient"
 MODEL = "examples/slider-crank.yaml"
@@ -127,7 +125,7 @@ def test_what_is_expected_is_the_scatter_of_what_is_used(folder: Path) -> None:
         assert result["rms_expected"].values[0, k] == pytest.approx(scatter, rel=1e-3)
 
 
-def test_the_legend_of_the_residuals_stands_above_the_name_of_the_condition(
+def test_the_legend_of_the_residuals_stands_below_the_name_of_the_condition(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     result = identified(folder)
@@ -136,11 +134,11 @@ def test_the_legend_of_the_residuals_stands_above_the_name_of_the_condition(
     first = sheet.axes[0]
     legend = first.get_legend()
     assert legend is not None
-    title = next(one for one in first.get_children() if isinstance(one, Text) and "600 rpm" in one.get_text())
-    assert legend.get_window_extent().y0 >= title.get_window_extent().y1 - 1
+    title = next(part._suptitle for part in sheet.subfigs if "600 rpm" in part.get_suptitle())
+    assert legend.get_window_extent().y1 <= title.get_window_extent().y0 + 1
     assert len(sheet.axes) == 2 * 2
     assert "curves" not in sheet.get_suptitle()
-    monkeypatch.setattr("trunnion.views.identify.figure.MOST_PANELS", 1)
+    monkeypatch.setattr("trunnion.views.identify.MOST_PANELS", 1)
     assert "1 of 2 curves" in figure(result, "residuals").get_suptitle()
 
 
@@ -161,7 +159,7 @@ def test_residuals_of_cycles_driven_forward_and_backward_are_drawn_over_the_angl
 
 def test_the_report_has_the_model_and_counts_what_was_found_in_the_data(folder: Path) -> None:
     result = identified(folder)
-    model = report(result).partition("<h2>Model</h2>")[2]
+    model = report(result).partition("<h2>Parameters</h2>")[2]
     assert GUIDE in model
     assert len(re.findall(r"<tr>", model)) > 20
     warned = [{"severity": "warning", "where": "angle", "what": "odd", "remedy": "", "code": "x", "file": "run-1.csv"}]

@@ -14,8 +14,8 @@ from trunnion.views.cycle.deviations import angle_scale, broken, continued, loss
 from trunnion.views.cycle.deviations_plot import error, with_worst_case
 from trunnion.views.cycle.plots import PLOTS, READY, drawable, save
 from trunnion.views.cycle.seat_plot import FACTORS, PIN
-from trunnion.views.sweep.figure import figure as sweep_figure
-from trunnion.views.sweep.tables import tables
+from trunnion.views.sweep import figure as sweep_figure
+from trunnion.views.sweep import tables
 
 INCH = 0.0254
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from trunnion import assemble, play, read, sweep
 from trunnion.cli.app import app
 from trunnion.errors import MechanismError
-from trunnion.views.play.tables import tables as play_tables
+from trunnion.views.play import tables as play_tables
 from trunnion.views.shown import report
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -10,10 +10,8 @@ import xarray as xr
 from stand_in_sweeps import ANGLE, DEG, RPM, SPEED, cardan, scale, swept
 
 from trunnion import MechanismError, Status, save
-from trunnion.views.sweep.figure import figure
-from trunnion.views.sweep.panels import on_scale
-from trunnion.views.sweep.scales import Scale, arrange, written
-from trunnion.views.sweep.tables import tables
+from trunnion.views.scales import Scale, arrange, written
+from trunnion.views.sweep import figure, on_scale, tables
 
 GRID = {"misalignment": ANGLE, "input.speed": SPEED}
 FEW = scale([50, 500, 1000, 1500], "rad/s", "rpm", RPM)

@@ -79,8 +79,6 @@ def compare(
 
 def _show(result: xr.Dataset) -> None:
     """Results and efficiencies; the first rows of many."""
-    from trunnion.views.compare.tables import efficiencies, explained, results
+    from trunnion.views.compare import tables
 
-    first = results(result).titled(f"{result.attrs['comparing']}: measured minus model")
-    shown = [one for one in (first, explained(result), efficiencies(result)) if one is not None]
-    show_tables(str(result.attrs["name"]), shown, most=MOST_ROWS, rest="FILE.figures.csv")
+    show_tables(str(result.attrs["name"]), tables(result), most=MOST_ROWS, rest="FILE.figures.csv")

@@ -167,7 +167,7 @@ def held_out(texts: list[str]) -> float | list[str] | None:
 
 def _show(result: xr.Dataset) -> None:
     """What was found; of long tables the first rows."""
-    from trunnion.views.identify.tables import tables
+    from trunnion.views.identify import tables
 
     show_tables(str(result.attrs["name"]), tables(result), most=MOST_ROWS, rest="FILE.residuals.csv")
 

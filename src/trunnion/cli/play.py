@@ -54,7 +54,7 @@ def play(
 
     def draw(path: Path) -> Any:
         from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.play.figure import MOST_PANELS, figure
+        from trunnion.views.play import MOST_PANELS, figure
 
         if result.sizes["measure"] > MOST_PANELS:
             what = f"{result.sizes['measure']} measures do not fit one figure"
@@ -62,13 +62,13 @@ def play(
         return figure(whole_peaks(result, uncut))
 
     def show() -> None:
-        from trunnion.views.play.tables import tables
+        from trunnion.views.play import tables
 
         show_tables(mechanism.name, tables(result), apart=False)
 
     def page() -> str:
         from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.play.report import report as html
+        from trunnion.views.play import report as html
 
         return html(whole_peaks(result, uncut))
 

@@ -97,7 +97,7 @@ def sweep(
     Efficiency, drive effort, reactions, friction, locking margin and measures of the model.
     """
     from trunnion.studies.sweep.study import sweep as run
-    from trunnion.views.sweep.scales import check_measure
+    from trunnion.views.scales import check_measure
 
     grid = over(over_)
     measures = list(dict.fromkeys(measure or ["efficiency"]))
@@ -118,13 +118,13 @@ def sweep(
 
     def draw(path: Path) -> Any:
         from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.sweep.figure import figure
+        from trunnion.views.sweep import figure
 
         return figure(whole_peaks(result, uncut), files[path], x or "", family or "", kind)
 
     def page() -> str:
         from trunnion.views.common.peaks import whole_peaks
-        from trunnion.views.sweep.report import report as html
+        from trunnion.views.sweep import report as html
 
         return html(whole_peaks(result, uncut), measures, x or "", family or "", kind)
 
@@ -137,7 +137,7 @@ def sweep(
 
 def _check_figures(grid: Mapping[str, Any], x: str, family: str, kind: str) -> None:
     """MechanismError for figures that cannot be drawn of a grid, before anything is computed."""
-    from trunnion.views.sweep.scales import check_axes, check_kind
+    from trunnion.views.scales import check_axes, check_kind
 
     check_kind(kind)
     counts = {name: points({name: values}) for name, values in grid.items()}
@@ -182,7 +182,7 @@ def _plain(name: str) -> str:
 
 def _show(result: xr.Dataset, mechanism: Mechanism, file: Path, measures: Sequence[str], x: str, family: str) -> None:
     """The tables, and how many points they leave out."""
-    from trunnion.views.sweep.tables import tables
+    from trunnion.views.sweep import tables
 
     shown = tables(result, measures, x, family, console().width)
     show_tables(mechanism.name or str(file), shown, apart=False)

@@ -5,28 +5,35 @@ A chart has two axes and marks, drawn in order. Colours are numbers of the palet
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trunnion.views.common.cycle import Abscissa
+from trunnion.errors import Status
+from trunnion.views.common.cycle import Abscissa, intervals
 
-__all__ = ["Axis", "Band", "Bars", "Cells", "Chart", "Legend", "Line", "Look", "Mark", "Note", "Panel", "Rule",
-           "Stairs", "Stripe"]  # fmt: skip
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark", "Note", "Panel",
+           "Rule", "Stairs", "Stripe", "silent"]  # fmt: skip
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a mark looks. colour: a number of the palette, a name, or "#rrggbb"; mark: a sign at each point, hollow or
-    filled; hatch: of an area; order: what has a larger one lies above.
+    """How a mark looks. colour: a number of the palette, a name, "#rrggbb", or a share of the scale
+    of colours; mark: a sign at each point, hollow or
+    filled; hatch: of an area; order: what has a larger one lies above; beyond: also over
+    the frame.
     """
 
-    colour: int | str = 0
+    colour: int | float | str = 0
     width: float = 1.6
     dash: Literal["solid", "long", "dashed", "short", "dotted", "none"] = "solid"
     mark: str = ""
@@ -35,6 +42,7 @@ class Look:
     alpha: float | None = None
     hatch: str = ""
     order: float = 2.0
+    beyond: bool = False
 
     def but(self, **changes: object) -> Look:
         """The same with something changed."""
@@ -135,8 +143,12 @@ Mark = Line | Band | Stairs | Bars | Rule | Stripe | Note | Cells
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a chart. limits: its ends, None where the marks decide; places: marks with their names; whole: marks
-    at whole numbers only; count: of marks; form: how a number is written; turned: names stand upright."""
+    """An axis of a chart.
+
+    limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
+    with names, which may be turned by so many degrees; whole: marked at whole numbers only; count: of its marks; form:
+    how a number is written; powers: very large and small numbers by a common power of ten.
+    """
 
     title: str = ""
     limits: tuple[float | None, float | None] = (None, None)
@@ -147,6 +159,7 @@ class Axis:
     form: Callable[[float], str] | None = None
     turned: float = 0.0
     margin: float | None = None
+    powers: bool = False
 
 
 class Legend(NamedTuple):
@@ -158,6 +171,22 @@ class Legend(NamedTuple):
 
 
 LEGEND = Legend()
+
+
+class ColourScale(NamedTuple):
+    """What the colours of a chart mean: a number from low to high."""
+
+    title: str
+    low: float
+    high: float
+    log: bool = False
+
+    def share(self, value: float) -> float:
+        """The place of a value on the scale, from 0 to 1."""
+        if self.low == self.high:
+            return 0.5
+        low, high, at = (math.log(v) if self.log else v for v in (self.low, self.high, value))
+        return (at - low) / (high - low)
 
 
 @dataclass(frozen=True)
@@ -172,6 +201,7 @@ class Chart:
     legend: Legend | None = LEGEND
     title: str = ""
     aside: str = ""
+    colours: ColourScale | None = None
     bare: bool = False  # without a line and marks at the left
 
 
@@ -183,3 +213,27 @@ class Panel:
     charts: Sequence[Chart]
     height: float = 3.5
     parts: Sequence[float] = field(default=())
+
+
+def silent(result: xr.Dataset, over: Abscissa, said: bool = True) -> list[Mark]:
+    """Stripes where positions have no answer, with each cause once; hatched where a pin loses contact.
+
+    Parameters
+    ----------
+    result : of one cycle
+    over : what it is drawn over
+    said : whether the causes are written
+    """
+    x, marks, causes = over.values, list[Mark](), set[str]()
+    half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
+    lost = [run for run in intervals(result, Status.CONTACT_LOST) if run.status == Status.CONTACT_LOST]
+    for run in [*lost, *intervals(result)]:
+        low, high = sorted((float(x[run.start]), float(x[run.stop - 1])))
+        hatched = run in lost
+        text = "not valid" if hatched else run.text.split(":")[0]
+        look = Look("shade", hatch="////" if hatched else "", order=0.5)
+        marks.append(Stripe(low - half, high + half, text if said and text not in causes else "", look))
+        causes.add(text)
+        if not hatched:
+            marks += [Rule(end, None, Look("muted", 0.6, "short", order=0.6)) for end in (low - half, high + half)]
+    return marks

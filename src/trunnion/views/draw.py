@@ -4,28 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize, to_hex
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
-from trunnion.views.charts import Axis, Band, Bars, Cells, Chart, Line, Look, Note, Panel, Rule, Stairs, Stripe
+from trunnion.views.charts import (
+    Axis,
+    Band,
+    Bars,
+    Cells,
+    Chart,
+    ColourScale,
+    Line,
+    Look,
+    Note,
+    Panel,
+    Rule,
+    Stairs,
+    Stripe,
+)
 from trunnion.views.common.cycle import Abscissa, Array, thin
 from trunnion.views.common.figures import INK, MUTED, PALETTE, RULE, SHADE, WIDTH, along, dress, legend, new
-from trunnion.views.common.lettering import plain
+from trunnion.views.common.lettering import Sheet, plain
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.figure import Figure, FigureBase
 
-__all__ = ["chart", "figure", "grid", "line_style"]
+__all__ = ["Board", "chart", "colour", "figure", "grid", "line_style", "small"]
 
 COLOURS = {"ink": INK, "muted": MUTED, "rule": RULE, "shade": SHADE, "limit": "#a1260d", "pale": "#b9c3cd"}
 DASHES: dict[str, Any] = {"solid": "-", "long": (0, (5, 2)), "dashed": (0, (3, 2)), "short": (0, (2, 1.5)),
                           "dotted": (0, (1, 1.5)), "none": "none"}  # fmt: skip
+# without the end that fades on white
+RISING: Colormap = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.9, 256)), "viridis to green")
 PAGE = {1: WIDTH, 2: 12.6, 3: 14.4}  # width of a figure by its columns, inches
 BOX: dict[str, Any] = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
@@ -50,15 +72,30 @@ def figure(title: str, result: xr.Dataset, panels: Sequence[Panel], columns: int
         if not panel.charts:  # of a measure that lacks this figure
             continue
         if panel.title and len(panels) > 1:
-            place.suptitle(plain(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
-        ratios = list(panel.parts) or [1.0] * len(panel.charts)
-        grid = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-        for axes, one in zip(grid, panel.charts, strict=True):
-            chart(axes, one, min(1.0, sheet.get_figwidth() / columns / WIDTH))
-            if axes is not grid[-1]:
-                axes.set_xlabel("")
-                axes.tick_params(labelbottom=False)
+            place.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9.5, color=INK)
+        _panel(place, panel, min(1.0, sheet.get_figwidth() / columns / WIDTH))
     return sheet
+
+
+def small(panel: Panel, width: float = 4.4) -> Figure:
+    """One panel for a page that has several side by side, without the name of the mechanism."""
+    layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, hspace=0.03, wspace=0.03)
+    sheet = Sheet(figsize=(width, panel.height), dpi=150, facecolor="white", layout=layout)
+    FigureCanvasAgg(sheet)
+    sheet.suptitle(_lines(panel.title), x=0.012, ha="left", fontsize=9, color=INK)
+    _panel(sheet, panel, width / WIDTH)
+    return sheet
+
+
+def _panel(place: FigureBase, panel: Panel, wide: float) -> None:
+    """The charts of a panel below one another."""
+    ratios = list(panel.parts) or [1.0] * len(panel.charts)
+    axes_of = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    for axes, one in zip(axes_of, panel.charts, strict=True):
+        chart(axes, one, wide)
+        if axes is not axes_of[-1]:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
 
 
 def grid(
@@ -77,6 +114,83 @@ def grid(
     return sheet
 
 
+class Board(NamedTuple):
+    """Panels that share both axes, labelled along their outer edges, and a strip above several for their legend."""
+
+    sheet: Figure
+    axes: list[Axes]
+    columns: int
+    strip: Axes | None
+
+    @classmethod
+    def new(cls, title: str, result: xr.Dataset, count: int, columns: int) -> Board:
+        """Empty panels, so many, under a title."""
+        rows = -(-count // columns)
+        height = (4.3 if count == 1 else 1.6 + {1: 2.5, 2: 2.1}.get(rows, 1.9) * rows) + 0.2 * title.count("\n")
+        sheet = new(title, result, height)
+        space = sheet.add_gridspec(rows + 1, columns, height_ratios=[0.01] + [1.0] * rows)
+        panels: list[Axes] = []
+        for k in range(count):
+            shared = panels[0] if panels else None
+            where = space[1 + k // columns, k % columns] if count > 1 else space[:, :]
+            panels.append(sheet.add_subplot(where, sharex=shared, sharey=shared))
+        strip = sheet.add_subplot(space[0, :]) if count > 1 else None
+        if strip is not None:
+            strip.set_axis_off()
+        return cls(sheet, panels, columns, strip)
+
+    def draw(self, k: int, one: Chart) -> Axes:
+        """The chart of the panel k; titles of its axes stand at the outer panels alone."""
+        axes, lowest, leftmost = self.axes[k], k + self.columns >= len(self.axes), k % self.columns == 0
+        chart(axes, one)
+        axes.tick_params(labelbottom=lowest, labelleft=leftmost)
+        if not lowest:
+            axes.set_xlabel("")
+        if not leftmost:
+            axes.set_ylabel("")
+        axes.title.set_fontsize(8.5)
+        axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=(8.5, 8.5, 8.5, 8.0, 7.2)[self.columns])
+        return axes
+
+    def add(self, k: int, one: Chart) -> None:
+        """The marks of a chart, over what the panel k has."""
+        for mark in one.marks:
+            _mark(mark, self.axes[k], one)
+
+    def finish(self, colours: ColourScale | None = None) -> None:
+        """A legend of everything that is named in any panel; the scale of their colours beside all."""
+        if self.strip is None:
+            legend(self.axes[0], least=1)
+        else:
+            named: dict[str, Any] = {}
+            entries = [pair for axes in self.axes for pair in zip(*axes.get_legend_handles_labels(), strict=True)]
+            for handle, label in sorted(entries, key=lambda pair: not isinstance(pair[0], Line2D)):  # curves first
+                named.setdefault(label, handle)
+            if not named:
+                self.strip.remove()
+            else:
+                columns = max(1, min(len(named), 100 // (max(map(len, named)) + 7)))
+                self.strip.legend(
+                    list(named.values()), list(named), loc="lower left", bbox_to_anchor=(0.0, 0.0), ncols=columns,
+                    frameon=False, fontsize=8.5, labelcolor=INK, handlelength=2.2, columnspacing=1.6,
+                    borderaxespad=0.0,
+                )  # fmt: skip
+        if colours is not None:
+            norm = (LogNorm if colours.log else Normalize)(colours.low, colours.high)
+            bar = self.colour_bar(ScalarMappable(norm, RISING), colours.title)
+            bar.outline.set_visible(False)
+
+    def colour_bar(self, colours: ScalarMappable, title: str, ticks: Array | None = None) -> Colorbar:
+        """A scale of colours beside all panels."""
+        rows = -(-len(self.axes) // self.columns)
+        aspect = 30 if len(self.axes) == 1 else 24 * rows
+        bar = self.sheet.colorbar(colours, ax=self.axes, pad=0.02, aspect=aspect, ticks=ticks)
+        bar.set_label(plain(title), fontsize=9, color=INK)
+        bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
+        bar.ax.minorticks_off()
+        return bar
+
+
 def chart(axes: Axes, one: Chart, wide: float = 1.0) -> None:
     """One chart on axes; wide: of the width of all figures, which its legend has room in."""
     if isinstance(one.x, Abscissa):
@@ -93,6 +207,12 @@ def chart(axes: Axes, one: Chart, wide: float = 1.0) -> None:
         _mark(mark, axes, one)
     _limits(axes, one)
     _titles(axes, one)
+    if one.colours is not None:
+        scale = one.colours
+        norm = (LogNorm if scale.log else Normalize)(scale.low, scale.high)
+        bar = axes.figure.colorbar(ScalarMappable(norm, RISING), ax=axes, pad=0.02, aspect=30)
+        bar.set_label(plain(scale.title), fontsize=9, color=INK)
+        bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
     if one.legend is not None:
         legend(axes, one.legend.most, int(wide * one.legend.room), one.legend.least)
 
@@ -122,14 +242,20 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
         (axes.set_xscale if name == "x" else axes.set_yscale)("log")
     if axis.places is not None:
         side.set_ticks([at for at, _ in axis.places], [plain(text) for _, text in axis.places])
-        if axis.turned:
-            side.set_tick_params(labelrotation=axis.turned)
+        side.set_minor_locator(NullLocator())
+        for label in side.get_ticklabels() if axis.turned else ():
+            label.set(rotation=axis.turned, ha="right" if axis.turned < 90 else "center", rotation_mode="anchor")
     elif axis.log and axis.count:
         subs = (1.0, 2.0, 5.0) if axis.count > 1 else (1.0,)
         side.set_major_locator(LogLocator(subs=subs, numticks=6))
         side.set_minor_formatter(NullFormatter())
     elif axis.count or axis.whole:
         side.set_major_locator(MaxNLocator(integer=axis.whole, nbins=axis.count or 6))
+    if axis.powers:
+        form = ScalarFormatter(useMathText=True)
+        form.set_powerlimits((-4, 6))
+        side.set_major_formatter(form)
+        side.get_offset_text().set(fontsize=8, color=MUTED)
     if axis.form is not None:
         written: Callable[[float], str] = axis.form
         side.set_major_formatter(FuncFormatter(lambda value, _: written(value)))
@@ -151,8 +277,10 @@ def _limits(axes: Axes, one: Chart) -> None:
 # ---- marks --------------------------------------------------------------------------------------------------------
 
 
-def colour(name: int | str) -> str:
-    """A colour of the palette, of its names, or as it is."""
+def colour(name: int | float | str) -> str:
+    """A colour of the palette, of the scale of colours, of the names, or as it is."""
+    if isinstance(name, float):
+        return to_hex(RISING(name))
     return PALETTE[name % len(PALETTE)] if isinstance(name, int) else COLOURS.get(name, name)
 
 
@@ -160,11 +288,11 @@ def line_style(look: Look) -> dict[str, Any]:
     """The look of a line as matplotlib takes it."""
     paint = colour(look.colour)
     style: dict[str, Any] = {"color": paint, "linewidth": look.width, "linestyle": DASHES[look.dash],
-                             "zorder": look.order, "alpha": look.alpha}  # fmt: skip
+                             "zorder": look.order, "alpha": look.alpha, "clip_on": not look.beyond}  # fmt: skip
     if look.mark:
         style |= {"marker": look.mark, "markersize": look.size}
     if look.hollow:
-        style |= {"markerfacecolor": "white", "markeredgewidth": 1.3}
+        style |= {"markerfacecolor": "none", "markeredgewidth": min(1.3, 0.2 * look.size)}
     return style
 
 
@@ -250,7 +378,9 @@ def _rule(mark: Rule, axes: Axes, one: Chart) -> None:
 def _stripe(mark: Stripe, axes: Axes, one: Chart) -> None:
     axes.axvspan(mark.low, mark.high, label=_name(mark.name), **_area(mark.look))
     if mark.text:
-        axes.text((mark.low + mark.high) / 2, 0.5, plain(mark.text), transform=axes.get_xaxis_transform(), rotation=90,
+        log = axes.get_xscale() == "log"
+        middle = np.sqrt(mark.low * mark.high) if log else (mark.low + mark.high) / 2
+        axes.text(middle, 0.5, plain(mark.text), transform=axes.get_xaxis_transform(), rotation=90,
                   ha="center", va="center", fontsize=8, color=MUTED, zorder=3, clip_on=True)  # fmt: skip
 
 

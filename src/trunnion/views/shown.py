@@ -26,13 +26,13 @@ __all__ = ["animation_of", "check_kind", "figure_of", "html_of", "plot", "report
 # matplotlib is slow to import
 REPORTS = {
     "cycle": "cycle.report", "tolerance": "tolerance", "allocation": "allocation",
-    "comparison": "compare.report", "identification": "identify.report",
-    "motion": "motion.report", "play": "play.report", "sweep": "sweep.report", "assembly": "assembly.report",
+    "comparison": "compare", "identification": "identify",
+    "motion": "motion.report", "play": "play", "sweep": "sweep", "assembly": "assembly.report",
 }  # fmt: skip
 FIGURES = {
-    "cycle": "cycle.plots", "sweep": "sweep.figure", "play": "play.figure", "assembly": "assembly.figure",
-    "tolerance": "tolerance", "allocation": "allocation", "comparison": "compare.figure",
-    "identification": "identify.figure", "motion": "motion.figure",
+    "cycle": "cycle.plots", "sweep": "sweep", "play": "play", "assembly": "assembly.figure",
+    "tolerance": "tolerance", "allocation": "allocation", "comparison": "compare",
+    "identification": "identify", "motion": "motion.figure",
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Contour maps: one number of the cycle over two swept names, and what hinders it where there is none.
+"""Contour maps of a sweep: one number of the cycle over two names, and what hinders it where there is none.
 
 Contours are drawn only within cells of the grid that have a number at all four corners. Around other points that have
 one, up to half-way to the next, its band is drawn; points without one get the fill and hatch of their cause.
@@ -19,17 +19,20 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from trunnion.errors import Finding, MechanismError, Status
+from trunnion.errors import Status
+from trunnion.views.charts import Chart, Mark
 from trunnion.views.common.cycle import Array
-from trunnion.views.common.figures import INK, MUTED, outside
-from trunnion.views.sweep.panels import ALIKE, NOTHING, Board, Field, on_scale, ring, scale_of_colours, tell, ticks
-from trunnion.views.sweep.scales import Scale, cause
+from trunnion.views.common.figures import INK, MUTED
+from trunnion.views.scales import Scale, cause
+from trunnion.views.sweep import ALIKE, NOTHING, Field, axis_of, field_room, on_scale, panel_title, rings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-__all__ = ["draw", "need_two"]
+    from trunnion.views.draw import Board
+
+__all__ = ["draw"]
 
 Beyond = Literal["neither", "both", "min", "max"]
 
@@ -62,40 +65,32 @@ class Ground(NamedTuple):
         return found
 
 
-def need_two(told: Field) -> None:
-    """MechanismError if there are not two names with two values or more to draw a map over."""
-    plan = told.plan
-    short = [one.name for one in (plan.x, plan.other) if one is not None and np.unique(one.values).size < 2]
-    if plan.other is None or short:
-        what = f"'{short[0]}' has one value" if short else f"'{plan.x.name}' alone is swept"
-        remedy = "sweep over two names with several values each, or draw curves"
-        raise MechanismError(Finding(f"{what}: a map needs two that vary", "--kind map", remedy))
-
-
-def draw(shown: Board, told: Field) -> None:
+def draw(board: Board, field: Field) -> None:
     """The map of every panel, one scale of colours for all."""
-    need_two(told)
-    other = told.plan.other
-    assert other is not None  # need_two
-    across, upward = _first(told.x), _first(other.values)
-    known = told.values[np.isfinite(told.values)] * told.factor
-    levels, extend = _levels(known, told.scope * told.factor)
+    x, other = field.plan.x, field.plan.other
+    assert other is not None  # as `sweep.figure` sees to
+    across, upward = _first(field.x), _first(other.values)
+    finite = field.values[np.isfinite(field.values)] * field.factor
+    levels, extend = _levels(finite, field.scope * field.factor)
     norm = BoundaryNorm(levels, COLOURS.N, extend=extend)
-    for axes, place in shown.panels:
+    alone, room = len(field.panels) == 1, field_room(len(field.panels), board.columns)
+    sides = axis_of(x, room, 0.0), axis_of(other, 60 if alone else 32, 0.0)
+    ground = Ground((x, other), (field.x[across], other.values[upward]))
+    for k, title in enumerate(field.panels):
         where = np.ix_(across, upward)
-        values, status = told.values[:, :, place][where], told.status[:, :, place][where]
-        over = Ground((told.plan.x, other), (told.x[across], other.values[upward]))
-        _panel(axes, over, values * told.factor, status, norm, 7.5 if shown.alone else 6.5, told.nothing)
-        peak = float(np.nanmax(np.abs(values), initial=0.0))
-        if peak > told.scope:
-            outside(axes, peak, told.unit)
-    tell(shown)
-    if known.size:
-        constant = bool(np.ptp(known) <= ALIKE * np.abs(known).max())
-        marks = levels.mean(keepdims=True) if constant else levels
-        say = _numbers(marks)
-        bar = scale_of_colours(shown, ScalarMappable(norm, COLOURS), told.label, marks)
-        bar.ax.set_yticks(marks, [say(value) for value in marks])
+        values, status = field.values[:, :, k][where] * field.factor, field.status[:, :, k][where]
+        marks = [*_lost(ground, (status == Status.CONTACT_LOST) & np.isfinite(values)), *field.beyond(k)]
+        headed = "" if alone else panel_title(title, room)
+        axes = board.draw(k, Chart(*sides, [], legend=None, title=headed))
+        _panel(axes, ground, values, status, norm, 7.5 if alone else 6.5, field.nothing)
+        board.add(k, Chart(*sides, marks))
+    board.finish()
+    if finite.size:
+        constant = bool(np.ptp(finite) <= ALIKE * np.abs(finite).max())
+        places = levels.mean(keepdims=True) if constant else levels
+        say = _numbers(places)
+        bar = board.colour_bar(ScalarMappable(norm, COLOURS), field.label, places)
+        bar.ax.set_yticks(places, [say(value) for value in places])
 
 
 def _first(values: Array) -> NDArray[np.intp]:
@@ -122,8 +117,6 @@ def _panel(
     """One map: values and status (x, y), x and y rising; size: of the numbers at the lines."""
     missing = ~np.isfinite(values)
     axes.grid(False)
-    ticks(axes, over.scales[0], "x", 0.0)
-    ticks(axes, over.scales[1], "y", 0.0)
     edges = over.edges()
     _beside_gaps(axes, edges, values, missing, norm)
     if not missing.all():
@@ -137,7 +130,6 @@ def _panel(
     for code in (NOTHING, *LOOKS):
         word = cause(code) if code != NOTHING else nothing
         _hinder(axes, edges, codes == code, code, word, filled=bool(missing[codes == code].any()))
-    _lost(axes, *over.places, (status == Status.CONTACT_LOST) & ~missing)
 
 
 def _refined(over: Ground, values: Array) -> tuple[Array, Array, Any]:
@@ -228,8 +220,8 @@ def _hinder(axes: Axes, edges: list[Array], where: NDArray[np.bool_], code: int,
     axes.add_patch(PathPatch(path, zorder=1.5, label=word, **look))
 
 
-def _lost(axes: Axes, x: Array, y: Array, where: NDArray[np.bool_]) -> None:
-    """Rings around points of whose cycle a position loses contact, as large as there is room."""
+def _lost(over: Ground, where: NDArray[np.bool_]) -> list[Mark]:
+    """Rings around points of whose cycle a position loses contact, as large as there is room, also over the frame."""
     rows, columns = np.nonzero(where)
-    if rows.size:
-        ring(axes, x[rows], y[columns], float(np.clip(160 / max(where.shape), 1.5, 8)), beyond=True)
+    size = float(np.clip(160 / max(where.shape), 1.5, 8))
+    return rings(over.places[0][rows], over.places[1][columns], size, beyond=True) if rows.size else []

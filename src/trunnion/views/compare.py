@@ -1,0 +1,618 @@
+"""Views of a comparison: measured and model, per working condition and channel.
+
+What was measured is drawn with its expanded uncertainty U, the model as a curve. Gaps stay gaps.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from html import escape
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.model.names import nearest
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, prefixed
+from trunnion.rig.comparison import CAUSES
+from trunnion.rig.judge import Verdict
+from trunnion.views.charts import Axis, Band, Chart, ColourScale, Legend, Line, Look, Mark, Panel, Stripe, silent
+from trunnion.views.common.cycle import Abscissa, Array, names
+from trunnion.views.page import Section, Summary, counts, page
+from trunnion.views.rig.conditions import shortened
+from trunnion.views.scales import Scale, cause
+from trunnion.views.table import NONE, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["KINDS", "MOST_DRAWN", "MOST_PANELS", "check_kind", "figure", "files", "of_file", "panels", "report",
+           "tables"]  # fmt: skip
+
+SIGNS = {"um": "µm", "deg": "°"}
+APART = 0.05  # of the range of a number: values nearer to each other are the same setting, each time a little off
+TRIFLE = 0.005  # of a number: less is no change of a setting
+KINDS = {"efficiency": "measured and modelled efficiency", "overlay": "signals with residuals"}
+MOST_PANELS = 6
+MOST_NAMED = 8  # series that a legend tells apart; more by a scale of colours
+MOST_DRAWN = 6  # conditions of a channel in the report
+MEASURED, MODEL = 0, 1
+Indices = NDArray[np.intp]
+
+
+# ---- settings and units -------------------------------------------------------------------------------------------
+
+
+def verdict(result: xr.Dataset, channel: int, condition: int) -> str:
+    """What the comparison of a channel in a condition came to."""
+    code = int(result["verdict"].values[channel, condition])
+    return next(member for member in Verdict if member == code).text
+
+
+def settings(result: xr.Dataset) -> list[Scale]:
+    """The numbers that were set, over the conditions, in the units that the model states them in."""
+    return [
+        Scale(name, SIGNS.get(unit, "" if unit == "1" else unit), values / factor + 0.0)
+        for name, (unit, factor), values in zip(
+            names(result, "set"), attribute(result, "set_written"), result["value"].values, strict=True
+        )
+    ]
+
+
+def levels(values: Array) -> Array:
+    """The settings among values that were measured and so are never quite the same: to each the mean of its own."""
+    rising, means = np.sort(values[np.isfinite(values)]), np.full(values.shape, np.nan)
+    if not rising.size:
+        return means
+    step = max(APART * float(np.ptp(rising)), TRIFLE * float(np.abs(rising).max()))
+    edges = rising[1:][np.diff(rising) > step]
+    group = np.searchsorted(edges, values, side="right")
+    for k in range(len(edges) + 1):
+        members = (group == k) & np.isfinite(values)
+        means[members] = values[members].mean()
+    return means
+
+
+def varied(result: xr.Dataset) -> list[Scale]:
+    """The numbers that were set to several values, that with the most first."""
+    several = []
+    for scale in settings(result):
+        at = levels(scale.values)
+        several.append((scale, len(np.unique(at[np.isfinite(at)]))))
+    return [scale for scale, count in sorted(several, key=lambda pair: -pair[1]) if count > 1]
+
+
+def label(result: xr.Dataset, condition: int) -> str:
+    """The name of a condition and what was set in it."""
+    name, several = names(result, "condition")[condition], varied(result)
+    values = [f"{scale.name} {setting(scale.values[condition], scale.unit)}"
+              for scale in several or settings(result)[:2] if np.isfinite(scale.values[condition])]  # fmt: skip
+    named = all(scale.name in name for scale in several)  # as a name made of the settings has them
+    return name if named or not values else f"{name}: {', '.join(values)}"
+
+
+def setting(value: float, unit: str) -> str:
+    """What was set, with its unit: "15°", "62.83 rad/s"."""
+    space = "" if unit in ("°", "") else "\u00a0"
+    return f"{float(f'{value:.4g}'):g}{space}{unit}".replace("-", "−").replace(" ", "\u00a0")
+
+
+def coverage_of(result: xr.Dataset) -> str:
+    """The probability that ±U covers, in words: "95 %"."""
+    return f"{100 * float(result.attrs['probability']):.3g}".replace("95.4", "95") + "\u00a0%"
+
+
+def text(value: float, unit: str, digits: int = 3) -> str:
+    """A number with its unit, which is not scaled any more."""
+    space = "" if unit in ("°", "") else "\u00a0"
+    return f"{number(float(value), digits)}{space}{unit}".replace(" ", "\u00a0")
+
+
+def scale_of(result: xr.Dataset, channel: int, condition: int) -> tuple[float, str]:
+    """Factor and unit that a channel is read in, in a condition; a speed in the unit of its file."""
+    own = str(attribute(result, "channel_units")[channel])
+    unit, size = (attribute(result, "channel_read_in") or [["", 1.0]] * (channel + 1))[channel]
+    if unit and own == "rad/s":
+        return 1 / size, str(unit)
+    values = np.concatenate([result[name].values[channel, condition] for name in ("measured", "model")])
+    return prefixed(float(np.nanmax(np.abs(values[np.isfinite(values)]), initial=0.0)), own)
+
+
+def drive(result: xr.Dataset, condition: int) -> Abscissa:
+    """What the courses of a condition are drawn over, and whether they close."""
+    values = np.asarray(result["drive"].values[condition], float)
+    values = values[np.isfinite(values)]
+    unit, name = str(result.attrs["drive_unit"]), str(result.attrs["drive_name"])
+    factor, shown = prefixed(float(np.abs(values).max(initial=0.0)), unit)
+    title = {"rad": f"drive angle {name}", "m": f"drive slide {name}", "s": "time"}[unit]
+    closed = bool(int(result.attrs["periodic"])) and values.size > 2
+    even = closed and np.ptp(np.diff(values)) <= 1e-6 * abs(values[1] - values[0])
+    period = float(values[1] - values[0]) * values.size * factor if even else 0.0
+    return Abscissa(title, shown, values * factor, bool(even and period), period)
+
+
+# ---- tables -------------------------------------------------------------------------------------------------------
+
+
+def tables(result: xr.Dataset) -> list[Table]:
+    """Results, what would explain the residuals, and efficiencies, as there are."""
+    first = results(result).titled(f"{result.attrs['comparing']}: measured minus model")
+    return [table for table in (first, explained(result), efficiencies(result)) if table is not None]
+
+
+def results(result: xr.Dataset, channel: int | None = None) -> Table:
+    """Residual and verdict of every channel in every condition, or of one channel."""
+    rows = [
+        [*first, *_residual_cells(result, i, k)]
+        for first, i, k in _rows(result, channel)
+        if int(result["turns"].values[i, k]) > 0
+    ]
+    head = ["RMS", "largest", "at", "bias", "within ±U", "required", "correlation", "verdict"]
+    return Table("results", [*_first_heads(result, channel), *head], rows)
+
+
+def _first_heads(result: xr.Dataset, channel: int | None) -> list[str]:
+    head = shortened(names(result, "condition"))[0]
+    return [head] if channel is not None else [head, "channel"]
+
+
+def _rows(result: xr.Dataset, channel: int | None) -> list[tuple[list[str], int, int]]:
+    """First cells, channel and condition of every row: of all channels with their names, or of one."""
+    channels, short = names(result, "channel"), shortened(names(result, "condition"))[1]
+    return [
+        ([name] if channel is not None else [name, channels[i]], i, k)
+        for k, name in enumerate(short)
+        for i in (range(len(channels)) if channel is None else [channel])
+    ]
+
+
+def explained(result: xr.Dataset, channel: int | None = None) -> Table | None:
+    """What would explain each residual beyond U: size and share, of all channels or of one; None if there is none."""
+    rows = []
+    for first, i, k in _rows(result, channel):
+        cells = [_cause(result, kind, i, k) for kind in CAUSES]
+        if any(cell != NONE for cell in cells):
+            rows.append([*first, *cells])
+    head = [*_first_heads(result, channel), *CAUSES]
+    return Table("what would explain the residual, each by itself", head, rows) if rows else None
+
+
+def _cause(result: xr.Dataset, kind: str, i: int, k: int) -> str:
+    """An error that would explain a residual, with the share that it explains."""
+    size, part = (float(result[f"{kind}_{what}"].values[i, k]) for what in ("error", "explains"))
+    if not np.isfinite(size):
+        return NONE
+    factor, unit = {"zero": scale_of(result, i, k), "angle": (180 / math.pi, "°")}.get(kind, (100.0, "%"))
+    return f"{'+' if size > 0 else ''}{text(size * factor, unit)} ({100 * part:.1f}\u00a0%)"
+
+
+def verdicts(result: xr.Dataset) -> Table:
+    """The verdict of every channel in every condition."""
+    channels, (head, short) = names(result, "channel"), shortened(names(result, "condition"))
+    rows = [
+        [name, *(verdict(result, i, k) if result["turns"].values[i, k] else NONE for i in range(len(channels)))]
+        for k, name in enumerate(short)
+    ]
+    return Table("verdicts", [head, *channels], rows)
+
+
+def _residual_cells(result: xr.Dataset, i: int, k: int) -> list[str]:
+    """RMS, largest residual and its place, bias, shares within ±U, correlation and verdict."""
+    keys = ("rms", "largest", "largest_at", "bias", "bias_expanded", "within", "within_least", "correlation")
+    rms, largest, at, bias, wide, within, least, alike = (float(result[key].values[i, k]) for key in keys)
+    factor, unit = scale_of(result, i, k)
+    rms_text, largest_text, bias_text = (
+        text(value * factor, unit) if np.isfinite(value) else NONE for value in (rms, largest, bias)
+    )
+    if np.isfinite(bias) and np.isfinite(wide):
+        bias_text = _with_uncertainty(bias * factor, wide * factor, unit)
+    place = NONE
+    if np.isfinite(at):
+        turned, shown = prefixed(at, str(result.attrs["drive_unit"]))
+        place = setting(at * turned, shown)
+    shares = (f"{100 * part:.1f}\u00a0%" if np.isfinite(part) else NONE for part in (within, least))
+    return [rms_text, largest_text, place, bias_text, *shares, _plain(alike), verdict(result, i, k)]
+
+
+def _with_uncertainty(value: float, wide: float, unit: str) -> str:
+    """A value with its expanded uncertainty, to two digits of that (GUM 7.2.6)."""
+    places = 1 - math.floor(math.log10(wide)) if wide > 0 else 3
+    if not 0 <= places <= 6:
+        return f"{number(value, 3)}\u00a0±\u00a0{text(wide, unit, 2)}"
+    digits = f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")  # no negative zero
+    return f"{digits}\u00a0±\u00a0{wide:.{places}f}\u00a0{unit}".rstrip().replace(" ", "\u00a0")
+
+
+def efficiencies(result: xr.Dataset) -> Table | None:
+    """Measured efficiency with U beside the model's; None if it was not measured."""
+    if "efficiency" not in result:
+        return None
+    words = {1: "within", 0: "not within", -1: "unknown"}
+    first, short = shortened(names(result, "condition"))
+    rows = []
+    for k, name in enumerate(short):
+        measured, wide, model = (
+            float(result[key].values[k]) for key in ("efficiency", "efficiency_expanded", "efficiency_model")
+        )
+        within = words[int(result["efficiency_within"].values[k])]
+        rows.append([name, *(_plain(value) for value in (measured, wide, model, measured - model)), within])
+    head = [first, "η measured", f"U ({coverage_of(result)})", "η model", "difference", "model within ±U"]
+    return Table("efficiency", head, rows)
+
+
+def _plain(value: float) -> str:
+    return f"{value:.4f}".replace("-", "−") if np.isfinite(value) else NONE
+
+
+def conditions(result: xr.Dataset) -> Table:
+    """What was set in every condition, in how many turns it was measured, and where the data are."""
+    scales, sources = settings(result), attribute(result, "condition_files")
+    rows = []
+    for k, name in enumerate(names(result, "condition")):
+        values = [setting(s.values[k], s.unit) if np.isfinite(s.values[k]) else NONE for s in scales]
+        turns = result["turns"].values[:, k]
+        ends = dict.fromkeys([str(int(turns.min())), str(int(turns.max()))])
+        files_of = [file.replace("\\", "/").rsplit("/", 1)[-1] for file in sources[k]] if sources else []
+        rows.append([name, *values, " to ".join(ends), ", ".join(files_of) or NONE])
+    return Table("conditions", ["condition", *(scale.name for scale in scales), "turns", "file"], rows)
+
+
+def sensors(result: xr.Dataset) -> Table:
+    """What each channel measures, with the standard uncertainties of its zero and gain."""
+    measures, read_in = attribute(result, "channel_measures"), attribute(result, "channel_read_in")
+    rows = []
+    for i, (name, own) in enumerate(zip(names(result, "channel"), attribute(result, "channel_units"), strict=True)):
+        read, size = read_in[i] if read_in else ("", 1.0)
+        unit = read or own
+
+        def zero(value: float, read: str = read, size: float = size, own: str = own) -> str:
+            factor, shown = (1 / size, read) if read and size != 1 else prefixed(value, own)
+            return text(value * factor, shown)
+
+        cells = []
+        for what, say in (("zero", zero), ("gain", lambda value: f"{number(100 * value, 3)}\u00a0%")):
+            values = result[f"accuracy_{what}"].values[i]
+            values = values[np.isfinite(values)]
+            ends = [float(values.min()), float(values.max())] if values.size else []
+            cells.append(" to ".join(dict.fromkeys(say(end) if end else "0" for end in ends)) or NONE)
+        rows.append([name, measures[i], "" if unit == "1" else unit, *cells])
+    return Table("sensors", ["channel", "measures", "unit", "u of the zero", "u of the gain"], rows)
+
+
+def files(result: xr.Dataset, key: str = "files") -> Table | None:
+    """The files of the data with their size and hash; None if none is known. key: of the attribute that has them."""
+    rows = [
+        [row["file"], NONE if row["bytes"] is None else f"{row['bytes']:,}".replace(",", "\u202f"),
+         row["sha256"] or NONE]
+        for row in attribute(result, key)
+    ]  # fmt: skip
+    return Table("files", ["file", "bytes", "SHA-256"], rows) if rows else None
+
+
+def headline(result: xr.Dataset) -> Summary:
+    """The figures at the head: how many courses are within, and how far the efficiencies are apart."""
+    codes = result["verdict"].values[result["turns"].values > 0]
+    count = f"{int(np.count_nonzero(codes == Verdict.WITHIN))} of {len(codes)}"
+    summary = [("signals within ±U", [(count, f"channels in conditions, {coverage_of(result)} coverage")])]
+    if "efficiency" in result:
+        within = result["efficiency_within"].values
+        count = f"{int(np.count_nonzero(within == 1))} of {int(np.count_nonzero(within >= 0))}"
+        summary.append(("efficiencies within ±U", [(count, "conditions")]))
+        gap = np.abs(result["efficiency"].values - result["efficiency_model"].values)
+        if np.isfinite(gap).any():
+            most = number(float(np.nanmax(gap)), 3)
+            summary.append(("largest difference of efficiency", [(most, "measured minus model, magnitude")]))
+    return summary
+
+
+# ---- figures ------------------------------------------------------------------------------------------------------
+
+
+def check_kind(kind: str) -> None:
+    """MechanismError if there is no such kind of figure."""
+    if kind not in KINDS:
+        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
+
+
+def figure(
+    result: xr.Dataset, kind: str | None = None, channel: str | None = None, condition: str | None = None
+) -> Figure:
+    """One figure.
+
+    Parameters
+    ----------
+    result : of a comparison
+    kind : of KINDS; the efficiency if it was measured and no channel is named, else the courses
+    channel, condition : which courses; the first MOST_PANELS of them if there are more
+
+    Raises
+    ------
+    MechanismError : for a name or kind that there is not, and where there is nothing to draw
+    """
+    from trunnion.views.draw import figure as draw
+
+    measured = "efficiency" in result
+    kind = kind or ("efficiency" if measured and channel is None and condition is None else "overlay")
+    check_kind(kind)
+    if kind == "efficiency":
+        if not measured:
+            remedy = "measure effort: and rate: of the driver, load: and rate: of a load's joint"
+            raise MechanismError(Finding("the efficiency was not measured", "--kind efficiency", remedy))
+        chart = efficiency(result)
+        over = "condition" if chart.x.title == "condition" else varied(result)[0].name
+        return draw(f"Efficiency, measured and model, over {over}", result, [Panel("", [chart], 3.75)])
+    shown = panels(result, channel, condition)
+    if not shown:
+        remedy = "see the findings of `trunnion data`"
+        raise MechanismError(Finding("there is no signal to draw", "--kind overlay", remedy))
+    more = f", {MOST_PANELS} of {len(shown)} signals" if len(shown) > MOST_PANELS else ""
+    courses = [course(result, i, k, 80) for i, k in shown[:MOST_PANELS]]
+    return draw(f"Measured and model{more}", result, courses, columns=2)
+
+
+def panels(result: xr.Dataset, channel: str | None = None, condition: str | None = None) -> list[tuple[int, int]]:
+    """(channel, condition) of the courses that there are, of one channel or condition only if it is named."""
+    picked = []
+    for dim, name in (("channel", channel), ("condition", condition)):
+        every = names(result, dim)
+        if name is not None and name not in every:
+            raise MechanismError(Finding(f"there is no {dim} '{name}'", f"--{dim}", nearest(name, every)))
+        picked.append(range(len(every)) if name is None else [every.index(name)])
+    there = np.isfinite(result["measured"].values).any(axis=2) | np.isfinite(result["model"].values).any(axis=2)
+    return [(i, k) for k in picked[1] for i in picked[0] if there[i, k]]
+
+
+def efficiency(result: xr.Dataset) -> Chart:
+    """Measured efficiency with bars of ±U beside the model's, over what was varied; a curve for each further value."""
+    over, series, other = _series(result)
+    single, many = len(series) == 1, len(series) > MOST_NAMED and other is not None
+    values = np.empty(0) if other is None else other.values
+    colours = ColourScale(other.title, float(np.nanmin(values)), float(np.nanmax(values))) if many and other else None
+    marks: list[Mark] = []
+    for k, (name, where) in enumerate(series):
+        look = Look(MODEL if single else k, dash=("solid", "long", "short", "dotted")[k // 6 % 4])
+        if colours is not None:
+            look = Look(colours.share(float(np.nanmean(values[where]))))
+        marks += _efficiency_marks(result, over, where, look, MEASURED if single else look.colour)
+        if name and not many:
+            marks.append(Line(np.empty(0), np.empty(0), name, look))
+    nothing = np.empty(0)
+    dots = Look(MEASURED if single else "ink", dash="none", mark="o")
+    marks.append(Line(nothing, nothing, f"measured, ±U ({coverage_of(result)})", dots))
+    marks.append(Line(nothing, nothing, "model", Look(MODEL if single else "ink")))
+    stripes, limits = _unanswered(result, over)
+    told = names(result, "condition")
+    named = over.name == "condition" and len(told) <= 24 and max(map(len, told)) <= 24
+    across = Axis(over.title, limits, [(k + 1, name) for k, name in enumerate(told)] if named else None,
+                  turned=60 if named and sum(map(len, told)) > 70 else 0)  # fmt: skip
+    return Chart(across, Axis("efficiency"), [*marks, *stripes], legend=Legend(least=1), colours=colours)
+
+
+def _series(result: xr.Dataset) -> tuple[Scale, list[tuple[str, Indices]], Scale | None]:
+    """What to draw over, the conditions of each curve with its name, and the number that tells the curves apart."""
+    count, several = result.sizes["condition"], varied(result)
+    by_number = Scale("condition", "", np.arange(1.0, count + 1)), [("", np.arange(count))], None
+    if not several:
+        return by_number
+    over, *others = several
+    if not others:
+        return over, [("", np.flatnonzero(np.isfinite(over.values)))], None
+    keys = np.stack([np.nan_to_num(levels(scale.values), nan=np.inf) for scale in others])
+    combined = np.unique(keys, axis=1).T
+    if len(others) > 1 and len(combined) > MOST_NAMED:
+        return by_number
+    series = []
+    for at in combined:
+        members = np.flatnonzero((keys == at[:, None]).all(axis=0) & np.isfinite(over.values))
+        parts = [f"{scale.name} = {setting(value, scale.unit)}" for scale, value in zip(others, at, strict=True)]
+        series.append((", ".join(parts), members))
+    return over, series, others[0]
+
+
+def _efficiency_marks(
+    result: xr.Dataset, over: Scale, where: Indices, look: Look, dots: int | float | str
+) -> list[Mark]:
+    """One curve of the model, crosses where it ends at a gap, with its measured points."""
+    order = where[np.argsort(over.values[where], kind="stable")]
+    x = over.values[order]
+    model, measured, wide = (
+        result[key].values[order] for key in ("efficiency_model", "efficiency", "efficiency_expanded")
+    )
+    answered = np.isfinite(model)
+    bars = look.but(dash="none", mark="_", size=13.0, order=2.5)
+    marks: list[Mark] = [Line(x, model, None, look.but(order=2.5))]
+    if over.name == "condition":  # which are in no order
+        marks = [Line(x, model, None, bars)]
+    elif np.count_nonzero(answered) == 1:  # a line of one point is none
+        marks.append(Line(x[answered], model[answered], None, bars))
+    ends = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
+    if over.name != "condition" and ends.any():
+        marks.append(Line(x[ends], model[ends], None, look.but(dash="none", mark="x", size=7.0, order=4.0)))
+    half = np.nan_to_num(wide)
+    return [*marks, Line(x, measured, None, Look(dots, dash="none", mark="o", order=3), half, half)]
+
+
+def _unanswered(result: xr.Dataset, over: Scale) -> tuple[list[Mark], tuple[float | None, float | None]]:
+    """Stripes where no condition has an answer of the model, with the cause; and the ends of the axis."""
+    model, status, at = result["efficiency_model"].values, result["status"].values, levels(over.values)
+    sampled, places = np.isfinite(result["phase"].values), np.unique(at[np.isfinite(at)])
+    if not places.size:
+        return [], (None, None)
+    margin = 0.05 * float(np.ptp(places)) or 0.5 * abs(float(places[0])) or 0.5
+    edges = np.concatenate([[places[0] - margin], (places[1:] + places[:-1]) / 2, [places[-1] + margin]])
+    marks, before = list[Mark](), ""
+    for k, place in enumerate(places):
+        here = at == place
+        if np.isfinite(model[here]).any():
+            continue
+        gravest = int(status[here][sampled[here]].max())
+        why = f"model: {cause(gravest) if gravest >= Status.NOT_CONVERGED else 'no efficiency'}"
+        marks.append(Stripe(edges[k], edges[k + 1], why if why != before else ""))
+        before = why
+    return marks, (float(edges[0]), float(edges[-1]))
+
+
+def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel:
+    """Measured with ±U and model; below, the residual in ±U. room: characters of the title in a line."""
+    over, (factor, unit) = drive(result, condition), scale_of(result, channel, condition)
+    x, count = over.values, over.values.size
+    measured, wide, model, residual, compared = (
+        np.asarray(result[key].values[channel, condition, :count], float)
+        for key in ("measured", "expanded", "model", "residual", "compared")
+    )
+    measured, wide, model = measured * factor, wide * factor, model * factor
+    residual = np.where(compared > 0, residual, np.nan) * factor
+    close, band, name = unit != "°", Look(MEASURED, alpha=0.22, order=1.8), names(result, "channel")[channel]
+    cycle = result.isel(condition=condition, position=slice(0, count))
+    above: list[Mark] = [
+        Band(x, measured - wide, measured + wide, f"±U ({coverage_of(result)})", band, close),
+        Line(x, measured, "measured", Look(MEASURED, 1.3), close=close),
+        Line(x, model, "model", Look(MODEL, 1.5, "long"), close=close),
+        *silent(cycle, over),
+    ]
+    below: list[Mark] = [
+        Band(x, -wide, wide, None, band, True),
+        Line(x, residual, None, Look(MEASURED, 1.1), close=True),
+        *silent(cycle, over, said=False),
+    ]
+    peak = np.nanmax(np.abs(np.append(measured, model)), initial=0.0)
+    flat = np.nanmax(np.abs(np.append(residual, wide)), initial=0.0) < 1e-6 * peak  # nothing to look at closer
+    limits = (-1e-3 * peak, 1e-3 * peak) if flat else (None, None)
+    rms, part = (float(result[key].values[channel, condition]) for key in ("rms", "within"))
+    words = [f"RMS {text(rms * factor, unit)}"] if np.isfinite(rms) else []
+    words += [f"{number(100 * part, 3)}\u00a0% within ±U"] if np.isfinite(part) else []
+    aside = ": ".join(filter(None, [", ".join(words), verdict(result, channel, condition)]))
+    charts = [
+        Chart(over, Axis(f"{name} [{unit}]" if unit else name), above, legend=Legend(room=70, least=1)),
+        Chart(over, Axis(f"residual\n[{unit}]" if unit else "residual", limits), below, True, None, aside=aside),
+    ]
+    return Panel("\n".join(wrap(label(result, condition), room)[:2]), charts, 3.3, (2.6, 1.0))
+
+
+# ---- report -------------------------------------------------------------------------------------------------------
+
+
+def report(result: xr.Dataset) -> str:
+    """The whole report as HTML, to be filed."""
+    from trunnion.views.draw import small
+
+    parts = []
+    table = efficiencies(result)
+    if table is not None:
+        parts.append(Section("Efficiency", pictures=[(KINDS["efficiency"], figure(result, "efficiency"))],
+                             after=[table]))  # fmt: skip
+    parts += [Section(one.title.capitalize(), tables=[one]) for one in (verdicts(result), conditions(result),
+                                                                        sensors(result))]  # fmt: skip
+    for i, name in enumerate(names(result, "channel")):
+        there = [k for _, k in panels(result, name)]
+        drawn = sorted(sorted(there, key=lambda k, i=i: -_severity(result, i, k))[:MOST_DRAWN])  # type: ignore[misc]
+        unit = str(attribute(result, "channel_units")[i])
+        about = f"measures {attribute(result, 'channel_measures')[i]}{f', {unit}' if unit != '1' else ''}"
+        if len(drawn) < len(there):
+            about += f"; {len(drawn)} of {len(there)} conditions are drawn, those with the largest residuals for " \
+                     "their uncertainty"  # fmt: skip
+        pictures = [(f"{name}, {label(result, k)}", small(course(result, i, k, 62))) for k in drawn]
+        why = explained(result, i)
+        parts.append(Section(name, about, pictures, [results(result, i), *([why] if why else [])], small=True,
+                             calm="" if pictures else "No signal."))  # fmt: skip
+    model = str(result.attrs["name"]) or "model"
+    facts = [(model, f"model {result.attrs['model_hash']}"),
+             *counts(*((result.sizes[dim], dim) for dim in ("condition", "channel", "position")))]  # fmt: skip
+    return page(
+        result, "Comparison of a model with a measurement", facts, parts, summary=headline(result), signed=True,
+        end=[data_section(result, "files"), Section("Definitions", terms=definitions(result))],
+        name=str(result.attrs["comparing"]) or "Measurement", about_data=about_data(result),
+    )  # fmt: skip
+
+
+def about_data(result: xr.Dataset) -> int:
+    """How many findings there are about the data, but for notes."""
+    return sum(row["severity"] != "note" for row in attribute(result, "data_findings"))
+
+
+def data_section(result: xr.Dataset, key: str) -> Section:
+    """What was done with the data, their files and the findings about them. key: of the attribute with the files."""
+    table = files(result, key)
+    rows = [of_file(row) for row in attribute(result, "data_findings")]
+    return Section("Data", lines=attribute(result, "done"), tables=[table] if table else [], findings=rows,
+                   calm="No findings about the data.", anchor="data")  # fmt: skip
+
+
+def of_file(row: dict[str, str]) -> dict[str, str]:
+    """A finding about data with the name of its file."""
+    return {**row, "where": " ".join(part for part in (Path(row["file"]).name, row["where"]) if part)}
+
+
+def _severity(result: xr.Dataset, channel: int, condition: int) -> float:
+    """Root mean square of the residual in expanded uncertainties; of an unknown one in its own unit."""
+    residual, wide = (result[key].values[channel, condition] for key in ("residual", "expanded"))
+    there = np.isfinite(residual)
+    if not there.any():
+        return -1.0
+    scale = np.where(np.isfinite(wide) & (wide > 0), wide, 1.0)
+    return float(np.sqrt(np.mean((residual / scale)[there] ** 2)))
+
+
+def definitions(result: xr.Dataset) -> list[tuple[str, str]]:
+    """(term, equation and meaning); the statement of uncertainty has the factor and the probability of this result."""
+    from markupsafe import Markup  # slow to import
+
+    factor, covered = float(result.attrs["coverage"]), coverage_of(result)
+    terms = [
+        (
+            "Mean and scatter",
+            "ȳ(φ) = Σⱼ yⱼ(φ)/n and s(φ)² = Σⱼ (yⱼ(φ) − ȳ(φ))²/(n − 1), over the n turns j that have a value at the "
+            "position φ of the cycle.",
+        ),
+        (
+            "Standard uncertainty of the mean",
+            "u² = s²/n + u₀² + (u_g ȳ)², with u₀ of the zero and u_g of the gain (relative) as stated for the "
+            "sensor; the resolution is added where the scatter is less than half a step. s²/n is of type A, the "
+            "others of type B (GUM 4.2, 4.3, 5.1). Zero and gain are the same at all positions; averaging does not "
+            "reduce them.",
+        ),
+        (
+            "Expanded uncertainty",
+            f"U = k_p u with the coverage probability {covered}. k_p is Student's t for ν_eff = (n − 1) u⁴/(s²/n)² "
+            f"degrees of freedom (Welch and Satterthwaite, GUM G.4.1): {factor:g} where turns are many or zero and "
+            "gain prevail, more where turns are few.",
+        ),
+        (
+            "Residual",
+            "r(φ) = ȳ(φ) − m(φ), measured minus model m. RMS is √(Σ r²/N) over the N positions that are compared, "
+            "largest the r of the largest magnitude, bias b = Σ r/N. The U of the bias is of the scatter of the means "
+            "of the turns, of the zero and of the gain.",
+        ),
+        (
+            "Verdict",
+            f"Of a true model {covered} of the positions are expected within ±U. A signal is within ±U if its share is "
+            "no less than this by more than 2.33 standard deviations of a share among as many independent "
+            "positions as the turns show there are, N²/Σρᵢⱼ² (column “required”); ρ is the correlation of the "
+            "errors of two positions. The verdict is “offset only” if r − b is, against the scatter "
+            "and the gain alone.",
+        ),
+        (
+            "Model",
+            "The model is computed with the values of each condition and at the same positions. It counts as "
+            "exact: the verdicts do not include the uncertainty of its parameters. Forces are not compared where "
+            "a joint is momentarily at rest or a dead centre is close: friction is an interval there.",
+        ),
+    ]  # fmt: skip
+    if "efficiency" in result:
+        terms.append(
+            (
+                "Efficiency",
+                "η = P_out/P_in = T_out ω_out/(T_in ω_in), powers being means over the time of whole turns of torque "
+                "times speed (Pezzuti et al. 2006, eq. 22). Its uncertainty is of the scatter of η between turns, and "
+                "of zero, gain and resolution of every channel, each with its sensitivity (GUM 5.1). η of the model "
+                "is computed from the model's signals in the same way.",
+            )
+        )
+    # indices, written behind a low line, set low
+    return [(term, Markup(re.sub(r"_([a-z]+)", r"<sub>\1</sub>", escape(words, quote=False)))) for term, words in terms]

@@ -1,0 +1,455 @@
+"""Views of an identification: estimates, what they are worth, and how the model fits the data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from trunnion.errors import Finding, MechanismError
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import number, prefixed
+from trunnion.rig.identification.number_text import amount, decimals, scaled
+from trunnion.rig.identification.uncertainty import quantile
+from trunnion.views.charts import Axis, Band, Cells, Chart, Legend, Line, Look, Mark, Note, Panel
+from trunnion.views.common.cycle import Array, names
+from trunnion.views.compare import about_data, data_section
+from trunnion.views.page import Section, Summary, counts, page
+from trunnion.views.rig.conditions import shortened
+from trunnion.views.table import NONE, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["KINDS", "MOST_PANELS", "Estimate", "check_kind", "estimates", "figure", "report", "sensors", "tables"]
+
+KINDS = ("intervals", "correlation", "residuals")  # of figures
+MOST_PANELS = 8  # curves of residuals
+MOST_TILES = 8  # estimates that are read first
+MANY = 1e4  # degrees of freedom: Student's t is the normal distribution to four digits
+LEAST = 0.005  # of a variance: a smaller share of all is no row of the budget
+FEW = 5  # conditions whose names stand side by side
+FEW_ESTIMATES = 2  # whose correlation needs no picture
+MOST_WRITTEN = 12  # parameters whose correlations have room for their numbers
+COVERED = 2.0  # standard uncertainties of the band
+ALIKE = 1e-6  # of the range of the drive: by which it may differ between conditions that share an axis
+BEFORE, AFTER = 4, 0
+
+
+# ---- estimates ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One unknown as it is read: in degrees, mm or SI.
+
+    limit: −1 or 1 where it is on its lower or upper limit; identifiable: whether the data tell it; shares: of each
+    source in its variance.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    unit: str
+    start: float
+    value: float
+    deviation: float
+    lower: float
+    upper: float
+    freedom: float
+    limit: int
+    identifiable: bool
+    shares: dict[str, float]
+
+    @cached_property
+    def half(self) -> float:
+        """Expanded uncertainty, half of the two-sided interval."""
+        return float(quantile(self.freedom)) * self.deviation if self.identifiable else math.nan
+
+    @cached_property
+    def places(self) -> int:
+        """Decimals that its uncertainty leaves."""
+        return max(decimals(self.half), 0) if self.identifiable else 4
+
+    @property
+    def short(self) -> str:
+        """Its name without the section that all numbers of joints have."""
+        return self.name.removeprefix("joints.").removeprefix("dimensions.")
+
+    def say(self, value: float, unit: bool = True) -> str:
+        """A value with the digits of the uncertainty."""
+        if not math.isfinite(value):
+            return number(value)
+        digits = f"{value + 0.0:.{self.places}f}" if self.places <= 7 else f"{value:.4g}"
+        return (digits + self.tail if unit else digits).replace("-", "−")
+
+    @property
+    def tail(self) -> str:
+        """The unit behind a number."""
+        return self.unit if self.unit in ("", "°") else f"\u00a0{self.unit}"
+
+    @property
+    def start_text(self) -> str:
+        """Where the search began, with its unit."""
+        return f"{self.start:.4g}{self.tail}".replace("-", "−")
+
+    def cells(self) -> tuple[str, str, str, str]:
+        """Estimate ± U, its interval, degrees of freedom, and what most of its variance is due to."""
+        if not self.identifiable:
+            return "not identifiable", NONE, "", ""
+        freedom, source = f"{self.freedom:.0f}" if self.freedom < MANY else "∞", ""
+        if self.shares:
+            name = max(self.shares, key=self.shares.__getitem__)
+            source = f"{name} {_percent(self.shares[name])}"
+        if self.limit:
+            interval = f"up to {self.say(self.upper)}" if self.limit < 0 else f"from {self.say(self.lower)}"
+            return f"{self.say(self.value)} (limit)", interval, freedom, source
+        interval = f"{self.say(self.lower, unit=False)}\u00a0to\u00a0{self.say(self.upper)}"
+        return f"{self.say(self.value, unit=False)}\u00a0±\u00a0{self.say(self.half)}", interval, freedom, source
+
+
+def _percent(part: float) -> str:
+    """A share in whole percent."""
+    return NONE if not math.isfinite(part) else f"{100 * part:.0f}\u00a0%"
+
+
+def estimates(result: xr.Dataset) -> list[Estimate]:
+    """Every unknown of a result."""
+    rows = []
+    units, paths = attribute(result, "parameter_units"), attribute(result, "parameter_paths")
+    sources = names(result, "source")
+    for p, name in enumerate(names(result, "parameter")):
+        factor, shown = scaled(units[p])
+        keys = ("start", "estimate", "standard_uncertainty", "lower", "upper")
+        start, value, deviation, lower, upper = (float(result[key].values[p]) * factor for key in keys)
+        shares = dict(zip(sources, map(float, result["share"].values[p]), strict=True))
+        rows.append(
+            Estimate(name, tuple(paths[p]), shown, start, value, deviation, lower, upper,
+                     float(result["degrees_of_freedom"].values[p]), int(result["limit"].values[p]),
+                     bool(result["told"].values[p]), shares)
+        )  # fmt: skip
+    return rows
+
+
+def _channels(result: xr.Dataset) -> list[tuple[int, str, str, list[int]]]:
+    """Number, name, SI unit of every channel, and the conditions in which it was fitted or held out."""
+    units = attribute(result, "channel_units")
+    turns = result["turns"].values + result["held_out_turns"].values
+    return [(i, name, str(units[i]), np.flatnonzero(turns[i] > 0).tolist())
+            for i, name in enumerate(names(result, "channel"))]  # fmt: skip
+
+
+# ---- tables -------------------------------------------------------------------------------------------------------
+
+
+def tables(result: xr.Dataset) -> list[Table]:
+    """The estimates, how they go together, how the model fits, and what was held out."""
+    every = [estimated(result), correlations(result), fits(result), held_out(result), sensors(result)]
+    return [table for table in every if table is not None]
+
+
+def estimated(result: xr.Dataset) -> Table:
+    """A row for each parameter: start, estimate ± expanded uncertainty, interval, and what most of that is due to."""
+    rows = [[row.short, row.start_text, *row.cells()] for row in estimates(result)]
+    head = ["parameter", "start", "estimate ± U", "95\u00a0% interval", "dof", "main source"]
+    return Table(f"{result.attrs['identified']}: estimates", head, rows)
+
+
+def stated(result: xr.Dataset) -> Table:
+    """What of the model each parameter is: all its paths, and its value at the start."""
+    rows = [[row.name, ", ".join(row.paths), row.start_text] for row in estimates(result)]
+    return Table("parameters", ["parameter", "paths in the model", "start"], rows)
+
+
+def correlations(result: xr.Dataset) -> Table | None:
+    """Between the estimates, of several; columns are numbered as the rows are, for names would be too wide."""
+    every = estimates(result)
+    members = [p for p, row in enumerate(every) if row.identifiable]
+    if len(members) < 2:
+        return None
+    values = result["correlation"].values
+    rows = [
+        [f"{k} {every[p].short}", *(f"{values[p, q]:.2f}".replace("-", "−") if q <= p else "" for q in members)]
+        for k, p in enumerate(members, 1)
+    ]
+    return Table("correlation", ["", *map(str, range(1, len(members) + 1))], rows)
+
+
+def fits(result: xr.Dataset) -> Table | None:
+    """A row for each channel and condition: RMS before and after, and what the scatter explains of it."""
+    rows = []
+    title, short = shortened(names(result, "condition"))
+    keys = ("rms_before", "rms_after", "rms_expected")
+    for i, name, unit, conditions in _channels(result):
+        turns, fitted = result["turns"].values[i], [k for k in conditions if result["turns"].values[i, k] > 0]
+        peak = np.nanmax([result[key].values[i, fitted] for key in keys[:2]], initial=0.0)
+        factor, shown = prefixed(float(peak), unit)
+        for k in fitted:
+            values = [_figure(float(result[key].values[i, k]) * factor) for key in keys]
+            used = f"{int(result['used'].values[i, k]):,}"
+            rows.append([name, short[k], *values, shown, f"{int(turns[k])}", used])
+    head = ["channel", title, "RMS before", "RMS after", "expected", "unit", "turns", "positions"]
+    return Table("residuals of the fit", head, rows) if rows else None
+
+
+def held_out(result: xr.Dataset) -> Table | None:
+    """What was not fitted but predicted."""
+    rows = []
+    title, short = shortened(names(result, "condition"))
+    for i, name, unit, _ in _channels(result):
+        turns = result["held_out_turns"].values[i]
+        for k in np.flatnonzero(turns > 0):
+            values = [float(result[f"held_out_{key}"].values[i, k]) for key in ("before", "after", "expected")]
+            factor, shown = prefixed(float(np.nanmax(np.nan_to_num(values))), unit)
+            cells = [_figure(value * factor) for value in values]
+            rows.append([name, short[k], f"{int(turns[k])}", *cells, shown])
+    head = ["channel", title, "turns", "RMS before", "RMS after", "expected", "unit"]
+    return Table("held-out data", head, rows) if rows else None
+
+
+def sensors(result: xr.Dataset) -> Table | None:
+    """Estimated errors of the sensors, in what is stated of them."""
+    units = {name: unit for _, name, unit, _ in _channels(result)}
+    columns = (result[key].values for key in ("sensor_error", "sensor_uncertainty", "sensor_size"))
+    rows = []
+    for name, error, u, size in zip(names(result, "sensor"), *columns, strict=True):
+        if name.startswith(("zero of each file", "angle of each condition")):  # as many as there are files
+            continue
+        kind, _, channel = name.partition(" of ")
+        zero = units.get(channel.partition(" in ")[0], "")
+        unit = {"zero": zero, "gain": "%", "angle in steps": "rad"}.get(kind, "")
+        factor = size * (100.0 if unit == "%" else 1.0)
+        sized = math.isfinite(error) and math.isfinite(factor) and bool(unit)
+        rows.append([
+            name,
+            amount(error * factor, 2 * u * factor, unit).replace("-", "−") if sized else NONE,
+            f"{error:.2f} ± {2 * u:.2f}".replace("-", "−") if math.isfinite(error) else "not identifiable",
+        ])  # fmt: skip
+    head = ["", "estimate ± 2 u", "in units of its stated standard uncertainty"]
+    return Table("errors of the sensors", head, rows) if rows else None
+
+
+def budget(result: xr.Dataset) -> Table | None:
+    """Share of each source in the variance of each estimate; of sources that are anything."""
+    members = [row for row in estimates(result) if row.identifiable]
+    sources = [name for name in names(result, "source") if any(row.shares[name] >= LEAST for row in members)]
+    rows = [[name, *(_percent(row.shares[name]) for row in members)] for name in sources]
+    return (
+        Table("uncertainty budget", ["share of the variance", *(m.short for m in members)], rows) if members else None
+    )
+
+
+def _figure(value: float) -> str:
+    return NONE if not math.isfinite(value) else f"{value:.3g}"
+
+
+# ---- figures ------------------------------------------------------------------------------------------------------
+
+
+def check_kind(kind: str) -> None:
+    """MechanismError if there is no such kind of figure."""
+    if kind not in KINDS:
+        raise MechanismError(Finding(f"there is no figure '{kind}'", "--kind", f"use one of {', '.join(KINDS)}"))
+
+
+def figure(result: xr.Dataset, kind: str | None = None) -> Figure:
+    """One figure. kind: of KINDS; the intervals if not given. MechanismError if there is no such kind."""
+    from trunnion.views.draw import figure as draw
+
+    check_kind(kind or "intervals")
+    if kind == "correlation":
+        return draw("Correlation of the estimates", result, [_correlation(result)], width=_side(result) + 2.8)
+    if kind == "residuals":
+        every = courses(result)
+        shown = evenly(every)
+        more = f", {len(shown)} of {len(every)} curves" if len(shown) < len(every) else ""
+        curves = _residual_panels(result, shown) if every else _residual_figures(result)
+        return draw(f"Residuals, before and after{more}", result, curves, columns=2 if every else 1)
+    panels = [_interval(row, Legend(least=1) if k == 0 else None) for k, row in enumerate(estimates(result))]
+    return draw("Estimates with their 95 % intervals", result, panels)
+
+
+def _interval(row: Estimate, legend: Legend | None) -> Panel:
+    """A parameter on a scale of its own: where it started, where it is, and its 95 % interval."""
+    points, marks, zero = [row.start], list[Mark](), np.zeros(1)
+    if row.identifiable:
+        ends = [end if np.isfinite(end) else row.value for end in (row.lower, row.upper)]
+        points += ends
+        marks = [Line(np.array(ends), np.zeros(2), "95 % interval", Look(AFTER, 6.0, alpha=0.35)),
+                 Line(np.array([row.value]), zero, "estimate", Look(AFTER, dash="none", mark="o", size=6))]  # fmt: skip
+    else:
+        marks = [Note("not identifiable", 0.5, 0.75, size=8.5)]
+    start = Look(BEFORE, dash="none", mark="D", size=5, hollow=True)
+    marks.append(Line(np.array([row.start]), zero, "start", start))
+    low, high = min(points), max(points)
+    margin = 0.08 * (high - low) or 0.1 * abs(high) or 0.1
+    across = Axis(row.unit, (low - margin, high + margin), count=7)
+    chart = Chart(across, Axis("", (-1, 1), [(0, row.short)]), marks, legend=legend, bare=True)
+    return Panel("", [chart], 0.95 if legend is None else 1.25)
+
+
+def _side(result: xr.Dataset) -> float:
+    """Of the matrix of correlations, inches."""
+    return min(1.6 + 0.62 * result.sizes["parameter"], 7.0)
+
+
+def _correlation(result: xr.Dataset) -> Panel:
+    """The correlation of the estimates as a matrix."""
+    short = [row.short for row in estimates(result)]
+    cells = Cells(result["correlation"].values, short, len(short) <= MOST_WRITTEN)
+    return Panel("", [Chart(Axis(), Axis(), [cells], legend=None)], _side(result) + 0.4)
+
+
+def courses(result: xr.Dataset) -> list[tuple[int, int]]:
+    """(channel, condition) with courses over the cycle that were fitted."""
+    after = np.isfinite(result["residual_after"].values).sum(axis=2)
+    return [(i, k) for i, _, _, conditions in _channels(result) for k in conditions if after[i, k] > 1]
+
+
+def evenly(every: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Those of the courses that are drawn: all, evenly chosen if there are many."""
+    if len(every) <= MOST_PANELS:
+        return every
+    return [every[int(j)] for j in np.rint(np.linspace(0, len(every) - 1, MOST_PANELS))]
+
+
+def _residual_panels(result: xr.Dataset, pairs: list[tuple[int, int]]) -> list[Panel]:
+    """Measured less model over the cycle, before beside after, with the band that the scatter leaves the mean."""
+    phases = {k: np.asarray(result["phase"].values[k], float) for _, k in pairs}
+    ranges = attribute(result, "drive_range")
+    turned = all(k < len(ranges) and ranges[k] is not None for k in phases)
+    title = f"drive angle {result.attrs.get('drive', '')} [°]" if turned else "share of the cycle"
+    panels = []
+    for n, (channel, condition) in enumerate(pairs):
+        x = phases[condition]
+        if turned:
+            first, last = ranges[condition]
+            x = np.degrees(first + (last - first) * x)
+        across = Axis(title if n == len(pairs) - 1 else "", (float(np.nanmin(x)), float(np.nanmax(x))))
+        for before in (True, False):
+            chart = _residual(result, channel, condition, x, across, before, Legend(least=1) if n == 0 else None)
+            where = names(result, "condition")[condition] if before else " "
+            panels.append(Panel(where, [chart], 2.3 if n == 0 else 1.9))
+    return panels
+
+
+def _residual(
+    result: xr.Dataset, channel: int, condition: int, x: Array, across: Axis, before: bool, legend: Legend | None
+) -> Chart:
+    """One course: before, with that after in front of it, or after with the band, on its own scale."""
+    _, name, unit, _ = _channels(result)[channel]
+    start, end, spread = (
+        np.asarray(result[f"residual_{key}"].values[channel, condition], float)
+        for key in ("before", "after", "uncertainty")
+    )
+    sizes = np.concatenate([start, end] if before else [end, COVERED * spread])
+    factor, shown = prefixed(float(np.nanmax(np.abs(sizes), initial=0.0)), unit)
+    marks: list[Mark] = []
+    if before:
+        marks.append(Line(x, start * factor, "before", Look(BEFORE, 1.1, mark="o", size=2)))
+    elif np.isfinite(spread).any():
+        half = COVERED * spread * factor
+        marks.append(Band(x, -half, half, f"±{COVERED:g} u of the mean, by scatter", Look("shade", order=1)))
+    marks.append(Line(x, end * factor, "after", Look(AFTER, 1.1, mark="o", size=2)))
+    return Chart(across, Axis(f"{name} [{shown}]" if shown else name), marks, True, legend)
+
+
+def _residual_figures(result: xr.Dataset) -> list[Panel]:
+    """Residuals of data with one figure a condition."""
+    title, short = shortened(names(result, "condition"))
+    channels = _channels(result)
+    every = sorted({k for *_, conditions in channels for k in conditions})
+    panels: list[Panel] = []
+    for i, name, unit, conditions in channels:
+        before, after, spread = (
+            np.array([result[f"residual_{key}"].values[i, k, 0] for k in conditions], float)
+            for key in ("before", "after", "uncertainty")
+        )
+        factor, shown = prefixed(float(np.nanmax(np.abs([before, after]), initial=0.0)), unit)
+        x, half = np.searchsorted(every, conditions).astype(float), COVERED * np.nan_to_num(spread) * factor
+        marks: list[Mark] = [
+            Line(x, before * factor, "before", Look(BEFORE, dash="none", mark="D", size=5, hollow=True)),
+            Line(x, after * factor, f"after, ±{COVERED:g} u by scatter", Look(AFTER, dash="none", mark="o", size=5),
+                 half, half),
+        ]  # fmt: skip
+        across = Axis(title, places=[(n, short[k]) for n, k in enumerate(every)], turned=90 if len(every) > FEW else 0)
+        legend = None if panels else Legend(least=1)
+        panels.append(
+            Panel("", [Chart(across, Axis(f"{name} [{shown}]" if shown else name), marks, True, legend)], 2.8)
+        )
+    return panels
+
+
+# ---- report -------------------------------------------------------------------------------------------------------
+
+
+def report(result: xr.Dataset) -> str:
+    """The whole report as HTML, to be filed."""
+    several, held = correlations(result), held_out(result)
+    members = sum(row.identifiable for row in estimates(result))
+    numbers = [table for table in (estimated(result).titled(""), budget(result), sensors(result)) if table is not None]
+    parts = [Section("Estimates", pictures=[("Estimates", figure(result, "intervals"))], after=numbers)]
+    if several:
+        pictures = [("Correlation", figure(result, "correlation"))] if members > FEW_ESTIMATES else []
+        parts.append(Section("Correlation", "", pictures, after=[several]))
+    fit = fits(result)
+    about = "Measured minus model over the cycle, before and after the fit."
+    pictures = [("Residuals", figure(result, "residuals"))]
+    parts.append(Section("Residuals", about, pictures, after=[fit] if fit else []))
+    if held:
+        about = "Data not used in the fit, and the error of their prediction."
+        parts.append(Section("Held out", about, after=[held]))
+    end = [data_section(result, "data_files"), Section("Definitions", terms=DEFINITIONS),
+           Section("Parameters", tables=[stated(result)])]  # fmt: skip
+    model = str(result.attrs["name"]) or "model"
+    sizes = [(result.sizes[dim], dim) for dim in ("parameter", "channel", "condition")]
+    facts = [(model, f"model {result.attrs.get('model_hash', '')}"),
+             *counts(*sizes, (int(result["used"].sum()), "position"))]  # fmt: skip
+    return page(
+        result, "Parameter identification from a measurement", facts, parts, summary=_summary(result), end=end,
+        name=str(result.attrs["identified"]) or "Measurement", about_data=about_data(result), signed=True,
+    )  # fmt: skip
+
+
+def _summary(result: xr.Dataset) -> Summary:
+    """The first estimates, and whether the model fits."""
+    summary = []
+    for row in estimates(result)[:MOST_TILES]:
+        pair = (row.say(row.value), "at its bound" if row.limit else f"± {row.say(row.half)}, 95 %")
+        summary.append((row.short, [pair if row.identifiable else ("not identifiable", "from these data")]))
+    chi = float(result["reduced_chi_squared"])
+    return [*summary, *([("reduced χ²", [(number(chi, 3), "near 1 if the model fits")])] if np.isfinite(chi) else [])]
+
+
+DEFINITIONS = (
+    (
+        "Estimate",
+        "The values that minimise Σ w (ȳ − (1 + g) f − z)² + Σ a²: ȳ the means over the turns, f the model, g and z "
+        "the errors of gain and zero of each sensor, a the same in their stated standard uncertainties. The weights w "
+        "are 1 over the variance of the mean, by the scatter between turns and its correlation along a turn.",
+    ),
+    (
+        "Standard uncertainty",
+        "From the contribution of each turn to the estimate, whatever the correlation within it (type A), and from the "
+        "stated uncertainties of zero, gain and resolution (type B), both with the exact derivatives of the model. "
+        "Where the model does not fit, or the conditions disagree, the remaining deviation is added.",
+    ),
+    (
+        "Interval",
+        "It holds the true value in 95 of 100 such experiments if the model is right: estimate ± t u, Student's t for "
+        "the effective degrees of freedom (Welch and Satterthwaite, GUM G.4.1). At a bound it is one-sided.",
+    ),
+    (
+        "Reduced χ²",
+        "Mean square of the residuals relative to that expected from the scatter between turns, frequency by "
+        "frequency along the cycle: near 1 if the model fits.",
+    ),
+    (
+        "Not identifiable",
+        "Parameters with the same effect on the data have no estimate; a finding names the combinations that are "
+        "determined.",
+    ),
+)

@@ -1,0 +1,485 @@
+"""Views of a sweep: figures of the cycle over swept names, as tables, families of curves, maps, and a page.
+
+Tables are of figures over one name, or of one figure over two, a table for each value of further names; long ones are
+thinned evenly, their ends included. Names beyond two are the panels of a figure, names with one value are in its title.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+from math import prod
+from textwrap import fill, wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunnion.errors import Finding, MechanismError, Status
+from trunnion.results.attributes import attribute
+from trunnion.results.quantities import prefixed, quantity
+from trunnion.results.scales import without_noise
+from trunnion.results.tables.studies import swept as figures_of
+from trunnion.solve.friction_method import MARGIN
+from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe
+from trunnion.views.common.cycle import Array
+from trunnion.views.common.peaks import ease_of_status, usual_peak
+from trunnion.views.cycle.deviations import angle_scale
+from trunnion.views.page import Section, counts, page
+from trunnion.views.scales import (
+    KINDS,
+    Arrangement,
+    Scale,
+    arrange,
+    cause,
+    check_kind,
+    grid,
+    meaning,
+    statuses,
+    thinned,
+    written,
+)
+from trunnion.views.table import Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["KINDS", "Field", "check_kind", "figure", "on_scale", "report", "tables"]
+
+
+# ---- tables -------------------------------------------------------------------------------------------------------
+
+MOST_ROWS, MOST_COLUMNS = 40, 8  # of a table
+LEAST_ROWS, LEAST_COLUMNS, MOST_TABLES = 6, 3, 6
+BESIDE = "friction_power_mean", "locking_margin"  # in the table beside the measure, if the sweep has them
+
+
+def tables(
+    result: xr.Dataset, measures: Sequence[str] = ("efficiency",), x: str = "", family: str = "", room: int = 1000
+) -> list[Table]:
+    """One table of several figures over a single name; of more names one for each measure and value of the facets.
+
+    room: characters in a line, which limit how many columns of a long table are shown.
+    """
+    result = without_noise(result)
+    plan = arrange(result, x, family)
+    if plan.other is None:
+        return [_list(result, measures, plan)]
+    return [table for measure in measures for table in _matrices(result, measure, plan, plan.other, room)]
+
+
+def _list(result: xr.Dataset, measures: Sequence[str], plan: Arrangement) -> Table:
+    """Several figures over one name."""
+    every = figures_of(result)
+    shown = dict.fromkeys([*measures, "efficiency", "efficiency_ideal", *_efforts(every), *BESIDE])
+    columns, titles = [], []
+    for name in shown:
+        if name in every or name in measures:
+            unit, values = grid(result, plan, name)
+            factor, drawn = _drawn(unit)
+            columns.append(factor * values[:, 0])
+            titles.append(f"{name.replace('_', ' ')} [{drawn}]".removesuffix(" [1]"))
+    picked = thinned(len(plan.x.values), MOST_ROWS)
+    words = [_word(int(code)) for code in statuses(result, plan)[:, 0]]
+    rows = []
+    for i in picked:
+        cells = ["" if np.isnan(column[i]) else _number(column[i]) for column in columns]
+        rows.append([_number(plan.x.values[i]), *cells, *([words[i]] if any(words) else [])])
+    head = [plan.x.title, *titles, *(["status"] if any(words) else [])]
+    title = f"{', '.join(name.replace('_', ' ') for name in measures)} over {plan.x.name}"
+    return Table(_titled(title, plan.at()), head, rows, len(plan.x.values) - len(picked))
+
+
+def _efforts(every: dict[str, tuple[str, Any]]) -> list[str]:
+    """The ends of every driver's effort that lie beyond 0 at any point: both where its sign changes."""
+    shown = []
+    for driver in (name.removesuffix(".effort_max") for name in every if name.endswith(".effort_max")):
+        ends = {f"{driver}.effort_min": -1.0, f"{driver}.effort_max": 1.0}
+        beyond = [name for name, sign in ends.items() if np.nanmax(sign * every[name][1], initial=0.0) > 0]
+        shown += beyond or [f"{driver}.effort_max"]
+    return shown
+
+
+def _matrices(result: xr.Dataset, measure: str, plan: Arrangement, other: Scale, room: int) -> list[Table]:
+    """A table for each combination of the facets' values; of many of them some."""
+    unit, values = grid(result, plan, measure)
+    (factor, shown_unit), status = _drawn(unit), statuses(result, plan)
+    places = list(product(*(range(len(scale.values)) for scale in plan.facets)))
+    shown = [places[i] for i in thinned(len(places), MOST_TABLES)]
+    most = max(LEAST_ROWS, MOST_ROWS // len(shown))
+    name = measure.replace("_", " ") + (f" [{shown_unit}]" if shown_unit not in ("", "1") else "")
+    matrices = []
+    for place in shown:
+        facets = [scale.told(i) for scale, i in zip(plan.facets, place, strict=True)]
+        at = ", ".join([*facets, *([plan.at()] if plan.fixed else [])])
+        title = _titled(f"{name} over {plan.x.name} and, in columns, {other.name}", at)
+        index: Any = (slice(None), slice(None), *place)
+        matrices.append(_matrix(title, plan.x, other, factor * values[index], status[index], most, room))
+    hidden = (len(places) - len(shown)) * plan.x.values.size * other.values.size
+    matrices[-1] = replace(matrices[-1], left_out=matrices[-1].left_out + hidden)
+    return matrices
+
+
+def _matrix(title: str, x: Scale, other: Scale, values: Array, status: NDArray[np.int8], most: int, room: int) -> Table:
+    """One figure over two names: at most so many rows, and columns that fit the room."""
+    down = thinned(values.shape[0], most)
+    columns = [[x.title, *(_number(x.values[i]) for i in down)]]
+    for k, (numbers, codes) in enumerate(zip(values[down].T, status[down].T, strict=True)):
+        cells = [_number(value) if not np.isnan(value) else cause(code) if code >= Status.NOT_CONVERGED else ""
+                 for value, code in zip(numbers.tolist(), codes.tolist(), strict=True)]  # fmt: skip
+        columns.append([other.say(k), *cells])
+    across = thinned(values.shape[1], MOST_COLUMNS)
+
+    def width() -> int:
+        """Characters of the columns; the words of a cause may stand below each other."""
+        picked = [columns[0], *(columns[k + 1] for k in across)]
+        return sum(3 + max(len(column[0]), *(len(w) for cell in column for w in cell.split())) for column in picked)
+
+    while len(across) > LEAST_COLUMNS and width() > room:
+        across = thinned(values.shape[1], len(across) - 1)
+    head, *rows = ([columns[0][i], *(columns[k + 1][i] for k in across)] for i in range(len(down) + 1))
+    return Table(title, head, rows, values.size - len(down) * len(across))
+
+
+def _drawn(unit: str) -> tuple[float, str]:
+    """Factor and unit of a column: lengths in mm, angles in degrees."""
+    return {"m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}.get(unit, (1.0, unit))
+
+
+def _titled(title: str, at: str) -> str:
+    return f"{title}, at {at}" if at else title
+
+
+def _word(code: int) -> str:
+    """What a table says of a point that has no figures, or not quite sound ones."""
+    if code >= Status.NOT_CONVERGED:
+        return cause(code)
+    milder = {int(Status.NEAR_SINGULAR): "near singular", int(Status.CONTACT_LOST): "contact lost"}
+    return milder.get(code, "")
+
+
+def _number(value: float) -> str:
+    if value == np.inf:  # of a locking margin: as far as it is looked for
+        return f"> {MARGIN:g}"
+    return f"{value + 0.0:.6g}"  # + 0.0: no negative zero
+
+
+# ---- what is drawn ------------------------------------------------------------------------------------------------
+
+MOST_PANELS = 12
+NOTHING = -1  # beside the statuses: sound, and yet without a number
+ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
+WIDE = 74  # characters of a title in a line
+
+
+@dataclass(frozen=True)
+class Field:
+    """A figure of a sweep as it is drawn: numbers in SI, (axis, curve, panel), the axis rising.
+
+    scope: the magnitude that is shown; factor, shown: what brings it to the unit of the drawing, and that unit.
+    panels: their titles; hidden: how many more there are; columns: how many belong side by side, 0 if that is the same.
+    nothing: what a sound point without a number has: "∞" or "no value".
+    """
+
+    plan: Arrangement
+    x: Array
+    values: Array
+    ideal: Array | None
+    status: NDArray[np.int8]
+    unit: str
+    title: str
+    scope: float
+    factor: float
+    shown: str
+    panels: list[str]
+    hidden: int
+    columns: int
+    nothing: str
+
+    @property
+    def label(self) -> str:
+        """The figure with its unit."""
+        return f"{self.title} [{self.shown}]" if self.shown else self.title
+
+    def beyond(self, panel: int) -> list[Mark]:
+        """What a panel says of its peak, where that is outside the frame."""
+        peak = float(np.nanmax(np.abs(self.values[:, :, panel]), initial=0.0))
+        text = f"peak {quantity(peak, self.unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
+        return [Note(text, 0.99, 0.97, "right", "top", boxed=True)] if peak > self.scope else []
+
+
+def _field(result: xr.Dataset, measure: str, x: str, family: str) -> Field:
+    """The numbers of a figure, brought into order; of too many panels some."""
+    plan = arrange(result, x, family)
+    unit, values = grid(result, plan, measure)
+    nothing = "∞" if np.isinf(values).any() else "no value"  # a margin beyond the last that is looked for
+    values = np.where(np.isfinite(values), values, np.nan)
+    ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else None
+    order = np.argsort(plan.x.values, kind="stable")
+    sizes = [len(scale.values) for scale in plan.facets]
+    total = prod(sizes)
+    while prod(sizes) > MOST_PANELS:
+        sizes[int(np.argmax(sizes))] -= 1
+    picked = (thinned(len(scale.values), size) for scale, size in zip(plan.facets, sizes, strict=True))
+    places = list(product(*picked))
+
+    def panelled(array: NDArray[Any]) -> NDArray[Any]:
+        rows: list[Any] = [(order, slice(None), *place) for place in places]
+        return np.stack([array[row] for row in rows], axis=-1)
+
+    values, status = panelled(values), panelled(statuses(result, plan))
+    ideal = None if ideal is None else panelled(ideal)
+    scope = usual_peak(ease_of_status(result, status), values, ideal)
+    factor, shown = angle_scale(scope) if unit == "rad" else prefixed(scope, unit)
+    titles = [", ".join(s.told(i) for s, i in zip(plan.facets, place, strict=True)) for place in places]
+    columns = len({place[-1] for place in places}) if len(plan.facets) == 2 else 0
+    return Field(
+        plan, plan.x.values[order], values, ideal, status, unit, meaning(measure, unit), scope, factor, shown,
+        titles, total - len(places), columns, nothing,
+    )  # fmt: skip
+
+
+def figure(
+    result: xr.Dataset, measure: str = "efficiency", x: str = "", family: str = "", kind: str = "curves"
+) -> Figure:
+    """A number of the cycle over swept names.
+
+    Parameters
+    ----------
+    result : of a sweep
+    measure : the number, by its column in the CSV file
+    x, family : the name along the axis and that of the curves, or upwards in a map; the first two that vary if not
+        given
+    kind : of KINDS. Where there is no answer it is grey or hatched, with the cause; the curves of a mechanism with
+        errors stand beside those of the ideal one, if the sweep has them
+
+    Raises
+    ------
+    MechanismError : for names that are not swept, and for a map of fewer than two names that vary
+    """
+    from trunnion.views.draw import Board
+
+    check_kind(kind)
+    field = _field(without_noise(result), measure, x, family)
+    plan, other, mapped = field.plan, field.plan.other, kind == "map"
+    if mapped:
+        _need_two(plan)
+    over = f"{plan.x.name} and {other.name}" if mapped and other else plan.x.name
+    title = f"{field.title} over {over}{f' at {plan.at()}' if plan.fixed else ''}"
+    if field.hidden:
+        title += f" ({len(field.panels)} of {len(field.panels) + field.hidden} panels)"
+    title = fill(f"{title[:1].upper()}{title[1:]}", WIDE, break_long_words=False)
+    board = Board.new(title, result, len(field.panels), _columns(field))
+    if mapped:
+        from trunnion.views.sweep_map import draw
+
+        draw(board, field)
+        return board.sheet
+    for k in range(len(field.panels)):
+        board.draw(k, _curves(field, k))
+    board.finish(_colours(other) if other is not None and len(other.values) > MOST_NAMED else None)
+    return board.sheet
+
+
+def _need_two(plan: Arrangement) -> None:
+    """MechanismError if there are not two names with two values or more to draw a map over."""
+    short = [scale.name for scale in (plan.x, plan.other) if scale and np.unique(scale.values).size < 2]
+    if plan.other is None or short:
+        what = f"'{short[0]}' has one value" if short else f"'{plan.x.name}' alone is swept"
+        remedy = "sweep over two names with several values each, or draw curves"
+        raise MechanismError(Finding(f"{what}: a map needs two that vary", "--kind map", remedy))
+
+
+def _columns(field: Field) -> int:
+    """How many panels stand side by side: all values of the last of two names, or a block nearly square."""
+    count = len(field.panels)
+    if 1 < field.columns <= 4:
+        return field.columns
+    return count if count <= 3 else 2 if count == 4 else 3 if count <= 6 or count == 9 else 4
+
+
+def panel_title(text: str, room: int) -> str:
+    """A title of a panel in lines of so many characters, broken after commas, too long names by their ends."""
+    lines: list[str] = []
+    for part in text.split(", "):
+        while len(part) > room and "." in part.split(" = ")[0].lstrip("…"):
+            part = f"…{part.lstrip('…').partition('.')[2]}"
+        part = part if len(part) <= room else f"…{part[1 - room :]}"
+        if lines and len(lines[-1]) + len(part) + 2 <= room:
+            lines[-1] += f", {part}"
+        else:
+            lines[-1:] = [f"{line}," for line in lines[-1:]]
+            lines.append(part)
+    return "\n".join(lines)
+
+
+# ---- axes ---------------------------------------------------------------------------------------------------------
+
+
+def on_scale(scale: Scale) -> str:
+    """ "log" if the values of a name are positive, span ten times or more and are spaced by ratios; else "linear"."""
+    values = np.unique(scale.values)
+    if values.size < 3 or values[0] <= 0 or values[-1] < 10 * values[0]:
+        return "linear"
+    ratios, steps = np.diff(np.log(values)), np.diff(values)
+    return "log" if ratios.max() / ratios.min() < min(4.0, steps.max() / steps.min()) else "linear"
+
+
+def ends(scale: Scale, margin: float = 0.015) -> tuple[float, float]:
+    """Ends of an axis: a little beyond the first and the last value."""
+    low, high = float(scale.values.min()), float(scale.values.max())
+    if on_scale(scale) == "log":
+        more = (high / low) ** margin
+        return low / more, high * more
+    more = margin * (high - low) if high > low else 0.5 * abs(low) or 0.5
+    return low - more, high + more
+
+
+def axis_of(scale: Scale, room: int, margin: float = 0.015) -> Axis:
+    """The axis along which a swept name runs; few values stand there as they were given. room: characters of a line."""
+    values, log = np.unique(scale.values), on_scale(scale) == "log"
+    few = values.size == 1 or (log and values.size <= 7)
+    title = "\n".join(wrap(scale.label, room, break_long_words=False))
+    places = [(float(value), written(value)) for value in values] if few else None
+    return Axis(title, ends(scale, margin), places, log, powers=not log and not few)
+
+
+# ---- curves -------------------------------------------------------------------------------------------------------
+
+MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
+MOST_MARKED = 40  # points of a curve that are marked
+MARKS = "os^DvPX*"  # so that curves are told apart in grey, too
+DASHES: Any = ("solid", "long", "short", "dotted")
+
+
+def _curves(field: Field, panel: int) -> Chart:
+    """One curve for each value of the second name, with what hinders it where there is none."""
+    other, x = field.plan.other, field.x
+    y, status = field.values[:, :, panel], field.status[:, :, panel]
+    ideal = None if field.ideal is None else field.ideal[:, :, panel] * field.factor
+    room = field_room(len(field.panels), _columns(field))
+    empty = ~np.isfinite(y) & (status < Status.NOT_CONVERGED) & bool(np.isfinite(y).any())
+    marks = _hindered(field, np.where(empty, NOTHING, status))
+    count = y.shape[1]
+    for k in range(count):
+        look, label = _look(field, k), "as built" if ideal is not None else None
+        if other is not None:  # many are told apart by the scale of colours
+            label = other.told(k) if count <= MOST_NAMED else None
+        marks += _curve(x, y[:, k] * field.factor, label, look)
+        if ideal is not None:
+            name = ("ideal" if other is None else "ideal, dashed") if k == count - 1 else None
+            marks += _curve(x, ideal[:, k], name, look.but(colour="ink", dash="long", width=1.0, size=2.2))
+    rows, columns = np.nonzero((status == Status.CONTACT_LOST) & np.isfinite(y))
+    if rows.size:
+        marks += rings(x[rows], y[rows, columns] * field.factor, float(np.clip(8 * np.sqrt(60 / rows.size), 2, 8)))
+    if not np.isfinite(y).any() and not (status >= Status.NOT_CONVERGED).any():
+        marks.append(Note(f"{field.nothing} at all points", 0.5, 0.5))
+    title = "\n".join(wrap(field.label, 60 if len(field.panels) == 1 else 32, break_long_words=False))
+    side = replace(_frame(field), title=title)
+    headed = panel_title(field.panels[panel], room) if len(field.panels) > 1 else ""
+    return Chart(axis_of(field.plan.x, room), side, [*marks, *field.beyond(panel)], legend=None, title=headed)
+
+
+def field_room(count: int, columns: int) -> int:
+    """Characters along a panel of so many, by how many stand side by side."""
+    return {1: 70, 2: 40, 3: 28, 4: 24}[columns if count > 1 else 1]
+
+
+def _look(field: Field, k: int) -> Look:
+    """Colour of a curve, and its marks or, of curves without, its dashes; beside ideal ones none."""
+    count, points, other = field.values.shape[1], field.x.size, field.plan.other
+    if other is not None and count > MOST_NAMED:
+        mark = "o" if points == 1 else ""
+        return Look(_colours(other).share(float(other.values[k])), 1.2, mark=mark, size=5)
+    if points <= MOST_MARKED:
+        return Look(k, mark=MARKS[k], size=5 if points == 1 else 3.5)
+    plain = field.ideal is not None or count == 1
+    return Look(k, dash="solid" if plain else DASHES[k % 4])
+
+
+def _colours(other: Scale) -> ColourScale:
+    log = on_scale(other) == "log"
+    low, high = float(other.values.min()), float(other.values.max())
+    return ColourScale(other.label, *(ends(other) if low == high else (low, high)), log)
+
+
+def _curve(x: Array, y: Array, label: str | None, look: Look) -> list[Mark]:
+    """One curve; points beside a gap have a cross."""
+    answered = np.isfinite(y)
+    beside = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
+    cross = look.but(dash="none", mark="x", size=7.0 if look.mark or look.width > 1.2 else 3.5, order=4.0)
+    return [Line(x, y, label, look), *([Line(x[beside], y[beside], None, cross)] if beside.any() else [])]
+
+
+def rings(x: Array, y: Array, size: float, beyond: bool = False) -> list[Mark]:
+    """Rings of a size around points at which contact is lost; in the legend one that is seen. beyond: the frame, too"""
+    look = Look("limit", dash="none", mark="o", size=7, hollow=True, order=4)
+    empty = np.empty(0)
+    seen = Line(empty, empty, "contact lost at some position", look)
+    return [seen, Line(x, y, None, look.but(size=size, beyond=beyond))]
+
+
+def _frame(field: Field) -> Axis:
+    """One scale upwards for all panels, cut where some rise far above the rest; flat curves in the middle of it."""
+    both = field.values if field.ideal is None else np.append(field.values, field.ideal)
+    finite = both[np.isfinite(both)] * field.factor
+    if not finite.size:
+        return Axis(places=[])
+    low, high, scope = float(finite.min()), float(finite.max()), field.scope * field.factor
+    most = max(abs(low), abs(high))
+    if scope < most:
+        return Axis(limits=(max(min(low, 0.0), -scope) * 1.05, min(max(high, 0.0), scope) * 1.05))
+    half = 0.1 * most or 1.0
+    return Axis(limits=(low - half, high + half)) if high - low <= ALIKE * most else Axis()
+
+
+def _hindered(field: Field, status: NDArray[np.int8]) -> list[Mark]:
+    """Grey where no curve has an answer, hatched where some have none; the cause beside it or, in panels, above.
+
+    status: or NOTHING, where a point with an answer has no number.
+    """
+    scale, x, alone = field.plan.x, field.x, len(field.panels) == 1
+    missing = (status >= Status.NOT_CONVERGED) | (status == NOTHING)
+    low, high = ends(scale)
+    middle = np.sqrt(x[:-1] * x[1:]) if on_scale(scale) == "log" else (x[:-1] + x[1:]) / 2
+    edges = np.concatenate([[low], middle, [high]])
+    kind = np.where(missing.all(axis=1), 2, np.where(missing.any(axis=1), 1, 0))
+    codes = np.where(missing, status, NOTHING).max(axis=1)
+    bounds = np.append(np.flatnonzero(np.diff(np.append(-1, kind))), len(kind)).tolist()
+    marks, causes = list[Mark](), set[str]()
+    for start, stop in pairwise(bounds):
+        if not kind[start]:
+            continue
+        code = int(codes[start:stop].max())
+        text = (field.nothing if code == NOTHING else cause(code)) + ("" if kind[start] == 2 else " for some")
+        look = Look("shade" if kind[start] == 2 else "rule", hatch="" if kind[start] == 2 else "///", order=0.5)
+        wide = text not in causes or (stop - start) / len(kind) > 0.03  # a second time only where there is room
+        name = None if alone or text in causes else text
+        marks.append(Stripe(edges[start], edges[stop], text if alone and wide else "", look, name))
+        causes.add(text)
+    return marks
+
+
+# ---- report -------------------------------------------------------------------------------------------------------
+
+
+def report(
+    result: xr.Dataset,
+    measures: Sequence[str] = ("efficiency",),
+    x: str = "",
+    family: str = "",
+    kind: str = "curves",
+) -> str:
+    """The whole report as HTML, a figure and tables of every measure; options: those of `figure`."""
+    over = " and ".join(attribute(result, "swept"))
+    facts = [*counts((prod(result.sizes[name] for name in attribute(result, "swept")), "point")), ("over", over)]
+    parts = []
+    for name in measures:
+        after = []
+        for table in tables(result, [name], x, family):
+            left_out = f"; {table.left_out:,} points more in a table file" if table.left_out else ""
+            after.append(table.titled(table.title + left_out))
+        parts.append(Section(name, "", [(f"{name} over {over}", figure(result, name, x, family, kind))], after=after))
+    return page(result, "Results over a range of model values", facts, parts)

@@ -538,7 +538,7 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
            "envelope": envelope}  # fmt: skip
     kinds = [kind for kind in few if any(KINDS[kind].ready(read) for read in reads)]
     height = max(min(3.3, TALL / len(reads)), SHORT)
-    panels, explained = [], {kind: set[str]() for kind in kinds}
+    panels, explained = [], {kind: set[str | None]() for kind in kinds}
     for k, read in enumerate(reads):
         for kind in kinds:
             charts = few[kind](read).charts if KINDS[kind].ready(read) else []

@@ -295,6 +295,13 @@ def test_a_drop_writes_what_the_drag_showed():
     assert "chooses the branch" in text
 
 
+def test_a_dimension_that_stands_for_several_lengths_is_told_once():
+    dragged = ask(ask="drag", text=EXAMPLES["drawing-press"], point="K", index=200, to=[-0.11, -0.15])
+    names = [name for name, *_ in dragged["changes"]]
+    assert "L" in names
+    assert len(names) == len(set(names))
+
+
 def column(values):
     return np.array(values, float)  # None is NaN
 

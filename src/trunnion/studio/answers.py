@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache, partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -193,8 +193,10 @@ def _drag(asked: Asked) -> dict[str, Any]:
         sketch.numbers = state.mechanism.parameter_set.nominal
     sketch.locked, sketch.fine = set(map(str, asked.get("locked") or ())), float(asked.get("fine") or 0.0)
     point = str(asked["point"])
-    changes = sketch.moved(point, to, bool(asked.get("keep")))
-    back = solved_with(state, {change.path: change.value for change in changes}, steps, asked.get("friction") != "off")
+    changes = {change.path: change for change in sketch.moved(point, to, bool(asked.get("keep")))}  # a number once
+    back = solved_with(
+        state, {path: change.value for path, change in changes.items()}, steps, asked.get("friction") != "off"
+    )
     columns = live_columns(back, steps)
     shown = f"{sketch.joints[point]['links'][1]}.{point}" if point in sketch.joints else point
     track = columns["points"][shown]
@@ -204,7 +206,7 @@ def _drag(asked: Asked) -> dict[str, Any]:
         near = index
     if not _keeps(sketch, columns["points"], near):  # the crank would turn, and a locked joint with it
         near = index
-    head = {"solved": True, "index": near, "changes": _told(sketch, changes)}
+    head = {"solved": True, "index": near, "changes": _told(sketch, changes.values())}
     return head | columns | {"margin": live_margin(back, columns["status"], near)}
 
 
@@ -227,7 +229,7 @@ def _try(asked: Asked) -> dict[str, Any]:
     return {"solved": True, "index": index} | columns | {"margin": live_margin(back, columns["status"], index)}
 
 
-def _told(sketch: Sketch, changes: list[Change]) -> list[list[str]]:
+def _told(sketch: Sketch, changes: Iterable[Change]) -> list[list[str]]:
     """What a drag changes: name, before, after."""
     return [
         [_named(change.path),

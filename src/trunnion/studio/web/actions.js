@@ -139,7 +139,7 @@ export function setValue(path, value, merge = null) {
   return edit([{ do: "set", path, value }], merge);
 }
 
-/** What the mechanism would be with a point at another place ("drag"), or with other numbers ("try"); null where something newer was asked. */
+/** The mechanism with a point at another place ("drag") or other numbers ("try"); null where something newer was asked. */
 export function changed(kind, fields) {
   const friction = state.friction.value === "off" ? "off" : "stated";
   return link.ask(kind, { text: state.text.value, steps: STEPS, friction, locked: state.locked.value, fine: sheet.fine(), ...fields });
@@ -229,7 +229,7 @@ export function openSheet({ name, saved, content, first = null }) {
   const found = work && (name === null || work.text === saved || work.text !== work.saved) ? work : null;
   state.begin({ name, saved: name === null && found ? found.saved : saved, content: found?.text ?? content, steps: found });
   if (first?.tracks && first.text === state.text.value) showFirst(first);
-  else if (!state.text.value.trim()) showFirst({ text: state.text.value, entries: {}, numbers: {}, tracks: null }); // the frame of an empty sheet stays with what is drawn there
+  else if (!state.text.value.trim()) showFirst({ text: state.text.value, entries: {}, numbers: {}, tracks: null });
   state.dialog.value = null;
   return solve();
 }
@@ -271,7 +271,7 @@ async function fetched(name) {
   await opened;
 }
 
-/** Draw a mechanism by where its points go, or an empty sheet, until its answer is there. */
+/** Draw a mechanism by where its points go, or an empty sheet, until its answer is there; the window then stays. */
 function showFirst({ text, entries, numbers, tracks }) {
   if (tracks) state.places.value = Object.fromEntries(Object.entries(tracks).map(([key, { x, y }]) => [key, [x[0], y[0]]]));
   state.answer.value = { text, entries, numbers, tracks, findings: [], ready: [], solved: false, scene: null };

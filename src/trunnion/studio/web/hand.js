@@ -17,7 +17,7 @@ export function listenToPointer(root, view) {
   const hand = { held: null };
   const fingers = new Map(); // where they are, px, by pointer
   const placed = (event) => {
-    const box = hand.held?.box ?? root.getBoundingClientRect(); // to measure it at each step of a drag takes longer than to draw
+    const box = hand.held?.box ?? root.getBoundingClientRect(); // to measure it at each step takes longer than to draw
     return [event.clientX - box.left, event.clientY - box.top];
   };
   const follow = (event) => {

@@ -15,12 +15,12 @@ export function poseHandles(view, spots, chosen) {
   layers.locks.replaceChildren(...spots.filter(({ name }) => locked.has(name)).map(({ at }) => padlock(frame.to(at))));
   const few = spots.slice(0, MOST);
   const least = gridStep(frame.scale) / 1000; // what a hand can tell apart: less is rounding
-  const told = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
+  const coordinate = (value) => stated(Math.abs(value) < least ? 0 : value, "m");
   const names = few.map(({ kind, name }) => `${kind} ${name}`).join("\n");
   if (view.handled !== names) build(view, few, names);
   few.forEach(({ kind, name, at }, order) => {
     const [x, y] = frame.to(at);
-    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}${locked.has(name) ? ", locked" : ""}, at ${told(at[0])}, ${told(at[1])}`;
+    const words = `${kind === "joints" ? "Joint" : "Point"} ${name}${locked.has(name) ? ", locked" : ""}, at ${coordinate(at[0])}, ${coordinate(at[1])}`;
     const active = chosen?.kind === kind && chosen.name === name;
     set(layers.handles.children[order], {
       cx: x.toFixed(1),

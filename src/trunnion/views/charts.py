@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion.errors import Status
+from trunnion.results.quantities import quantity
 from trunnion.views.common.cycle import Abscissa, intervals
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Axis", "Band", "Bars", "Cells", "Chart", "ColourScale", "Legend", "Line", "Look", "Mark", "Note", "Panel",
-           "Rule", "Stairs", "Stripe", "silent"]  # fmt: skip
+           "Rule", "Stairs", "Stripe", "outside", "silent"]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -136,6 +137,12 @@ class Cells(NamedTuple):
     values: Array
     names: list[str]
     written: bool
+
+
+def outside(peak: float, unit: str) -> Note:
+    """What stands in a chart whose peak is cut off."""
+    text = f"peak {quantity(peak, unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
+    return Note(text, 0.99, 0.97, "right", "top", boxed=True)
 
 
 Mark = Line | Band | Stairs | Bars | Rule | Stripe | Note | Cells

@@ -11,7 +11,7 @@ from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
 from trunnion.results.quantities import prefixed, quantity
 from trunnion.results.scales import without_noise
-from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Note, Panel, Rule, silent
+from trunnion.views.charts import Axis, Band, Chart, Line, Look, Mark, Panel, Rule, outside, silent
 from trunnion.views.common.cycle import Abscissa
 from trunnion.views.common.peaks import ease, usual_peak
 from trunnion.views.page import Section, counts, page
@@ -111,8 +111,7 @@ def _panel(every: xr.Dataset, i: int) -> Panel:
     top = None
     if shown < most:
         top = 1.05 * shown * factor
-        text = f"peak {quantity(most, unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
-        marks.append(Note(text, 0.99, 0.97, "right", "top", boxed=True))
+        marks.append(outside(most, unit))
     title = f"worst case of {every['measure'].values[i]} [{label}]"
     return Panel("", [Chart(over, Axis(title, (0.0, top)), marks, zero=True)], PANEL)
 

@@ -12,7 +12,7 @@ import numpy as np
 from trunnion.errors import Status
 from trunnion.results.attributes import attribute
 from trunnion.results.dataset import units_along
-from trunnion.results.quantities import joined, scale_of
+from trunnion.results.quantities import drawn_in, joined, number, scale_of
 from trunnion.results.scales import without_noise
 from trunnion.views.common.cycle import Abscissa, Array, names
 from trunnion.views.texts import fixed, limits_in, limits_text, rounded
@@ -296,6 +296,16 @@ class MeasureReading:
         ]  # fmt: skip
         return sorted(rows, key=lambda row: [-part if math.isfinite(part) else 1.0
                                              for part in (row.rss_share, row.worst_share)])  # fmt: skip
+
+    def slope(self, row: ContributionRow) -> str:
+        """Change of the measure by a number, in the units in which both are written: "0.01365 °/mm"."""
+        if math.isnan(row.sensitivity):
+            return "—"
+        half = row.worst / abs(row.sensitivity) if row.sensitivity else math.nan  # whose unit is that of the limits
+        factor, shown = drawn_in(half if half > 0 else 1.0, row.unit)
+        shown = shown.replace(" ", "\u00a0")
+        unit = f"{self.label or '1'}/{shown}" if shown else self.label
+        return f"{number(row.sensitivity * self.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
 
     def largest(self, most: int) -> tuple[list[ContributionRow], list[ContributionRow]]:
         """At most so many contributions that have a row or bar of their own, and the rest."""

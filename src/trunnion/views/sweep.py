@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import prefixed, quantity
+from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe
+from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe, outside
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.peaks import ease_of_status, usual_peak
 from trunnion.views.cycle.deviations import angle_scale
@@ -206,8 +206,7 @@ class Field:
     def beyond(self, panel: int) -> list[Mark]:
         """What a panel says of its peak, where that is outside the frame."""
         peak = float(np.nanmax(np.abs(self.values[:, :, panel]), initial=0.0))
-        text = f"peak {quantity(peak, self.unit)} is outside the frame,\nnear a dead centre; --uncut shows it"
-        return [Note(text, 0.99, 0.97, "right", "top", boxed=True)] if peak > self.scope else []
+        return [outside(peak, self.unit)] if peak > self.scope else []
 
 
 def _field(result: xr.Dataset, measure: str, x: str, family: str) -> Field:

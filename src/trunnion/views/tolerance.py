@@ -11,12 +11,12 @@ import numpy as np
 
 from trunnion.errors import Finding, MechanismError
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import drawn_in, number
+from trunnion.results.quantities import number
 from trunnion.statistics import intervals
 from trunnion.views.charts import Axis, Band, Bars, Chart, Legend, Line, Look, Mark, Note, Panel, Rule, Stairs, Stripe
 from trunnion.views.common.cycle import Array, names
 from trunnion.views.page import Section, Summary, counts, page
-from trunnion.views.readings import OUTER, ContributionRow, MeasureReading, failures, readings
+from trunnion.views.readings import OUTER, MeasureReading, failures, readings
 from trunnion.views.table import Table
 from trunnion.views.texts import ending, limits_in, share, share_interval, share_parts, value_text
 
@@ -41,11 +41,10 @@ def tables(result: xr.Dataset) -> list[Table]:
     parts = []
     for read in readings(result):
         parts += _measure_tables(read, read.heading + (f"; limits {read.limits_said}" if read.limited else ""))
-    yields = _overall(result)
-    if yields:
-        parts += failed(result)
-        return [*parts, Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])]
-    return [*parts, *failed(result)]
+    parts, yields = [*parts, *failed(result)], _overall(result)
+    return (
+        [*parts, Table("all limits together", ["", "yield"], [["kept", share_interval(*yields)]])] if yields else parts
+    )
 
 
 def _measure_tables(read: MeasureReading, title: str) -> list[Table]:
@@ -106,30 +105,15 @@ def contributions(read: MeasureReading) -> Table:
     shares |= {"of variance": "variance_share"} if read.shares_apart else {}
     head = ["contribution", "tolerance", "sensitivity", "worst ±", *shares]
     rows = [
-        [row.short, row.limits, _sensitivity(read, row), read.say(row.worst),
+        [row.short, row.limits, read.slope(row), read.say(row.worst),
          *(share(getattr(row, key), 1) for key in shares.values())]
         for row in large
     ]  # fmt: skip
     if rest:
         sums = (float(np.nansum([getattr(row, key) for row in rest])) for key in shares.values())
-        scatters = any(abs(read.value(key)) > 0 for key in ("deviation", "searched_lower", "searched_upper"))
-        effect = "small"
-        if all(row.worst == 0 for row in rest):
-            second = scatters and not any(row.worst for row in read.contributions)
-            effect = "no effect to first order" if second else "no effect"
+        effect = "no effect to first order" if all(row.worst == 0 for row in rest) else "small"
         rows.append([f"{len(rest)} others, {effect}", "", "", "", *(share(part, 1) for part in sums)])
     return Table(f"contributions to {read.name}{read.at_place}", head, rows)
-
-
-def _sensitivity(read: MeasureReading, row: ContributionRow) -> str:
-    """Change of the measure by the number, in the units in which both are written: "0.01365 °/mm"."""
-    if math.isnan(row.sensitivity):
-        return "—"
-    half = row.worst / abs(row.sensitivity) if row.sensitivity else math.nan  # whose unit is that of the limits
-    factor, shown = drawn_in(half if half > 0 else 1.0, row.unit)
-    shown = shown.replace(" ", "\u00a0")
-    unit = f"{read.label or '1'}/{shown}" if shown else read.label
-    return f"{number(row.sensitivity * read.factor / factor)}\u00a0{unit}".rstrip("\u00a0")
 
 
 def indices(read: MeasureReading) -> Table:
@@ -167,8 +151,8 @@ def overview(result: xr.Dataset) -> Table:
     rows, head = [], list[str]()
     for read in readings(result):
         cells = cells_of(read)
-        sampled = [cells[key].get("sampled") or cells[key].get("linear", "") for key in ("mean", "deviation σ", "yield",
-                                                                                        "Cpk")]  # fmt: skip
+        keys = ("mean", "deviation σ", "yield", "Cpk")
+        sampled = [cells[key].get("sampled") or cells[key].get("linear", "") for key in keys]
         rows.append([read.name, read.limits_said, cells["nominal"]["linear"], _worst(cells),
                      cells[read.rss_label]["linear"], *sampled])  # fmt: skip
         head = ["measure", "limits", "nominal", "worst case", read.rss_label, "mean", "deviation σ", "yield", "Cpk"]
@@ -563,43 +547,24 @@ def _named(result: xr.Dataset, measures: Sequence[str] | None) -> list[MeasureRe
 
 # method: heading, what was done
 NOTES: dict[str, tuple[str, str]] = {
-    "linear": (
-        "Linear",
-        "Sensitivities are derivatives of the measure by every toleranced number, carried exactly through motion and "
-        "forces by dual numbers. The worst case adds their sizes times the limits; RSS is the root of the sum of the "
-        "squares, with the means where the distributions have them. A clearance contributes through the load that "
-        "the pin bears under a unit load at the measure.",
-    ),
-    "worst-case": (
-        "Worst case by search",
-        "The corner that the sensitivities point to is put into the nonlinear model and improved from there; the "
-        "worst corner that was found is run again, and its figure is the one reported. A search finds a bad corner; "
-        "it does not prove that none is worse.",
-    ),
-    "monte-carlo": (
-        "Monte Carlo",
-        "Each sample is a mechanism of its own, drawn from the distributions, assembled and run through the same "
-        "analysis as the nominal one. The numbers come from a counter-based generator (Salmon et al., 2011, "
-        "doi:10.1145/2063384.2063405), so that the same seed gives the same samples however the work is divided.",
-    ),
-    "quasi-monte-carlo": (
-        "Quasi-Monte Carlo",
-        "The samples are points of Sobol's sequence, which fill the space of the tolerances more evenly than random "
-        "ones, scrambled for each of several replicates; the intervals come from the scatter between them by "
-        "Student's t.",
-    ),
-    "sobol": (
-        "Sobol indices",
-        "The share of the variance due to a parameter alone, and with all its interactions (Sobol, 2001, "
-        "doi:10.1016/S0378-4754(00)00270-6). They hold for large and nonlinear deviations, but assume independent "
-        "numbers.",
-    ),
-}
+    "linear": ("Linear", "Sensitivities are exact derivatives of the measure, carried through motion and forces by "
+               "dual numbers. The worst case is the sum of their sizes times the limits, RSS the root of the sum of "
+               "squares. A clearance contributes by the load that its pin bears under a unit load at the measure."),
+    "worst-case": ("Worst case by search", "From the corner to which the sensitivities point the nonlinear model is "
+                   "improved to a worse one, whose figure is reported. It is not proven that no corner is worse."),
+    "monte-carlo": ("Monte Carlo", "Each sample is a mechanism drawn from the distributions and run through the same "
+                    "analysis as the nominal one. Numbers are counter-based (Salmon et al., 2011, "
+                    "doi:10.1145/2063384.2063405): the same seed gives the same samples however the work is divided."),
+    "quasi-monte-carlo": ("Quasi-Monte Carlo", "The samples are scrambled replicates of Sobol's sequence, which fills "
+                          "the space of the tolerances more evenly than random points; intervals are Student's t of "
+                          "the scatter between replicates."),
+    "sobol": ("Sobol indices", "The share of the variance due to a parameter alone, and with its interactions (Sobol, "
+              "2001, doi:10.1016/S0378-4754(00)00270-6), of large and nonlinear deviations of independent numbers."),
+}  # fmt: skip
 ON_SAMPLES = (
-    "Samples that cannot be assembled, lock or do not converge count as outside every limit; means, deviations and "
-    "quantiles are those of the others. The interval of a yield is Wilson's (1927, "
-    "doi:10.1080/01621459.1927.10502953), at 95 %. Cp compares the width of the limits with six standard deviations, "
-    "Cpk the distance from the mean to the nearer limit with three."
+    "Samples that cannot be assembled, lock or do not converge are outside every limit; means, deviations and "
+    "quantiles are of the others. The interval of a yield is Wilson's (1927, doi:10.1080/01621459.1927.10502953), at "
+    "95 %. Cp is the width of the limits over 6 σ, Cpk the distance from the mean to the nearer limit over 3 σ."
 )
 
 

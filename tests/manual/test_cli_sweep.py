@@ -209,11 +209,11 @@ def test_measures_stand_in_millimetres_and_degrees() -> None:
 
 def test_long_tables_are_thinned() -> None:
     mechanism = trunnion.read(FOUR_BAR)
-    _, _, shown, left = tables(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))[0]
-    assert len(shown) == 40
-    assert left == 10
-    assert (shown[0][0], shown[-1][0]) == ("2", "2.1")
-    _, head, shown, left = tables(trunnion.sweep(mechanism, {"AB": [2, 2.1], "BC": ("6 m", "6.1 m", 12)}, 1))[0]
-    assert len(head) == 9
-    assert left == 8
-    assert head[-1] == "6.1 m"
+    table = tables(trunnion.sweep(mechanism, {"AB": ("2 m", "2.1 m", 50)}, 1))[0]
+    assert len(table.rows) == 40
+    assert table.left_out == 10
+    assert (table.rows[0][0], table.rows[-1][0]) == ("2", "2.1")
+    table = tables(trunnion.sweep(mechanism, {"AB": [2, 2.1], "BC": ("6 m", "6.1 m", 12)}, 1))[0]
+    assert len(table.head) == 9
+    assert table.left_out == 8
+    assert table.head[-1] == "6.1 m"

@@ -285,9 +285,9 @@ def test_a_sweep_is_drawn_beside_the_ideal_mechanism(slider, tmp_path):
     lost = swept["status"].values == Status.CONTACT_LOST
     told = [text.get_text() for text in axes.get_legend().get_texts()]
     assert ("contact lost at some position" in told) == lost.any()
-    _, head, rows, _ = tables(swept)[0]
-    assert head[:3] == ["misalignment [deg]", "efficiency", "efficiency ideal"]
-    assert ([row[-1] == "contact lost" for row in rows] == lost).all()
+    table = tables(swept)[0]
+    assert table.head[:3] == ["misalignment [deg]", "efficiency", "efficiency ideal"]
+    assert ([row[-1] == "contact lost" for row in table.rows] == lost).all()
     save(sweep_figure(swept, "output.transmission_error_max"), tmp_path / "error.png")
     free = trunnion.sweep(mechanism.with_values({"joint_defaults.friction.coefficient": 0.1}),
                           {"misalignment": ["10 deg", "20 deg"], "input.speed": [10, 100]}, 12)  # fmt: skip

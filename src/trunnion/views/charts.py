@@ -28,10 +28,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Look:
-    """How a mark looks. colour: a number of the palette, a name, "#rrggbb", or a share of the scale
-    of colours; mark: a sign at each point, hollow or
-    filled; hatch: of an area; order: what has a larger one lies above; beyond: also over
-    the frame.
+    """How a mark looks.
+
+    colour: a number of the palette, a name, "#rrggbb", or a share of the scale of colours; mark: a sign at each point,
+    hollow or filled; hatch: of an area; order: what has a larger one lies above; unclipped: also over the frame.
     """
 
     colour: int | float | str = 0
@@ -43,7 +43,7 @@ class Look:
     alpha: float | None = None
     hatch: str = ""
     order: float = 2.0
-    beyond: bool = False
+    unclipped: bool = False
 
     def but(self, **changes: object) -> Look:
         """The same with something changed."""
@@ -153,15 +153,15 @@ class Axis:
     """An axis of a chart.
 
     limits: its ends, None where the marks decide; margin: around the marks, as a share; places: where it is marked,
-    with names, which may be turned by so many degrees; whole: marked at whole numbers only; count: of its marks; form:
-    how a number is written; powers: very large and small numbers by a common power of ten.
+    with names, which may be turned by so many degrees; integer: marked at whole numbers only; count: of its marks;
+    form: how a number is written; powers: very large and small numbers by a common power of ten.
     """
 
     title: str = ""
     limits: tuple[float | None, float | None] = (None, None)
     places: Sequence[tuple[float, str]] | None = None
     log: bool = False
-    whole: bool = False
+    integer: bool = False
     count: int = 0
     form: Callable[[float], str] | None = None
     turned: float = 0.0
@@ -222,14 +222,14 @@ class Panel:
     parts: Sequence[float] = field(default=())
 
 
-def silent(result: xr.Dataset, over: Abscissa, said: bool = True) -> list[Mark]:
+def silent(result: xr.Dataset, over: Abscissa, written: bool = True) -> list[Mark]:
     """Stripes where positions have no answer, with each cause once; hatched where a pin loses contact.
 
     Parameters
     ----------
     result : of one cycle
     over : what it is drawn over
-    said : whether the causes are written
+    written : whether the causes are written
     """
     x, marks, causes = over.values, list[Mark](), set[str]()
     half = abs(float(x[1] - x[0])) / 2 if x.size > 1 else 0.5
@@ -239,7 +239,7 @@ def silent(result: xr.Dataset, over: Abscissa, said: bool = True) -> list[Mark]:
         hatched = run in lost
         text = "not valid" if hatched else run.text.split(":")[0]
         look = Look("shade", hatch="////" if hatched else "", order=0.5)
-        marks.append(Stripe(low - half, high + half, text if said and text not in causes else "", look))
+        marks.append(Stripe(low - half, high + half, text if written and text not in causes else "", look))
         causes.add(text)
         if not hatched:
             marks += [Rule(end, None, Look("muted", 0.6, "short", order=0.6)) for end in (low - half, high + half)]

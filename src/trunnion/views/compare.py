@@ -479,7 +479,7 @@ def course(result: xr.Dataset, channel: int, condition: int, room: int) -> Panel
     below: list[Mark] = [
         Band(x, -wide, wide, None, band, True),
         Line(x, residual, None, Look(MEASURED, 1.1), close=True),
-        *silent(cycle, over, said=False),
+        *silent(cycle, over, written=False),
     ]
     peak = np.nanmax(np.abs(np.append(measured, model)), initial=0.0)
     flat = np.nanmax(np.abs(np.append(residual, wide)), initial=0.0) < 1e-6 * peak  # nothing to look at closer

@@ -91,8 +91,8 @@ def _panel(place: FigureBase, panel: Panel, wide: float) -> None:
     """The charts of a panel below one another."""
     ratios = list(panel.parts) or [1.0] * len(panel.charts)
     axes_of = place.subplots(len(panel.charts), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-    for axes, one in zip(axes_of, panel.charts, strict=True):
-        chart(axes, one, wide)
+    for axes, spec in zip(axes_of, panel.charts, strict=True):
+        chart(axes, spec, wide)
         if axes is not axes_of[-1]:
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)
@@ -107,8 +107,8 @@ def grid(
     places = sheet.subplots(rows, columns, squeeze=False).ravel()
     for axes in places[len(charts) :]:
         axes.set_visible(False)
-    for axes, one in zip(places, charts, strict=False):
-        chart(axes, one)
+    for axes, spec in zip(places, charts, strict=False):
+        chart(axes, spec)
     if note:
         sheet.text(0.012, 0.005, plain(note), fontsize=7.5, color=MUTED)
     return sheet
@@ -139,10 +139,10 @@ class Board(NamedTuple):
             strip.set_axis_off()
         return cls(sheet, panels, columns, strip)
 
-    def draw(self, k: int, one: Chart) -> Axes:
+    def draw(self, k: int, spec: Chart) -> Axes:
         """The chart of the panel k; titles of its axes stand at the outer panels alone."""
         axes, lowest, leftmost = self.axes[k], k + self.columns >= len(self.axes), k % self.columns == 0
-        chart(axes, one)
+        chart(axes, spec)
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)
         if not lowest:
             axes.set_xlabel("")
@@ -152,10 +152,10 @@ class Board(NamedTuple):
         axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=(8.5, 8.5, 8.5, 8.0, 7.2)[self.columns])
         return axes
 
-    def add(self, k: int, one: Chart) -> None:
+    def add(self, k: int, spec: Chart) -> None:
         """The marks of a chart, over what the panel k has."""
-        for mark in one.marks:
-            _mark(mark, self.axes[k], one)
+        for mark in spec.marks:
+            _mark(mark, self.axes[k], spec)
 
     def finish(self, colours: ColourScale | None = None) -> None:
         """A legend of everything that is named in any panel; the scale of their colours beside all."""
@@ -191,41 +191,41 @@ class Board(NamedTuple):
         return bar
 
 
-def chart(axes: Axes, one: Chart, wide: float = 1.0) -> None:
+def chart(axes: Axes, spec: Chart, wide: float = 1.0) -> None:
     """One chart on axes; wide: of the width of all figures, which its legend has room in."""
-    if isinstance(one.x, Abscissa):
-        along(axes, one.x, _lines(one.y.title), zero=one.zero)
+    if isinstance(spec.x, Abscissa):
+        along(axes, spec.x, _lines(spec.y.title), zero=spec.zero)
     else:
-        dress(axes, _lines(one.x.title), _lines(one.y.title))
-        _axis(axes, "x", one.x)
-        if one.zero:
+        dress(axes, _lines(spec.x.title), _lines(spec.y.title))
+        _axis(axes, "x", spec.x)
+        if spec.zero:
             axes.axhline(0, color=MUTED, linewidth=0.8, zorder=1.5)
-    _axis(axes, "y", one.y)
-    for mark in sorted(one.marks, key=lambda mark: isinstance(mark, Rule)):
+    _axis(axes, "y", spec.y)
+    for mark in sorted(spec.marks, key=lambda mark: isinstance(mark, Rule)):
         if isinstance(mark, Rule):  # in view or not: the limits must stand
-            _limits(axes, one)
-        _mark(mark, axes, one)
-    _limits(axes, one)
-    _titles(axes, one)
-    if one.colours is not None:
-        scale = one.colours
+            _limits(axes, spec)
+        _mark(mark, axes, spec)
+    _limits(axes, spec)
+    _titles(axes, spec)
+    if spec.colours is not None:
+        scale = spec.colours
         norm = (LogNorm if scale.log else Normalize)(scale.low, scale.high)
         bar = axes.figure.colorbar(ScalarMappable(norm, RISING), ax=axes, pad=0.02, aspect=30)
         bar.set_label(plain(scale.title), fontsize=9, color=INK)
         bar.ax.tick_params(labelsize=8.5, colors=MUTED, labelcolor=INK)
-    if one.legend is not None:
-        legend(axes, one.legend.most, int(wide * one.legend.room), one.legend.least)
+    if spec.legend is not None:
+        legend(axes, spec.legend.most, int(wide * spec.legend.room), spec.legend.least)
 
 
-def _titles(axes: Axes, one: Chart) -> None:
-    if one.bare:
+def _titles(axes: Axes, spec: Chart) -> None:
+    if spec.bare:
         axes.spines["left"].set_visible(False)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")
-    if one.title:
-        axes.set_title(_lines(one.title), fontsize=8.5, color=INK, loc="left")
-    if one.aside:
-        axes.set_title(plain(one.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
+    if spec.title:
+        axes.set_title(_lines(spec.title), fontsize=8.5, color=INK, loc="left")
+    if spec.aside:
+        axes.set_title(plain(spec.aside), fontsize=7.5, color=MUTED, loc="right", pad=2)
 
 
 # ---- axes ---------------------------------------------------------------------------------------------------------
@@ -249,8 +249,8 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
         subs = (1.0, 2.0, 5.0) if axis.count > 1 else (1.0,)
         side.set_major_locator(LogLocator(subs=subs, numticks=6))
         side.set_minor_formatter(NullFormatter())
-    elif axis.count or axis.whole:
-        side.set_major_locator(MaxNLocator(integer=axis.whole, nbins=axis.count or 6))
+    elif axis.count or axis.integer:
+        side.set_major_locator(MaxNLocator(integer=axis.integer, nbins=axis.count or 6))
     if axis.powers:
         form = ScalarFormatter(useMathText=True)
         form.set_powerlimits((-4, 6))
@@ -263,9 +263,9 @@ def _axis(axes: Axes, name: str, axis: Axis) -> None:
         axes.ticklabel_format(axis=name, useOffset=False)  # type: ignore[arg-type]  # "x" or "y"
 
 
-def _limits(axes: Axes, one: Chart) -> None:
+def _limits(axes: Axes, spec: Chart) -> None:
     """Ends of both axes."""
-    for name, axis in (("x", one.x), ("y", one.y)):
+    for name, axis in (("x", spec.x), ("y", spec.y)):
         if isinstance(axis, Axis):
             if axis.margin is not None:
                 axes.margins(**{name: axis.margin})  # type: ignore[arg-type]  # x or y
@@ -288,7 +288,7 @@ def line_style(look: Look) -> dict[str, Any]:
     """The look of a line as matplotlib takes it."""
     paint = colour(look.colour)
     style: dict[str, Any] = {"color": paint, "linewidth": look.width, "linestyle": DASHES[look.dash],
-                             "zorder": look.order, "alpha": look.alpha, "clip_on": not look.beyond}  # fmt: skip
+                             "zorder": look.order, "alpha": look.alpha, "clip_on": not look.unclipped}  # fmt: skip
     if look.mark:
         style |= {"marker": look.mark, "markersize": look.size}
     if look.hollow:
@@ -309,26 +309,26 @@ def _name(name: str | None) -> str | None:
     return None if name is None else plain(name)
 
 
-def _closed(one: Chart, x: Array, close: bool, *rows: Array) -> list[Array]:
+def _closed(spec: Chart, x: Array, close: bool, *rows: Array) -> list[Array]:
     """x and rows, over a whole turn led on to their first values."""
-    if not (close and isinstance(one.x, Abscissa) and one.x.closed):
+    if not (close and isinstance(spec.x, Abscissa) and spec.x.closed):
         return [x, *rows]
-    return [np.append(x, x[0] + one.x.period), *(np.append(row, row[0]) for row in rows)]
+    return [np.append(x, x[0] + spec.x.period), *(np.append(row, row[0]) for row in rows)]
 
 
 @singledispatch
-def _mark(mark: object, axes: Axes, one: Chart) -> None:
+def _mark(mark: object, axes: Axes, spec: Chart) -> None:
     raise TypeError(mark)
 
 
 @_mark.register(Line)
-def _line(mark: Line, axes: Axes, one: Chart) -> None:
-    style, (x, y) = line_style(mark.look), _closed(one, mark.x, mark.close, np.asarray(mark.y, float))
+def _line(mark: Line, axes: Axes, spec: Chart) -> None:
+    style, (x, y) = line_style(mark.look), _closed(spec, mark.x, mark.close, np.asarray(mark.y, float))
     if mark.low is not None and mark.high is not None:
         axes.errorbar(x, y, [mark.low, mark.high], label=_name(mark.name), capsize=3, elinewidth=1.1,
                       fmt="none" if not mark.look.mark else "", **style)  # fmt: skip
         return
-    if isinstance(one.x, Abscissa) and mark.look.dash != "none":  # a dense course, without losing a peak
+    if isinstance(spec.x, Abscissa) and mark.look.dash != "none":  # a dense course, without losing a peak
         picked = thin(y)
         x, y = x[picked], y[picked]
     drawstyle: dict[str, Any] = {"drawstyle": "steps-post"} if mark.steps else {}
@@ -341,13 +341,13 @@ def _line(mark: Line, axes: Axes, one: Chart) -> None:
 
 
 @_mark.register(Band)
-def _band(mark: Band, axes: Axes, one: Chart) -> None:
-    x, low, high = _closed(one, mark.x, mark.close, mark.low, mark.high)
+def _band(mark: Band, axes: Axes, spec: Chart) -> None:
+    x, low, high = _closed(spec, mark.x, mark.close, mark.low, mark.high)
     axes.fill_between(x, low, high, label=_name(mark.name), **_area(mark.look))
 
 
 @_mark.register(Stairs)
-def _stairs(mark: Stairs, axes: Axes, one: Chart) -> None:
+def _stairs(mark: Stairs, axes: Axes, spec: Chart) -> None:
     drawn = axes.stairs(mark.counts, mark.edges, fill=True, color=colour(mark.look.colour), zorder=mark.look.order,
                         label=_name(mark.name))  # fmt: skip
     if mark.window is not None:
@@ -357,7 +357,7 @@ def _stairs(mark: Stairs, axes: Axes, one: Chart) -> None:
 
 
 @_mark.register(Bars)
-def _bars(mark: Bars, axes: Axes, one: Chart) -> None:
+def _bars(mark: Bars, axes: Axes, spec: Chart) -> None:
     spread = None if mark.low is None or mark.high is None else np.stack([mark.low, mark.high])
     axes.barh(mark.at, mark.sizes, mark.thickness, color=colour(mark.look.colour), label=_name(mark.name),
               zorder=mark.look.order, xerr=spread,
@@ -365,7 +365,7 @@ def _bars(mark: Bars, axes: Axes, one: Chart) -> None:
 
 
 @_mark.register(Rule)
-def _rule(mark: Rule, axes: Axes, one: Chart) -> None:
+def _rule(mark: Rule, axes: Axes, spec: Chart) -> None:
     if not mark.upright:
         axes.axhline(mark.at, label=_name(mark.name), **line_style(mark.look))
         return
@@ -375,7 +375,7 @@ def _rule(mark: Rule, axes: Axes, one: Chart) -> None:
 
 
 @_mark.register(Stripe)
-def _stripe(mark: Stripe, axes: Axes, one: Chart) -> None:
+def _stripe(mark: Stripe, axes: Axes, spec: Chart) -> None:
     axes.axvspan(mark.low, mark.high, label=_name(mark.name), **_area(mark.look))
     if mark.text:
         log = axes.get_xscale() == "log"
@@ -385,7 +385,7 @@ def _stripe(mark: Stripe, axes: Axes, one: Chart) -> None:
 
 
 @_mark.register(Note)
-def _note(mark: Note, axes: Axes, one: Chart) -> None:
+def _note(mark: Note, axes: Axes, spec: Chart) -> None:
     axes.annotate(
         _lines(mark.text), (mark.x, mark.y), xycoords="data" if mark.data else "axes fraction", xytext=mark.shift,
         textcoords="offset points", ha=mark.across, va=mark.up, fontsize=mark.size, color=colour(mark.colour),
@@ -394,7 +394,7 @@ def _note(mark: Note, axes: Axes, one: Chart) -> None:
 
 
 @_mark.register(Cells)
-def _cells(mark: Cells, axes: Axes, one: Chart) -> None:
+def _cells(mark: Cells, axes: Axes, spec: Chart) -> None:
     count = len(mark.names)
     picture = axes.imshow(np.ma.masked_invalid(mark.values), vmin=-1, vmax=1, cmap=colormaps["RdBu_r"])
     axes.grid(False)

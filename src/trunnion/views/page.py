@@ -156,16 +156,16 @@ def hashed(text: str) -> str:
 
 def headline(result: xr.Dataset) -> list[tuple[str, list[tuple[str, str]]]]:
     """Subjects, each with its figures and what they are: ("drive torque of A", [("9.3 kN m", "maximum, at 24°")])."""
-    found = []
-    rows = [one for one in summary_of(result) if not one.numerical]
-    for subject, members in groupby(rows, key=lambda one: one.subject):
-        found.append((subject, [(_value(one), one.remark) for one in members]))
-    return found
+    rows = [row for row in summary_of(result) if not row.numerical]
+    return [
+        (subject, [(_value(row), row.remark) for row in members])
+        for subject, members in groupby(rows, key=lambda row: row.subject)
+    ]
 
 
-def _value(one: Stated) -> str:
-    text = one.value if isinstance(one.value, str) else quantity(one.value, one.unit) or "—"
-    return f"> {text}" if one.aspect == MORE_THAN else text
+def _value(row: Stated) -> str:
+    text = row.value if isinstance(row.value, str) else quantity(row.value, row.unit) or "—"
+    return f"> {text}" if row.aspect == MORE_THAN else text
 
 
 def inputs_of(result: xr.Dataset) -> list[tuple[str, list[dict[str, str]]]]:

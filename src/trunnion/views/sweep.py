@@ -7,7 +7,7 @@ thinned evenly, their ends included. Names beyond two are the panels of a figure
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise, product
 from math import prod
 from textwrap import fill, wrap
@@ -18,14 +18,11 @@ from numpy.typing import NDArray
 
 from trunnion.errors import Finding, MechanismError, Status
 from trunnion.results.attributes import attribute
-from trunnion.results.quantities import prefixed
 from trunnion.results.scales import without_noise
 from trunnion.results.tables.studies import swept as figures_of
 from trunnion.solve.friction_method import MARGIN
-from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe, outside
+from trunnion.views.charts import Axis, Chart, ColourScale, Line, Look, Mark, Note, Stripe
 from trunnion.views.common.cycle import Array
-from trunnion.views.common.peaks import ease_of_status, usual_peak
-from trunnion.views.cycle.deviations import angle_scale
 from trunnion.views.page import Section, counts, page
 from trunnion.views.scales import (
     KINDS,
@@ -35,10 +32,21 @@ from trunnion.views.scales import (
     cause,
     check_kind,
     grid,
-    meaning,
     statuses,
     thinned,
-    written,
+)
+from trunnion.views.sweep_field import (
+    ALIKE,
+    NOTHING,
+    Field,
+    axis_of,
+    columns_of,
+    ends,
+    field_of,
+    field_room,
+    on_scale,
+    panel_title,
+    rings,
 )
 from trunnion.views.table import Table
 
@@ -46,7 +54,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "Field", "check_kind", "figure", "on_scale", "report", "tables"]
+__all__ = ["KINDS", "check_kind", "figure", "report", "tables"]
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
@@ -168,76 +176,7 @@ def _number(value: float) -> str:
 
 # ---- what is drawn ------------------------------------------------------------------------------------------------
 
-MOST_PANELS = 12
-NOTHING = -1  # beside the statuses: sound, and yet without a number
-ALIKE = 1e-9  # of the largest: numbers that differ by less are taken as one
 WIDE = 74  # characters of a title in a line
-
-
-@dataclass(frozen=True)
-class Field:
-    """A figure of a sweep as it is drawn: numbers in SI, (axis, curve, panel), the axis rising.
-
-    scope: the magnitude that is shown; factor, shown: what brings it to the unit of the drawing, and that unit.
-    panels: their titles; hidden: how many more there are; columns: how many belong side by side, 0 if that is the same.
-    nothing: what a sound point without a number has: "∞" or "no value".
-    """
-
-    plan: Arrangement
-    x: Array
-    values: Array
-    ideal: Array | None
-    status: NDArray[np.int8]
-    unit: str
-    title: str
-    scope: float
-    factor: float
-    shown: str
-    panels: list[str]
-    hidden: int
-    columns: int
-    nothing: str
-
-    @property
-    def label(self) -> str:
-        """The figure with its unit."""
-        return f"{self.title} [{self.shown}]" if self.shown else self.title
-
-    def beyond(self, panel: int) -> list[Mark]:
-        """What a panel says of its peak, where that is outside the frame."""
-        peak = float(np.nanmax(np.abs(self.values[:, :, panel]), initial=0.0))
-        return [outside(peak, self.unit)] if peak > self.scope else []
-
-
-def _field(result: xr.Dataset, measure: str, x: str, family: str) -> Field:
-    """The numbers of a figure, brought into order; of too many panels some."""
-    plan = arrange(result, x, family)
-    unit, values = grid(result, plan, measure)
-    nothing = "∞" if np.isinf(values).any() else "no value"  # a margin beyond the last that is looked for
-    values = np.where(np.isfinite(values), values, np.nan)
-    ideal = grid(result, plan, f"{measure}_ideal")[1] if f"{measure}_ideal" in result else None
-    order = np.argsort(plan.x.values, kind="stable")
-    sizes = [len(scale.values) for scale in plan.facets]
-    total = prod(sizes)
-    while prod(sizes) > MOST_PANELS:
-        sizes[int(np.argmax(sizes))] -= 1
-    picked = (thinned(len(scale.values), size) for scale, size in zip(plan.facets, sizes, strict=True))
-    places = list(product(*picked))
-
-    def panelled(array: NDArray[Any]) -> NDArray[Any]:
-        rows: list[Any] = [(order, slice(None), *place) for place in places]
-        return np.stack([array[row] for row in rows], axis=-1)
-
-    values, status = panelled(values), panelled(statuses(result, plan))
-    ideal = None if ideal is None else panelled(ideal)
-    scope = usual_peak(ease_of_status(result, status), values, ideal)
-    factor, shown = angle_scale(scope) if unit == "rad" else prefixed(scope, unit)
-    titles = [", ".join(s.told(i) for s, i in zip(plan.facets, place, strict=True)) for place in places]
-    columns = len({place[-1] for place in places}) if len(plan.facets) == 2 else 0
-    return Field(
-        plan, plan.x.values[order], values, ideal, status, unit, meaning(measure, unit), scope, factor, shown,
-        titles, total - len(places), columns, nothing,
-    )  # fmt: skip
 
 
 def figure(
@@ -261,7 +200,7 @@ def figure(
     from trunnion.views.draw import Board
 
     check_kind(kind)
-    field = _field(without_noise(result), measure, x, family)
+    field = field_of(without_noise(result), measure, x, family)
     plan, other, mapped = field.plan, field.plan.other, kind == "map"
     if mapped:
         _need_two(plan)
@@ -270,7 +209,7 @@ def figure(
     if field.hidden:
         title += f" ({len(field.panels)} of {len(field.panels) + field.hidden} panels)"
     title = fill(f"{title[:1].upper()}{title[1:]}", WIDE, break_long_words=False)
-    board = Board.new(title, result, len(field.panels), _columns(field))
+    board = Board.new(title, result, len(field.panels), columns_of(field))
     if mapped:
         from trunnion.views.sweep_map import draw
 
@@ -291,60 +230,6 @@ def _need_two(plan: Arrangement) -> None:
         raise MechanismError(Finding(f"{what}: a map needs two that vary", "--kind map", remedy))
 
 
-def _columns(field: Field) -> int:
-    """How many panels stand side by side: all values of the last of two names, or a block nearly square."""
-    count = len(field.panels)
-    if 1 < field.columns <= 4:
-        return field.columns
-    return count if count <= 3 else 2 if count == 4 else 3 if count <= 6 or count == 9 else 4
-
-
-def panel_title(text: str, room: int) -> str:
-    """A title of a panel in lines of so many characters, broken after commas, too long names by their ends."""
-    lines: list[str] = []
-    for part in text.split(", "):
-        while len(part) > room and "." in part.split(" = ")[0].lstrip("…"):
-            part = f"…{part.lstrip('…').partition('.')[2]}"
-        part = part if len(part) <= room else f"…{part[1 - room :]}"
-        if lines and len(lines[-1]) + len(part) + 2 <= room:
-            lines[-1] += f", {part}"
-        else:
-            lines[-1:] = [f"{line}," for line in lines[-1:]]
-            lines.append(part)
-    return "\n".join(lines)
-
-
-# ---- axes ---------------------------------------------------------------------------------------------------------
-
-
-def on_scale(scale: Scale) -> str:
-    """ "log" if the values of a name are positive, span ten times or more and are spaced by ratios; else "linear"."""
-    values = np.unique(scale.values)
-    if values.size < 3 or values[0] <= 0 or values[-1] < 10 * values[0]:
-        return "linear"
-    ratios, steps = np.diff(np.log(values)), np.diff(values)
-    return "log" if ratios.max() / ratios.min() < min(4.0, steps.max() / steps.min()) else "linear"
-
-
-def ends(scale: Scale, margin: float = 0.015) -> tuple[float, float]:
-    """Ends of an axis: a little beyond the first and the last value."""
-    low, high = float(scale.values.min()), float(scale.values.max())
-    if on_scale(scale) == "log":
-        more = (high / low) ** margin
-        return low / more, high * more
-    more = margin * (high - low) if high > low else 0.5 * abs(low) or 0.5
-    return low - more, high + more
-
-
-def axis_of(scale: Scale, room: int, margin: float = 0.015) -> Axis:
-    """The axis along which a swept name runs; few values stand there as they were given. room: characters of a line."""
-    values, log = np.unique(scale.values), on_scale(scale) == "log"
-    few = values.size == 1 or (log and values.size <= 7)
-    title = "\n".join(wrap(scale.label, room, break_long_words=False))
-    places = [(float(value), written(value)) for value in values] if few else None
-    return Axis(title, ends(scale, margin), places, log, powers=not log and not few)
-
-
 # ---- curves -------------------------------------------------------------------------------------------------------
 
 MOST_NAMED = 8  # curves that are told apart by a legend; more by a scale of colours
@@ -358,7 +243,7 @@ def _curves(field: Field, panel: int) -> Chart:
     other, x = field.plan.other, field.x
     y, status = field.values[:, :, panel], field.status[:, :, panel]
     ideal = None if field.ideal is None else field.ideal[:, :, panel] * field.factor
-    room = field_room(len(field.panels), _columns(field))
+    room = field_room(len(field.panels), columns_of(field))
     empty = ~np.isfinite(y) & (status < Status.NOT_CONVERGED) & bool(np.isfinite(y).any())
     marks = _hindered(field, np.where(empty, NOTHING, status))
     count = y.shape[1]
@@ -379,11 +264,6 @@ def _curves(field: Field, panel: int) -> Chart:
     side = replace(_frame(field), title=title)
     headed = panel_title(field.panels[panel], room) if len(field.panels) > 1 else ""
     return Chart(axis_of(field.plan.x, room), side, [*marks, *field.beyond(panel)], legend=None, title=headed)
-
-
-def field_room(count: int, columns: int) -> int:
-    """Characters along a panel of so many, by how many stand side by side."""
-    return {1: 70, 2: 40, 3: 28, 4: 24}[columns if count > 1 else 1]
 
 
 def _look(field: Field, k: int) -> Look:
@@ -410,14 +290,6 @@ def _curve(x: Array, y: Array, label: str | None, look: Look) -> list[Mark]:
     beside = answered & (np.append(False, ~answered[:-1]) | np.append(~answered[1:], False))
     cross = look.but(dash="none", mark="x", size=7.0 if look.mark or look.width > 1.2 else 3.5, order=4.0)
     return [Line(x, y, label, look), *([Line(x[beside], y[beside], None, cross)] if beside.any() else [])]
-
-
-def rings(x: Array, y: Array, size: float, beyond: bool = False) -> list[Mark]:
-    """Rings of a size around points at which contact is lost; in the legend one that is seen. beyond: the frame, too"""
-    look = Look("limit", dash="none", mark="o", size=7, hollow=True, order=4)
-    empty = np.empty(0)
-    seen = Line(empty, empty, "contact lost at some position", look)
-    return [seen, Line(x, y, None, look.but(size=size, beyond=beyond))]
 
 
 def _frame(field: Field) -> Axis:

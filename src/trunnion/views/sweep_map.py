@@ -24,7 +24,7 @@ from trunnion.views.charts import Chart, Mark
 from trunnion.views.common.cycle import Array
 from trunnion.views.common.figures import INK, MUTED
 from trunnion.views.scales import Scale, cause
-from trunnion.views.sweep import ALIKE, NOTHING, Field, axis_of, field_room, on_scale, panel_title, rings
+from trunnion.views.sweep_field import ALIKE, NOTHING, Field, axis_of, field_room, on_scale, panel_title, rings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -254,7 +254,7 @@ def histogram(read: MeasureReading) -> Panel:
         marks.append(Note(text, 0.99, 0.97, "right", "top", boxed=True))
     top = 1.06 * max(float(heights.max(initial=0.0)), 1.0)
     across = Axis(title, ((low - shift) * read.factor, (high - shift) * read.factor))
-    return Panel("", [Chart(across, Axis("samples", (0, top), whole=True), marks, legend=Legend(3))])
+    return Panel("", [Chart(across, Axis("samples", (0, top), integer=True), marks, legend=Legend(3))])
 
 
 def _core(tally: Array, edges: Array) -> tuple[float, float]:

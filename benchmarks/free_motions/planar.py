@@ -1,23 +1,17 @@
-"""Do random planar mechanisms move freely as they should? `python -m benchmarks.free_motions [--count 200]`
+"""Random planar mechanisms let go, beside SciPy on the equations of all their links.
 
-The mechanisms of `benchmarks.drawn` whose one crank is let go from rest or from a speed: gravity, forces, springs,
-dampers and friction in pins and guides move them. Beside `trunnion.simulate` stands SciPy's integrator on the equations
-of all links at once, with Lagrange multipliers for the joints and friction by its law from these (index 1, in the
-coordinates of every link), which shares nothing with Trunnion. Both are compared at the end of the motion, or where it
-comes to rest or meets a dead centre first. `--only 17` replays a seed.
+The mechanisms of `benchmarks.drawn.planar` whose one crank is let go from rest or from a speed: gravity, forces,
+springs, dampers and friction in pins and guides move them. The equations have Lagrange multipliers for the joints, and
+friction by its law from these (index 1, in the coordinates of every link).
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import sys
-from collections import Counter
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from rich.console import Console
 from scipy.integrate import solve_ivp
 
 import trunnion
@@ -32,7 +26,7 @@ ROUNDS = 60  # of friction and multipliers at one moment
 SETTLED = 1e-13
 MOST = 5_000  # evaluations of a motion: a stiff one is left out
 
-__all__ = ["AllLinks", "examine", "free", "main"]
+__all__ = ["AllLinks", "examine", "free"]
 
 
 def free(seed: int) -> Data | None:
@@ -317,30 +311,3 @@ def examine(seed: int) -> tuple[str, float]:
     if not np.any(solved[1:]):
         return "ends at once", 0.0
     return "compared" if np.all(solved) else "compared up to its end", _off(system, own, found)
-
-
-def main() -> int:
-    """Compare; the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.free_motions", description=__doc__)
-    parser.add_argument("--count", type=int, default=200, help="motions to compare")
-    parser.add_argument("--only", type=int, help="one seed")
-    asked = parser.parse_args()
-    console, counts, worst, over, seed = Console(), Counter[str](), (0.0, -1), list[tuple[int, float]](), 0
-    while counts["compared"] + counts["compared up to its end"] < asked.count:
-        own = seed if asked.only is None else asked.only
-        what, off = examine(own)
-        counts[what] += 1
-        worst = max(worst, (off, own))
-        if off > LIMIT:
-            over.append((own, off))
-        seed += 1
-        if asked.only is not None:
-            break
-    for what, number in counts.most_common():
-        console.print(f"{number:6d} {what}")
-    console.print(f"largest difference {worst[0]:.1e} (seed {worst[1]}); over {LIMIT:g}: {over}")
-    return 1 if over else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

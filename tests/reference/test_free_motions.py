@@ -17,6 +17,7 @@ def test_they_move_as_all_their_links_must(seed: int) -> None:
     assert off < LIMIT
 
 
+@pytest.mark.slow
 def test_a_spatial_one_moves_as_all_its_links_must() -> None:
     """A crank with a rod of two balls: gravity, forces, moments, and a spring with a damper of some."""
     what, off = examine_spatial(2)

@@ -116,7 +116,7 @@ def test_one_position_and_no_answer_are_drawn_and_told() -> None:
     empty = result.copy(deep=True)
     for key in ("worst_case", "worst_case_total", "rss", "deviation_total", "extreme_worst_case"):
         empty[key] = np.nan * empty[key]
-    assert "not solved at" in tables(empty)[0].title
+    assert "no value at" in tables(empty)[0].title
     assert figure(empty).axes
 
 

@@ -356,3 +356,38 @@ def test_two_columns_of_more_are_named_by_their_headers(names: str, tmp_path: Pa
 )
 def test_columns_that_are_not_there(stated: str, text: str | None, words: str, tmp_path: Path) -> None:
     assert words in "\n".join(refused(model(tmp_path, stated, text)))
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("time,turn [deg],p\ns,deg,Pa\n0,0,8\n1,180,5\n2,360,8\n", [(0.0, 8.0), (np.pi, 5.0), (2 * np.pi, 8.0)]),
+        ("time,turn,p\n,deg,\n0,0,8\n1,180,5\n2,360,8\n", [(0.0, 8.0), (np.pi, 5.0), (2 * np.pi, 8.0)]),
+        (f"time,turn,p\n0,0,8\n1,3,5\n2,{2 * np.pi!r},8\n", [(0.0, 8.0), (3.0, 5.0), (2 * np.pi, 8.0)]),
+    ],
+)
+def test_units_below_the_headers_and_numbers_of_si(
+    text: str, points: list[tuple[float, float]], tmp_path: Path
+) -> None:
+    found = read_mechanism(model(tmp_path, "file: gas.csv, columns: [turn, p]", text))
+    stated = found.parameter_set.stated
+    where = [f"tables.pressure.points.{i}" for i in range(len(points))]
+    assert np.array([[stated(f"{place}.at"), stated(f"{place}.value")] for place in where]) == pytest.approx(
+        np.array(points)
+    )
+    assert not [one for one in found.checked if "radians" in one.what]
+
+
+@pytest.mark.parametrize(
+    ("names", "text", "words"),
+    [
+        ("[time, p]", "time,x,p\n0,5,1,2\n1,5,2,3\n", "gas.csv:2: error: has 4 cells, the header has 3"),
+        ('["0", "20"]', f"0,10,20\n0,11,8\n1,12,7\n{2 * np.pi!r},13,8\n", ""),
+    ],
+)
+def test_rows_are_those_of_the_headers(names: str, text: str, words: str, tmp_path: Path) -> None:
+    path = model(tmp_path, f"file: gas.csv, columns: {names}", text)
+    if words:
+        assert words in "\n".join(refused(path))
+    else:
+        assert len(read_mechanism(path).tables["pressure"].points) == 3

@@ -200,6 +200,9 @@ def _points(
     shown: what the file is called in findings; names: the headers of the two columns, of a file that has more.
     """
     units, rows = _columns(path, kinds, shown or str(path), names)
+    if names:  # of another program, which writes numbers of SI without their unit
+        units = [stated or (kind.unit if kind in (KINDS["time"], KINDS["angle"], KINDS["length"]) else "")
+                 for stated, kind in zip(units, kinds, strict=True)]  # fmt: skip
     points: list[list[float | str]] = []
     for _, cells in rows:
         points.append([f"{cell} {one}" if one else float(cell) for cell, one in zip(cells, units, strict=True)])
@@ -236,11 +239,11 @@ def _columns(
         separator = next((one for one in ";\t" if one in stated[0][1]), "," if len(kinds) == 2 else ";")
         rows = [(number, _cells(line, separator)) for number, line in stated]
         if names:
-            rows = _named_columns(rows, names)
+            rows = _with_units(_named_columns(rows, names))
         if len(rows[0][1]) != len(kinds):
             what = f"has {len(rows[0][1])} column{'s' * (len(rows[0][1]) > 1)}, a {noun} has {len(kinds)}"
             raise MechanismError(Finding(what, remedy=_OTHER_COLUMNS[len(kinds)], line=rows[0][0]))
-        headed = not any(_number(cell, separator) for cell in rows[0][1])
+        headed = bool(names) or not any(_number(cell, separator) for cell in rows[0][1])
         units = _units(rows[0], kinds) if headed else [""] * len(kinds)
         numbers = rows[1:] if headed else rows
         if len(numbers) < 2:
@@ -282,9 +285,24 @@ def _named_columns(rows: Sequence[Row], names: Sequence[str]) -> list[Row]:
             remedy = nearest(name, plain) if not fitting else "give each column a name of its own"
             findings.append(Finding(what, remedy=remedy, line=line))
         places += fitting[:1]
+    findings += [
+        Finding(f"has {len(cells)} cells, the header has {len(header)}", remedy=_OTHER_COLUMNS[2], line=number)
+        for number, cells in rows[1:] if len(cells) > len(header)
+    ]  # fmt: skip
     if findings:
-        raise MechanismError(findings)
+        raise MechanismError(_few(findings))
     return [(number, [cells[i] if i < len(cells) else "" for i in places]) for number, cells in rows]
+
+
+def _with_units(rows: Sequence[Row]) -> list[Row]:
+    """The rows without one of units below the header, whose cells then stand in the header's brackets."""
+    (line, header), *others = rows
+    below = others[0][1] if others else [""]
+    if not all(cell in _NO_UNIT or _is_unit(cell) for cell in below) or not any(map(_is_unit, below)):
+        return list(rows)
+    stated = zip(header, below, strict=True)
+    return [(line, [f"{cell} [{unit}]" if unit and not _IN_BRACKETS.search(cell) else cell for cell, unit in stated]),
+            *others[1:]]  # fmt: skip
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -298,6 +298,15 @@ def _findings(played: Played) -> Iterator[Finding]:
         where = np.flatnonzero(played.course.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
             yield finding_for("play.no_answer", at=dial.intervals(where), status=code.text)
+    for measure, effects, of in zip(played.measures, played.over_cycle, played.course.measures, strict=True):
+        lost = np.any(np.isnan(effects.worst_case), axis=0) & np.isfinite(_nominal(of))
+        where = np.flatnonzero(lost & (played.course.status < Status.SINGULAR))
+        if len(where):
+            text = "a magnitude that is 0 has no derivative"
+            yield finding_for(
+                "play.no_answer", f"measures.{measure.name}", severity=Severity.WARNING, at=dial.intervals(where),
+                status=text,
+            )  # fmt: skip
 
 
 def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -364,10 +373,13 @@ def _idle(played: Played, i: int) -> Iterator[Finding]:
     largest = [float(np.nanmax(row, initial=0.0)) for row in played.over_cycle[i].worst_case]
     joints = [joint for joint, most in zip(played.inputs.loose, largest, strict=True) if most <= floor]
     solved = course[np.isfinite(course)]
+    sized = np.any(np.nan_to_num(_radii(played.inputs, 3)) > 0, axis=1)
+    moves = bool(np.ptp(solved) > floor and np.any(sized)) if len(solved) else False
+    at = f" at {played.place(i)}" if len(played.time) == 1 else ""
     if joints and len(solved):
         yield finding_for(
             "play.no_effect", f"measures.{measure.name}", joints=joints, measure=measure.name,
-            drivers=list(run.system.mechanism.drivers), moves=bool(np.ptp(solved) > floor),
+            drivers=list(run.system.mechanism.drivers), moves=moves, at=at,
         )  # fmt: skip
 
 
@@ -384,9 +396,11 @@ def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
         if np.ravel(status)[0] != Status.SOLVED:
             return
     least, largest = searched(study.many, study.linear, of)
+    if not (least.assembles and largest.assembles):  # pins that cannot get there
+        return
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
-    if off > SLIGHT:  # not of NaN: pins that cannot get there
+    if off > SLIGHT:
         yield finding_for(
             "play.beyond_first_order", f"measures.{measure.name}", low=low, high=high, first=first,
             severity=Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
@@ -403,7 +417,7 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     worst, deviation, loads = (np.array(parts) for parts in zip(*played.over_cycle, strict=True))
     places = played.at_places
     arrays: dict[str, Array | NDArray[np.int8]] = {
-        "value": np.array([of.curve for of in played.course.measures]),
+        "value": np.array([_nominal(of) for of in played.course.measures]),
         "worst_case": worst,
         "deviation": deviation,
         "worst_case_total": np.sum(worst, axis=1),
@@ -440,6 +454,12 @@ def _dataset(played: Played, findings: Sequence[Finding]) -> xr.Dataset:
     }
     variables = described(arrays, VARIABLES, {"measure": own, "sensitivity": per_length})
     return dataset_of("play", variables, labels, attributes, driven(played.time, *dial))
+
+
+def _nominal(of: Of) -> Array:
+    """The course with every pin in the middle, also of a magnitude that is 0, which has no derivative."""
+    plain = of.reference.parts[0]
+    return np.where(np.isnan(of.curve), plain, of.curve) if len(plain) == len(of.curve) else of.curve
 
 
 def _radii(inputs: Inputs, ends: int) -> Array:

@@ -49,7 +49,7 @@ def _table(result: xr.Dataset, name: str, unit: str, kind: str, where: str) -> T
     effects, deviations = (result[f"extreme_{key}"].values for key in ("worst_case", "deviation"))
     total = float(np.sum(effects))
     if not np.isfinite(total):
-        return Table(f"{name}: not solved at {where}", head, [])
+        return Table(f"{name}: no value at {where}", head, [])
     rows = []
     for j, (joint, effect) in enumerate(zip(result["joint"].values, effects, strict=True)):
         share = f"{100 * effect / total:.1f} %" if total > 0 else NONE

@@ -500,7 +500,7 @@ def figure(result: xr.Dataset, kind: str, measures: Sequence[str] | None = None)
 
     check_kind(kind)
     about = KINDS[kind]
-    reads = [read for read in _named(result, measures) if about.ready(read)]
+    reads = _named(result, measures, about.ready)
     if not reads:
         raise MechanismError(Finding(f"no measure has a figure '{kind}'", "--kind", about.remedy))
     title = about.title if len(reads) > 1 else f"{about.title}: {reads[0].name}"
@@ -511,7 +511,7 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
     """All kinds of figures of one measure; of several, at most MOST_PANELS, the main ones, a row for each measure."""
     from trunnion.views.draw import figure as draw
 
-    reads = [read for read in _named(result, measures) if drawable(read)]
+    reads = _named(result, measures, lambda read: bool(drawable(read)))
     if not reads:
         raise MechanismError(Finding("no measure has a figure", remedy="add --method linear"))
     if len(reads) == 1:
@@ -534,9 +534,11 @@ def sheet(result: xr.Dataset, measures: Sequence[str] | None = None) -> Figure:
     return draw("Effect of the tolerances", result, panels, columns=len(kinds))
 
 
-def _named(result: xr.Dataset, measures: Sequence[str] | None) -> list[MeasureReading]:
-    """The measures that are named, or all. MechanismError if they do not fit one figure."""
-    reads = [read for read in readings(result) if measures is None or read.name in measures]
+def _named(
+    result: xr.Dataset, measures: Sequence[str] | None, ready: Callable[[MeasureReading], bool]
+) -> list[MeasureReading]:
+    """The measures that are named, or all, which have a figure. MechanismError if they do not fit one figure."""
+    reads = [read for read in readings(result) if (measures is None or read.name in measures) and ready(read)]
     if len(reads) > MOST_PANELS:
         what = f"{len(reads)} measures do not fit one figure"
         raise MechanismError(Finding(what, "--out", f"name at most {MOST_PANELS} by --measure"))

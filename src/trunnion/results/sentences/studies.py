@@ -46,13 +46,13 @@ PLAY = {
     ),
     "play.beyond_first_order": Sentence(
         NOTE,
-        "with the pins where first order has ±{first:~{unit}} (at {at}), it changes by {low:~{unit}} and "
-        "{high:~{unit}}",
+        "to first order it changes by ±{first:~{unit}} at {at}; the worst found on the mechanism itself is "
+        "{low:~{unit}} and {high:~{unit}}",
         "use these figures",
     ),
     "play.no_effect": Sentence(
         NOTE,
-        "the play of {joints} has no effect on {measure}",
+        "the play of {joints} has no effect on {measure}{at}",
         lambda drivers, moves, **_: (
             f"drive the joint that the machine drives, now {', '.join(drivers)}" if moves else ""
         ),

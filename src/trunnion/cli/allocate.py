@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
 
 __all__ = ["allocate"]
 
-FEW = 2_000_000  # configurations up to which further processes cost more than they save
 SECTIONS = (*OF_TOLERANCES, "costs")
 WRITTEN = 5  # significant digits of a tolerance in the model that is written
 
@@ -115,8 +113,6 @@ def allocate(
     check_model(write, file, force)
     by = _criterion(criterion, target)
     mechanism = stated(file, set_, table, friction)
-    if jobs is None:
-        jobs = 1 if samples * steps < FEW else os.cpu_count() or 1
     with lines_of(file), bar("samples", samples, least=1000) as progress:
         result = run(
             mechanism, measure, by.value, target, choice.value, steps, at, samples,

@@ -111,7 +111,7 @@ def contributions(read: MeasureReading) -> Table:
     ]  # fmt: skip
     if rest:
         sums = (float(np.nansum([getattr(row, key) for row in rest])) for key in shares.values())
-        effect = "no effect to first order" if all(row.worst == 0 for row in rest) else "small"
+        effect = "no effect" if all(row.worst == 0 for row in rest) else "small"
         rows.append([f"{len(rest)} others, {effect}", "", "", "", *(share(part, 1) for part in sums)])
     return Table(f"contributions to {read.name}{read.at_place}", head, rows)
 

@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -149,24 +151,43 @@ def test_a_program_that_is_ended_leaves_no_draft(number: signal.Signals, end: st
     assert end == "zarr" or out.read_text() == "old"
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_that_is_dropped_comes_again(
-    program: Run, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
-) -> None:
+class Ended:
     """Python drops what is raised while it clears up an object."""
 
-    class Ended:
-        def __del__(self) -> None:
-            os.kill(os.getpid(), number)
-            time.sleep(0.01)
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __del__(self) -> None:
+        os.kill(os.getpid(), self.number)
+        time.sleep(0.01)
+
+
+def caught(number: int) -> None:
+    """A library may catch all that is raised."""
+    with suppress(BaseException):
+        os.kill(os.getpid(), number)
+        time.sleep(10)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("lose", [Ended, caught])
+def test_a_signal_that_gets_lost_comes_again(
+    program: Run, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, lose: Callable[[int], object]
+) -> None:
+    cleared = []
 
     def broken(*_: object) -> None:
-        Ended()
-        time.sleep(10)
+        try:
+            lose(number)
+            time.sleep(10)
+        finally:
+            time.sleep(0.2)  # what clears up is not broken off
+            cleared.append(1)
 
     monkeypatch.setattr(sys, "unraisablehook", lambda _: None)  # that of the tests tells of it
     monkeypatch.setattr(analysing, "analysed", broken)
     assert program("analyse", FOUR_BAR).code == 128 + number
+    assert cleared
 
 
 @pytest.mark.slow

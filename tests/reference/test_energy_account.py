@@ -46,8 +46,9 @@ def test_the_account_of_the_examples_as_they_begin(example: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("example", MOVING)
 def test_the_account_of_the_examples_as_they_stand(example: str) -> None:
-    """The whole time that each of them runs where nothing else is asked."""
-    assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"))) < 1e-8
+    """The whole time that each of them runs where nothing else is asked; half a turn of the one that takes minutes."""
+    duration = 0.01 if example == "tilting-gudgeon-pin" else None
+    assert unbalanced(simulate(read(EXAMPLES / f"{example}.yaml"), duration)) < 1e-8
 
 
 def test_every_example_that_moves_in_time_has_its_account_tested() -> None:

@@ -3,13 +3,11 @@
 0 fine, 1 findings, 2 bad input, 3 a fault of the program itself, 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
 Only `--debug` shows where a fault of the program arose.
 
-Ctrl-C ends every verb alike: no result of a part of the work is shown or written, and files of before stay. Samples
-that are kept in a checkpoint are told.
+A signal ends every verb alike: no result of a part of the work is shown or written, and files of before stay.
 """
 
 from __future__ import annotations
 
-import _thread
 import os
 import signal
 import sys
@@ -27,13 +25,14 @@ __all__ = ["BAD_INPUT", "FAULT", "STOPPED", "status_of"]
 BAD_INPUT, FAULT, STOPPED = 2, 3, 130
 LONGEST = 300  # signs of what an exception says
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-AGAIN = 0.01  # s, after which a signal comes again that Python has dropped
+AGAIN = 0.05  # s, after which what ends a run is raised anew where it got lost
 
 
 class _Interrupt:
-    """The signal that came to end the run, also where what runs made another exception of it; 0 if none did."""
+    """The signal that came to end the run, 0 if none did, and the exception that was made of it."""
 
     number = 0
+    raised: BaseException = KeyboardInterrupt()
 
 
 def status_of(run: Callable[[], Any], debug: bool = False) -> int:
@@ -41,13 +40,11 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
     interrupt = _Interrupt()
     code: Any = 0
     try:
-        with _told_of(interrupt):
+        with _raised_by_signals(interrupt):
             run()
     except SystemExit as stop:  # typer's own end, of a usage error or of Ctrl-C too
         code = stop.code
-        if code == STOPPED:
-            _say(f"stopped; a file named above as written is whole, no other was begun{_kept(stop)}")
-        elif interrupt.number:
+        if code == STOPPED or interrupt.number:
             _say("stopped")
     except MechanismError as error:
         for finding in error.findings:
@@ -62,13 +59,6 @@ def status_of(run: Callable[[], Any], debug: bool = False) -> int:
                 traceback.print_exc()
             code = _unforeseen(error)
     return int(code or 0)
-
-
-def _kept(stop: BaseException | None) -> str:
-    """What a run that was stopped says of its work, see `studies.tolerance`."""
-    while stop is not None and not (isinstance(stop, KeyboardInterrupt) and stop.args):
-        stop = stop.__context__
-    return f"; {stop.args[0]}" if stop is not None else ""
 
 
 def _unforeseen(error: BaseException) -> int:
@@ -94,44 +84,45 @@ def _say(text: str) -> None:
 
 
 @contextmanager
-def _told_of(interrupt: _Interrupt) -> Iterator[None]:
+def _raised_by_signals(interrupt: _Interrupt) -> Iterator[None]:
     """A signal that ends the run is an exception, so that drafts of files are removed and workers ended.
 
-    Ctrl-C raises KeyboardInterrupt, of which a library may make an ImportError: so it is remembered. The others raise
-    SystemExit, and what clears up then is not broken off by a second one. Where Python drops the exception, while it
-    clears up an object, the signal comes again.
+    Ctrl-C raises KeyboardInterrupt, the others SystemExit; what clears up then is not broken off by another of those.
+    The exception can get lost: Python drops it while it clears up an object, and a library may catch it. So a timer
+    raises it anew until the run has ended, unless it is just being handled.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    repeated: list[threading.Timer] = []
 
     def stop(number: int, _frame: Any) -> None:
         first, interrupt.number = not interrupt.number, number
-        if number == signal.SIGINT:
-            raise KeyboardInterrupt
-        if first:
-            raise SystemExit(128 + number)
+        if first or number == signal.SIGINT:
+            interrupt.raised = KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
+            if hasattr(signal, "setitimer"):
+                signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
+            raise interrupt.raised
 
-    def lost(told: Any) -> None:
-        if interrupt.number and issubclass(told.exc_type, (KeyboardInterrupt, SystemExit)):
-            repeated.append(threading.Timer(AGAIN, _thread.interrupt_main, [interrupt.number]))
-            interrupt.number = 0
-            repeated[-1].start()
-        before_lost(told)
+    def again(*_: Any) -> None:
+        handled = sys.exc_info()[1]
+        while handled is not None:
+            if handled is interrupt.raised:
+                return
+            handled = handled.__context__
+        raise interrupt.raised
 
     # what is ignored, as Ctrl-C in the background of a shell, is not for us
     before = {number: signal.getsignal(number) for number in SIGNALS}
-    ours = [number for number in SIGNALS if before[number] not in (signal.SIG_IGN, None)]
-    before_lost = sys.unraisablehook
-    for number in ours:
-        signal.signal(number, stop)
-    sys.unraisablehook = lost
+    handlers: dict[int, Any] = {number: stop for number in SIGNALS if before[number] not in (signal.SIG_IGN, None)}
+    if hasattr(signal, "setitimer"):
+        before[signal.SIGALRM] = signal.getsignal(signal.SIGALRM)
+        handlers[signal.SIGALRM] = again
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
     try:
         yield
     finally:
-        for timer in repeated:
-            timer.cancel()
-        sys.unraisablehook = before_lost
-        for number in ours:
+        if interrupt.number and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        for number in handlers:
             signal.signal(number, before[number])

@@ -15,6 +15,7 @@ __all__ = [
     "ParameterNames",
     "as_key",
     "guarded",
+    "is_number",
     "nearest",
     "unguarded",
 ]
@@ -56,7 +57,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 def guarded(text: str) -> str:
     """A text for a cell of CSV, with an apostrophe before it if a spreadsheet would take it for a formula."""
-    return f"'{text}" if text[:1] in FORMULA and text and not _is_number(text) else text
+    return f"'{text}" if text[:1] in FORMULA and text and not is_number(text) else text
 
 
 def unguarded(cell: str) -> str:
@@ -64,7 +65,7 @@ def unguarded(cell: str) -> str:
     return cell[1:] if cell[:1] == "'" and cell[1:2] in FORMULA and cell[1:] else cell
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:

@@ -251,8 +251,8 @@ def _plays(run: Run) -> Inputs:
     return Inputs(run, (), tuple(plays), (), Population([], None))
 
 
-def _by_joint(first: FirstOrder, known: Array) -> JointEffects:
-    """What first order makes of each play. known: 0, or NaN where there is no answer."""
+def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
+    """What first order makes of each play. blank: 0, or NaN where there is no answer."""
     inputs, ends = first.inputs, max(len(first.inputs.ends(joint)) for joint in first.inputs.loose)
     shape = (len(inputs.loose), *first.slope.shape[1:])
     loads = np.full((shape[0], ends, 3, *shape[1:]), np.nan)
@@ -265,11 +265,11 @@ def _by_joint(first: FirstOrder, known: Array) -> JointEffects:
         scatters = np.array([zones.scatter(*own) for own in carriers])
         found.deviation[j] = np.take_along_axis(scatters, best[None], axis=0)[0]
         for k, keys in enumerate(inputs.ends(joint)):
-            loads = np.array([own[0][k] for own in carriers])  # (carrier, component, …)
-            for key, load in zip(keys, np.moveaxis(loads, 1, 0), strict=True):
+            at_end = np.array([own[0][k] for own in carriers])  # (carrier, component, …)
+            for key, load in zip(keys, np.moveaxis(at_end, 1, 0), strict=True):
                 axis = "xyz".index(key.rpartition(".")[2])
                 found.loads[j, k, axis] = np.take_along_axis(load, best[None], axis=0)[0]
-    return JointEffects(*(part + known for part in found))
+    return JointEffects(*(part + blank for part in found))
 
 
 # ---- findings -------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from trunnion.errors import agreeing
+from trunnion.model.names import is_number
 from trunnion.results.attributes import attribute, summary_of
 from trunnion.results.figure import MORE_THAN
 from trunnion.results.figure import Figure as Stated
@@ -189,12 +190,4 @@ def _stated(row: dict[str, Any]) -> str:
         return text
     if text.lstrip("+-")[:1] not in "0123456789.±":
         return f"{text} = {quantity(value, unit)}"
-    return f"{text}\u00a0{unit}" if unit and _is_number(text) else text
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return f"{text}\u00a0{unit}" if unit and is_number(text) else text

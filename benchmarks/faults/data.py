@@ -62,15 +62,15 @@ _STUDIES = (
     Fault(
         "play-scatter-of-another-dimension",
         "studies/tolerance/effects.py",
-        "(most, square * len(end) / (len(end) + 2))",
-        "(most, square * len(end) / (len(end) + 1))",
+        "square * len(q) / (len(q) + 2) * length(q)",
+        "square * len(q) / (len(q) + 1) * length(q)",
         ("tests/reference/test_play.py", "-k", "one_rule"),
     ),
     Fault(
         "tolerance-mean-shift-sign",
-        "studies/tolerance/zones.py",
-        "half, slope * mean, np.abs(slope) * deviation)",
-        "half, -slope * mean, np.abs(slope) * deviation)",
+        "studies/tolerance/effects.py",
+        "upper, half, slope * mean, scatter)",
+        "upper, half, -slope * mean, scatter)",
         ("tests/reference/test_tolerance.py", "-k", "limits_to_one_side or moments"),
     ),
     Fault(
@@ -225,15 +225,15 @@ _RESULTS = (
     Fault(
         "power-in-not-written",
         "results/tables/cycle.py",
-        'found.append(("power_in", "W", lambda window: drive[:, window].sum(axis=0)))',
-        'found.append(("power_in", "W", lambda window: drive[:1, window].mean(axis=0) * 0.0))',
+        'Column("power_in", "W", result["drive_power"].values.sum(axis=0))',
+        'Column("power_in", "W", result["drive_power"].values[:1].mean(axis=0) * 0.0)',
         ("tests/invariants/test_written_results.py", "-k", "csv"),
     ),
     Fault(
         "set-values-of-the-next-condition",
-        "results/tables/comparison.py",
-        "(str(name), unit, np.repeat(rows[i], times))",
-        "(str(name), unit, np.tile(rows[i], times))",
+        "results/tables/studies.py",
+        "np.repeat(row, times)",
+        "np.tile(row, times)",
         ("tests/views/test_compare.py", "tests/rig/test_compare.py", "-k", "stands_beside"),
     ),
 )

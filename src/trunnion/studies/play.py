@@ -39,14 +39,13 @@ from trunnion.model.mechanism import Mechanism
 from trunnion.results.attributes import cited, finding_rows, origin
 from trunnion.results.dataset import MemberUnits, Variable, dataset_of, described, driven
 from trunnion.results.figure import Figure
-from trunnion.results.sentences import finding_for
+from trunnion.results.quantities import readable
 from trunnion.solve import shifts
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.statistics.population import Population
-from trunnion.studies.tolerance import zones
 from trunnion.studies.tolerance.effects import FirstOrder
-from trunnion.studies.tolerance.first_order import ToleranceStudy
+from trunnion.studies.tolerance.first_order import ToleranceStudy, none_stated
 from trunnion.studies.tolerance.inputs import Inputs
 from trunnion.studies.tolerance.linear import Linear, Of, searched
 
@@ -217,7 +216,10 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
     remedy = "use `trunnion tolerance` for other measures"
     if others and names is not None:
         raise MechanismError(Finding(what, "measures", remedy))
-    notes = [finding_for("play.measures_left_out", "measures", measures=others)] if others else []
+    notes = []
+    if others:
+        short = f"left out: {', '.join(others)}, which have no one value at every position"
+        notes = [Finding.note("play.measures_left_out", "measures", short, remedy, measures=others)]
     found = [one for one in found if one.name not in others]
     if found:
         return found, notes
@@ -227,7 +229,7 @@ def _measures(run: Run, names: Sequence[str] | None) -> tuple[list[Measure], lis
         raise MechanismError(
             Finding("no measure is stated, and no joint to the ground is an output", "measures", remedy)
         )
-    return found, [finding_for("measure.none_stated", "measures", measures=[one.name for one in found]), *notes]
+    return found, [none_stated(found), *notes]
 
 
 def _covered(run: Run, measure: Measure) -> bool:
@@ -259,13 +261,13 @@ def _by_joint(first: FirstOrder, blank: Array) -> JointEffects:
     found = JointEffects(np.zeros(shape), np.zeros(shape), loads)
     for j, joint in enumerate(inputs.loose):
         carriers = first.plays(j)
-        worst = np.array([zones.worst(*own) for own in carriers])
+        worst = np.array([pin.worst for pin in carriers])
         best = np.argmax(np.nan_to_num(worst) > (1 - EQUAL) * np.nan_to_num(np.max(worst, axis=0)), axis=0)
         found.worst_case[j] = np.take_along_axis(worst, best[None], axis=0)[0]
-        scatters = np.array([zones.scatter(*own) for own in carriers])
+        scatters = np.array([pin.deviation for pin in carriers])
         found.deviation[j] = np.take_along_axis(scatters, best[None], axis=0)[0]
         for k, keys in enumerate(inputs.ends(joint)):
-            at_end = np.array([own[0][k] for own in carriers])  # (carrier, component, …)
+            at_end = np.array([pin.loads[k] for pin in carriers])  # (carrier, component, …)
             for key, load in zip(keys, np.moveaxis(at_end, 1, 0), strict=True):
                 axis = "xyz".index(key.rpartition(".")[2])
                 found.loads[j, k, axis] = np.take_along_axis(load, best[None], axis=0)[0]
@@ -282,11 +284,16 @@ def _findings(played: Played) -> Iterator[Finding]:
     if run.determinacy is not None:
         yield from run.determinacy.findings()
         if any(part.redundant for part in run.determinacy.parts):
-            yield finding_for("play.redundant", "joints")
+            what = "constraints are redundant: the worst case is an upper bound, because pins constrain one another"
+            remedy = "the deviation assumes that each pin can be anywhere within its play"
+            yield Finding.warning("play.redundant", "joints", what, remedy)
     yield from _left_out(run, played.inputs.loose)
     yield from _spinning(run, played.measures)
     if run.seats:
-        yield finding_for("play.seats_not_taken", "joints", joints=[one.joint for one in run.seats])
+        what = "play is relative to the middle of the holes: the worst case is over all positions of the pins and "
+        what += f"does not use the seats of {', '.join(one.joint for one in run.seats)}"
+        remedy = "`trunnion analyse` has the deviation with these seats"
+        yield Finding.note("play.seats_not_taken", "joints", what, remedy, joints=[one.joint for one in run.seats])
     yield from _fits(run, played.inputs.loose)
     for i in range(len(played.measures)):
         yield from _limit(played, i)
@@ -297,16 +304,16 @@ def _findings(played: Played) -> Iterator[Finding]:
     for code in Status:
         where = np.flatnonzero(played.course.status == code)
         if code >= Status.NOT_CONVERGED and len(where):
-            yield finding_for("play.no_answer", at=dial.intervals(where), status=code.text)
+            what = f"{code.text} {dial.intervals(where)}"
+            remedy = "the effect of play is undefined there"
+            yield Finding.error("play.no_answer", "", what, remedy, at=dial.intervals(where), status=code.text)
     for measure, effects, of in zip(played.measures, played.over_cycle, played.course.measures, strict=True):
         lost = np.any(np.isnan(effects.worst_case), axis=0) & np.isfinite(_nominal(of))
         where = np.flatnonzero(lost & (played.course.status < Status.SINGULAR))
         if len(where):
-            text = "a magnitude that is 0 has no derivative"
-            yield finding_for(
-                "play.no_answer", f"measures.{measure.name}", severity=Severity.WARNING, at=dial.intervals(where),
-                status=text,
-            )  # fmt: skip
+            what = f"a magnitude that is 0 has no derivative {dial.intervals(where)}"
+            remedy = "the effect of play is undefined there"
+            yield Finding.warning("play.no_answer", f"measures.{measure.name}", what, remedy, at=dial.intervals(where))
 
 
 def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -320,12 +327,16 @@ def _left_out(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
     ]
     if stated:
         kinds = [f"{name} is {run.system.joints[name][0]}" for name in stated]
-        yield finding_for("play.left_out", "joints", joints=list(stated), kinds=kinds, modelled=list(models))
+        what = f"the play of {', '.join(stated)} is left out ({', '.join(kinds)} joints)"
+        remedy = f"play is modelled in {', '.join(models)} joints"
+        yield Finding.warning("play.left_out", "joints", what, remedy, joints=stated)
     toothed = sorted({
         joint for gear in mechanism.gears.values() if gear.teeth for joint in gear.joints if joint in loose
     })  # fmt: skip
     if toothed:
-        yield finding_for("play.gears", "gears", joints=toothed)
+        what = f"gears turn in {', '.join(toothed)}: the effect of this play on the tooth contact is left out"
+        remedy = "an offset e of a gear's centre across the line of centres turns the gear by e over its pitch radius"
+        yield Finding.warning("play.gears", "gears", what, remedy, joints=toothed)
 
 
 def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
@@ -340,7 +351,11 @@ def _fits(run: Run, loose: Sequence[str]) -> Iterator[Finding]:
             largest[name] = float(np.ravel(primal(own))[0])
     if largest:
         most = max(largest, key=largest.__getitem__)
-        yield finding_for("play.mean_of_fits", "fits", joints=list(largest), largest=largest[most], most=most)
+        what = f"the play of {', '.join(largest)} is the mean of their fits; the largest is "
+        what += f"{readable(largest[most], 'm')}, of {most}"
+        remedy = "--set fits=maximum takes the largest play"
+        figures = {"joints": list(largest), "largest": largest[most], "most": most}
+        yield Finding.note("play.mean_of_fits", "fits", what, remedy, **figures)
 
 
 def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
@@ -349,7 +364,10 @@ def _spinning(run: Run, measures: Sequence[Measure]) -> Iterator[Finding]:
         for measure in measures:
             owner, _, point = measure.subject.partition(".")
             if owner == link and (measure.kind == "angle" or (measure.kind == "point" and point not in ends)):
-                yield finding_for("play.spin", f"measures.{measure.name}", link=link, points=list(ends))
+                what = f"'{link}' can spin about the line {ends[0]}-{ends[1]}; this study sets that spin to zero"
+                remedy = "measure one of these two points"
+                figures = {"link": link, "points": list(ends)}
+                yield Finding.warning("play.spin", f"measures.{measure.name}", what, remedy, **figures)
 
 
 def _limit(played: Played, i: int) -> Iterator[Finding]:
@@ -362,8 +380,14 @@ def _limit(played: Played, i: int) -> Iterator[Finding]:
         return
     unit, where = measure.unit(played.run.system), f"measures.{measure.name}.limit"
     factor, shown = (180 / np.pi, "deg") if unit == "rad" else (1e3, "mm") if unit == "m" else (1.0, unit)
-    code = "limit.kept" if worst <= limit else "limit.exceeded"
-    yield finding_for(code, where, worst=factor * worst, limit=factor * limit, unit=shown, at=played.place(i))
+    figures = {"worst": factor * worst, "limit": factor * limit, "unit": shown, "at": played.place(i)}
+    reaches = f"the worst case to first order, {readable(factor * worst, shown)} at {played.place(i)}"
+    allowed = f"the limit of {readable(factor * limit, shown)}"
+    if worst <= limit:
+        yield Finding.note("limit.kept", where, f"{reaches}, is within {allowed}", **figures)
+    else:
+        remedy = "reduce the play of the joints with the largest share"
+        yield Finding.error("limit.exceeded", where, f"{reaches}, exceeds {allowed}", remedy, **figures)
 
 
 def _idle(played: Played, i: int) -> Iterator[Finding]:
@@ -377,10 +401,14 @@ def _idle(played: Played, i: int) -> Iterator[Finding]:
     moves = bool(np.ptp(solved) > floor and np.any(sized)) if len(solved) else False
     at = f" at {played.place(i)}" if len(played.time) == 1 else ""
     if joints and len(solved):
-        yield finding_for(
-            "play.no_effect", f"measures.{measure.name}", joints=joints, measure=measure.name,
-            drivers=list(run.system.mechanism.drivers), moves=moves, at=at,
-        )  # fmt: skip
+        drivers = ", ".join(run.system.mechanism.drivers)
+        yield Finding.note(
+            "play.no_effect",
+            f"measures.{measure.name}",
+            f"the play of {', '.join(joints)} has no effect on {measure.name}{at}",
+            f"drive the joint that the machine drives, now {drivers}" if moves else "",
+            joints=joints,
+        )
 
 
 def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
@@ -401,11 +429,21 @@ def _beyond_first_order(played: Played, i: int, of: Of) -> Iterator[Finding]:
     low, high = least.value, largest.value
     off = max(abs(low + first), abs(high - first)) / first
     if off > SLIGHT:
-        yield finding_for(
-            "play.beyond_first_order", f"measures.{measure.name}", low=low, high=high, first=first,
-            severity=Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
-            unit=measure.unit(played.run.system), at=played.place(i),
-        )  # fmt: skip
+        yield Finding.weighed(
+            Severity.WARNING if max(-low, high) > (1 + GRAVE) * first else Severity.NOTE,
+            "play.beyond_first_order",
+            f"measures.{measure.name}",
+            f"to first order it changes by ±{readable(first, measure.unit(played.run.system))} at "
+            f"{played.place(i)}; the worst found on the mechanism itself is "
+            f"{readable(low, measure.unit(played.run.system))} and "
+            f"{readable(high, measure.unit(played.run.system))}",
+            "use these figures",
+            low=low,
+            high=high,
+            first=first,
+            unit=measure.unit(played.run.system),
+            at=played.place(i),
+        )
 
 
 # ---- the result -----------------------------------------------------------------------------------------------

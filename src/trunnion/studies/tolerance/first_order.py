@@ -17,17 +17,17 @@ from trunnion.measures.many import Many
 from trunnion.measures.measures import Measure, chosen, outputs
 from trunnion.measures.positions import PositionPlan, place_of, plan
 from trunnion.model.mechanism import Mechanism
-from trunnion.results.sentences import finding_for
 from trunnion.solve.friction_method import FrictionMethod
 from trunnion.solve.run import Run, prepare
 from trunnion.studies.tolerance.effects import Effects, effects_of
+from trunnion.studies.tolerance.indices import Indices
 from trunnion.studies.tolerance.inputs import Inputs, inputs_of
 from trunnion.studies.tolerance.kernel import many_of
 from trunnion.studies.tolerance.linear import Linear, Reference, linear, references, searched
-from trunnion.studies.tolerance.sampling import Sampling, towards
+from trunnion.studies.tolerance.sampling import Samples, Sampling, towards
 from trunnion.studies.tolerance.search import Corner
 
-__all__ = ["FEW", "ToleranceStudy", "placed", "study"]
+__all__ = ["FEW", "Outcome", "ToleranceStudy", "placed", "study"]
 
 
 FEW = 10_000_000  # configurations up to which further processes cost more than they save
@@ -93,6 +93,18 @@ class ToleranceStudy:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the methods that were asked for found; None of those that were not. target: the yield asked for."""
+
+    study: ToleranceStudy
+    methods: tuple[str, ...]
+    worst: Sequence[tuple[Corner, Corner]] | None = None
+    samples: Samples | None = None
+    indices: Indices | None = None
+    target: float | None = None
+
+
 def study(
     mechanism: Mechanism,
     measures: Sequence[str] | None = None,
@@ -108,7 +120,7 @@ def study(
     found = chosen(mechanism, measures, run.values)
     if not found:
         found = outputs(run.system)
-        note = finding_for("measure.none_stated", "measures", measures=[one.name for one in found])
+        note = none_stated(found)
         if not found:
             what = "no measure is stated, and no joint to the ground is an output"
             raise MechanismError(Finding(what, "measures", note.remedy))
@@ -120,6 +132,14 @@ def study(
     if at is not None:
         found = [placed(mechanism, one, at) for one in found]
     return ToleranceStudy(run, inputs, tuple(found), steps, friction or FrictionMethod(), tuple(notes))
+
+
+def none_stated(measures: Sequence[Measure]) -> Finding:
+    """That outputs are taken as measures, as the model states none."""
+    names = [measure.name for measure in measures]
+    what = f"the model states no measure; {', '.join(names)} are used (joints to the ground without a driver)"
+    remedy = "state measures: in the model, or use --measure link.point.x"
+    return Finding.note("measure.none_stated", "measures", what, remedy, measures=names)
 
 
 def placed(mechanism: Mechanism, measure: Measure, at: float | str) -> Measure:

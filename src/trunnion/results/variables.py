@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,35 +150,18 @@ IDEAL = {
 }
 
 
-class CycleMeans(Protocol):
-    """What CYCLE names, over drivers or joints where it has these dimensions."""
-
-    @property
-    def efficiency(self) -> float: ...
-    @property
-    def efficiency_error(self) -> float: ...
-    @property
-    def drive_effort_rms(self) -> NDArray[np.float64]: ...
-    @property
-    def drive_power_mean(self) -> float: ...
-    @property
-    def useful_power_mean(self) -> float: ...
-    @property
-    def friction_power_mean(self) -> NDArray[np.float64]: ...
-
-
 Labels = Mapping[str, Sequence[str]]
 
 
 def variables(space: str) -> dict[str, Variable]:
     """The vocabulary of the results of planar or of spatial mechanisms."""
-    both = {name: one for name, one in VARIABLES.items() if one.space in ("", space)}
+    both = {name: variable for name, variable in VARIABLES.items() if variable.space in ("", space)}
     return {**both, **IN_SPACE} if space == "spatial" else both
 
 
 @functools.cache
 def _along_positions(space: str) -> dict[str, Variable]:
-    return {name: one.over("position") for name, one in variables(space).items()}
+    return {name: variable.over("position") for name, variable in variables(space).items()}
 
 
 def _space(labels: Labels) -> str:
@@ -220,25 +203,27 @@ def dataset(
     arrays: dict[str, NDArray[np.float64]],
     labels: Labels,
     along: Mapping[str, xr.Variable],
-    means: CycleMeans,
+    means: object,
     attributes: Mapping[str, Any],
     units: Mapping[str, MemberUnits],
-    ideal: CycleMeans | None = None,
+    ideal: object = None,
     kept: Collection[str] | None = None,
     dtype: str = "float64",
     more: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
-    """The result of a cycle. along: the coordinates of its positions, see `results.dataset.driven`; units: those of
-    drivers and springs; kept: variables of every position that it has, all if not given; dtype: of their floats. Where
-    that is another than theirs, arrays are taken out of their dict one by one, so that both need not be in memory.
-    more: what it has beside.
+    """The result of a cycle.
+
+    along: the coordinates of its positions, see `results.dataset.driven`; means, ideal: what has the names of CYCLE as
+    attributes, of the mechanism and of that without errors; units: those of drivers and springs; kept: variables of
+    every position that it has, all if not given; dtype: of their floats. Where that is another than theirs, arrays are
+    taken out of their dict one by one, so that both need not be in memory. more: what it has beside.
     """
-    known = _along_positions(_space(labels))
+    vocabulary = _along_positions(_space(labels))
     names = [name for name in arrays if kept is None or name in kept]
     other = {name for name in names if arrays[name].dtype == np.float64 and dtype != "float64"}
-    own = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
-    found = described(own, known, units)
-    found |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
+    numbers = {name: arrays.pop(name).astype(dtype) if name in other else arrays[name] for name in names}
+    described_arrays = described(numbers, vocabulary, units)
+    described_arrays |= described({name: getattr(means, name) for name in CYCLE}, CYCLE, units)
     if ideal is not None:
-        found |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
-    return dataset_of("cycle", {**found, **(more or {})}, labels, attributes, along)
+        described_arrays |= described({name: getattr(ideal, name.removesuffix("_ideal")) for name in IDEAL}, IDEAL)
+    return dataset_of("cycle", {**described_arrays, **(more or {})}, labels, attributes, along)

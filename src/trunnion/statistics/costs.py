@@ -7,9 +7,9 @@ where k t ≥ unit. So an allocation is solved in t, where it is convex with eit
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -32,21 +32,16 @@ class CostParameter:
     meaning: str = ""
 
 
-class CostFunction(Protocol):
-    """A cost, or its derivative, from the half width t (m or rad)."""
-
-    def __call__(self, t: float, *, A: float, B: float, k: float, unit: float) -> float: ...
-
-
 @dataclass(frozen=True)
 class CostModel:
     """A cost of a tolerance, with its derivative with respect to the half width.
 
-    cone: the cone of a conic program that its epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
+    value, slope: of (t, *, A, B, k, unit), t the half width, m or rad; cone: the cone of a conic program that its
+    epigraph is: of z ≥ x^−k, or of z ≥ exp(−k x), with x = t/unit.
     """
 
-    value: CostFunction
-    slope: CostFunction
+    value: Callable[..., float]
+    slope: Callable[..., float]
     parameters: Mapping[str, CostParameter]
     formula: str
     source: str
@@ -112,7 +107,7 @@ class Cost:
     def numbers(self) -> dict[str, float]:
         """The parameters by name, those that are not stated with their defaults."""
         stated = COST_MODELS[self.model].parameters
-        return {name: self.parameters.get(name, one.default or 0.0) for name, one in stated.items()}
+        return {name: self.parameters.get(name, parameter.default or 0.0) for name, parameter in stated.items()}
 
     def value(self, t: float) -> float:
         """Cost of a half width t, m or rad."""
@@ -125,14 +120,16 @@ class Cost:
     def findings(self, where: str = "") -> list[Finding]:
         """What is missing or out of range."""
         if self.model not in COST_MODELS:
-            known = ", ".join(COST_MODELS)
-            return [Finding(f"'{self.model}' is no cost model", where, f"write one of {known}")]
-        found = []
-        for name, one in COST_MODELS[self.model].parameters.items():
-            value = self.parameters.get(name, one.default)
+            names = ", ".join(COST_MODELS)
+            return [Finding(f"'{self.model}' is no cost model", where, f"write one of {names}")]
+        findings_here = []
+        for name, parameter in COST_MODELS[self.model].parameters.items():
+            value = self.parameters.get(name, parameter.default)
             if value is None:
-                found.append(Finding(f"'{name}' is missing ({one.meaning})", where, "add it"))
-            elif not value > one.minimum and (one.above or value != one.minimum):
-                limit = f"{'above' if one.above else 'at least'} {one.minimum:g}"
-                found.append(Finding(f"'{name}' is {value:g}, it has to be {limit}", where, "else wider costs more"))
-        return found
+                findings_here.append(Finding(f"'{name}' is missing ({parameter.meaning})", where, "add it"))
+            elif not value > parameter.minimum and (parameter.above or value != parameter.minimum):
+                limit = f"{'above' if parameter.above else 'at least'} {parameter.minimum:g}"
+                findings_here.append(
+                    Finding(f"'{name}' is {value:g}, it has to be {limit}", where, "else wider costs more")
+                )
+        return findings_here

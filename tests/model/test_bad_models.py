@@ -137,7 +137,7 @@ CASES = [
     ("links: [ground, crank]}", "links: [ground, crank], pin: {fit: 20 mm}}", 18, "joints.A.pin.fit",
      "'20 mm' is not a fit", "20 mm H7/g6"),
     ("links: [ground, crank]}", "links: [ground, crank], pin: {fit: 20 H7/g6}}", 18, "joints.A.pin.fit",
-     "'20' has no unit", "60 mm"),
+     "'20' has no unit", "20 mm H7/g6"),
     ("links: [ground, crank]}", "links: [ground, crank], pin: {fit: 20 mm H7/g6, radius: 1}}", 18, "joints.A.pin",
      "states radius and clearance already", "keep"),
     ("mass: 4.8 kg", "mass: 1 kg\n    centre: [1, 0]\n    inertia: 0.5\n    inertia_about: origin", 13,

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.mechanisms import four_bar
 
-from trunnion import Mechanism, MechanismError
+from trunnion import Mechanism, MechanismError, check
 from trunnion.model.quantity import Quantity
 from trunnion.model.units import BASES, KINDS, UnitError, root, unit
 from trunnion.rig.reading.sensor_quantity import dimensions
@@ -145,6 +145,8 @@ def test_what_is_no_product(text: str) -> None:
     [
         ("1/2 in", "length", "write 0.5 in"), ("1-1/2 in", "length", "write 1.5 in"),
         ("100 lb", "force", "write 100 lbf"), ("5 kg", "force", "write 5 kgf"), ("10 kp", "force", "write kgf, or N"),
+        ("10 N.m", "moment", "write 10 N m"), ("2 kg.m^2", "moment of inertia", "write 2 kg m^2"),
+        ("Ø 24 mm", "length", "write 24 mm"), ("3 inchs", "length", "write in"),
     ],
 )  # fmt: skip
 def test_the_spelling_that_is_meant(text: str, kind: str, remedy: str) -> None:
@@ -162,3 +164,19 @@ def test_a_torque_with_a_hyphen(text: str, meant: str) -> None:
         Mechanism(**{**four_bar(), "loads": {"out": {"joint": "D", "resisting_torque": text}}})
     (finding,) = caught.value.findings
     assert (finding.where, finding.remedy) == ("loads.out.resisting_torque", f"write {meant}")
+
+
+@pytest.mark.parametrize(("text", "number"), [("30.000 N m", "30000"), ("1.500 N m", "1500"), ("2.5 N m", "")])
+def test_a_number_that_may_be_thousands(text: str, number: str) -> None:
+    data = {**four_bar(), "loads": {"out": {"joint": "D", "resisting_torque": text}}}
+    warned = [one for one in check(Mechanism(**data)).findings if one.where == "loads.out.resisting_torque"]
+    assert [f"not as {number}" in one.what for one in warned] == [True] * bool(number)
+
+
+@pytest.mark.parametrize("text", ["Ø 24 H7/g6", "24 H7/g6", "⌀24 mm H7/g6"])
+def test_a_fit_as_drawings_have_it(text: str) -> None:
+    data = four_bar()
+    data["joints"]["B"]["pin"] = {"fit": text}
+    with pytest.raises(MechanismError) as caught:
+        Mechanism(**data)
+    assert [one.remedy for one in caught.value.findings] == ["write 24 mm H7/g6"]

@@ -22,10 +22,11 @@ import numpy as np
 from trunnion.algebra.namespace import Number, namespace
 from trunnion.model.units import ANGLE, NUMBER, Dimension, UnitError, dimension_text, fits, normalise, unit
 
-__all__ = ["MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse"]
+__all__ = ["DIAMETER", "MOTION", "PLACED", "RESERVED", "Expression", "literal", "parse"]
 
 MAX_LENGTH = 500
 MAX_DEPTH = 40
+DIAMETER = ("Ø", "ø", "⌀", "∅")  # signs of drawings before a number
 
 _NUMBER = r"(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?(?![0-9.])"  # whole: a part of a number is none
 _WORD = r"(?:[^\W\d_]+|%|°[A-Za-z]?)(?!\w|\s*\()(?:(?:\^|\*\*)[-+]?[0-9](?:\.[0-9]{1,2})?(?![\w.]))?"
@@ -148,6 +149,8 @@ def parse(text: str) -> Expression:
         literal(under, unit_text)  # UnitError for what is no unit
         size = int(whole or 0) + int(over) / int(under)
         raise UnitError(f"'{text}' divides by {under} {unit_text}", f"write {size:.12g} {unit_text}")
+    if (signless := text.strip()).startswith(DIAMETER):
+        raise UnitError(f"'{signless[0]}' is not read in '{text}'", f"write {signless[1:].strip()}")
     source, operands = _tokens(normalise(text))
     try:
         tree = ast.parse(source, mode="eval").body
@@ -178,7 +181,7 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
     while place < len(text):
         found = _TOKEN.match(text, place)
         if not found:
-            raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text))
+            raise UnitError(f"'{text[place:].strip()[:20]}' is not understood in '{text}'", _hint(text, place))
         if power := _RECIPROCAL.match(text, place):
             what = f"'{power['power']}' is {power['unit']} less {power['power'][-1]} in '{text}'"
             raise UnitError(what, "write an angular speed in rpm or rad/s, a power of a unit as s^-1")
@@ -195,15 +198,17 @@ def _tokens(text: str) -> tuple[str, dict[str, Literal | str]]:
             source.append(key)
         else:
             if operator == "," and "(" not in source:
-                raise UnitError(f"',' is not understood in '{text}'", _hint(text))
+                raise UnitError(f"',' is not understood in '{text}'", _hint(text, place))
             source.append("**" if operator == "^" else operator)
         after_operand = operator is None or operator == ")"
         place = found.end()
     return " ".join(source), operands
 
 
-def _hint(text: str) -> str:
-    """The remedy that the commonest slips need."""
+def _hint(text: str, place: int) -> str:
+    """The remedy that the commonest slips need. place: from which on nothing is understood."""
+    if text[place] == "." and re.search(r"[0-9]\s*[^\W\d_]+$", text[:place]):  # 10 N.m
+        return f"write {text[:place]} {text[place + 1 :]}"
     if re.search(r"[0-9],[0-9]", text):
         return "write a decimal point, not a comma"
     return "use numbers with units, names of dimensions, + - * / ^ ( ) and " + ", ".join(sorted(RESERVED))

@@ -28,6 +28,7 @@ from trunnion.joints.contact import CONTACT_LAWS, ContactLaw
 from trunnion.joints.friction import FRICTION_LAWS
 from trunnion.joints.pairs import PAIRS
 from trunnion.model.entry import Direction, Name, Part, ReadOnlyDict, forms, known, problem
+from trunnion.model.expression import DIAMETER
 from trunnion.model.quantity import (
     Angle,
     AnyQuantity,
@@ -86,6 +87,7 @@ Pitch = Annotated[Length, NotZero("the thread does not advance", "give another p
 
 
 _FIT = re.compile(r"^(?P<size>.*\S)\s+(?P<hole>[A-Z]{1,2}[0-9]{1,2})\s*/\s*(?P<shaft>[a-z]{1,2}[0-9]{1,2})$")
+_PLAIN = re.compile(r"[0-9]+(\.[0-9]*)?")
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,11 @@ class Fit:
         found = _FIT.match(source.strip()) if isinstance(source, str) else None
         if not isinstance(source, str) or not found:
             raise problem(f"{str(source)[:60]!r} is not a fit", "write diameter, hole and shaft as 20 mm H7/g6")
+        diameter = found["size"].lstrip("".join(DIAMETER)).strip()
+        plain = bool(_PLAIN.fullmatch(diameter))
+        if plain or diameter != found["size"]:  # Ø 24 H7/g6
+            what = f"'{diameter}' has no unit" if plain else f"'{found['size'][0]}' is not read in '{source[:60]}'"
+            raise problem(what, f"write {diameter}{' mm' * plain} {found['hole']}/{found['shaft']}")
         try:
             size = Quantity.read(found["size"], KINDS["length"])
         except UnitError as error:

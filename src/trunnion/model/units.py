@@ -167,7 +167,7 @@ bar(m)                  | 1e5 Pa          |
 J(m k M)                | 1 N m           | joule*
 W(µ m k M)              | 1 J/s           | watt*
 Wh(k)                   | 1 W h           |
-Hz(k M)                 | 1 s^-1          | hertz*
+Hz(k M) hertz(kilo mega) | 1 s^-1         |
 V(µ m k)                | 1 W/A           | volt*
                         | 1 A s           | coulomb*
 pC                      | 1e-12 A s       |
@@ -191,8 +191,8 @@ t                       | 1000 kg         | tonne
 kgf                     | 9.80665 N       |
 gf                      | 0.001 kgf       |
 dyn                     | 1e-5 N          |
-in(µ) inches            | 0.0254 m        | inch
-ft feet                 | 12 in           | foot
+in(µ) inch inches       | 0.0254 m        |
+ft foot feet            | 12 in           |
 yd                      | 3 ft            | yard
 mi                      | 1760 yd         | mile
 thou                    | 0.001 in        |
@@ -211,7 +211,7 @@ kph                     | 1 km/h          |
 cSt                     | 1 mm^2/s        |
 ε(µ)                    | 1               | strain
                         | 1e-6            | microstrain
-%                       | 0.01            | percent
+% percent               | 0.01            |
 ‰                       | 0.001           |
 ppm                     | 1e-6            |
 """
@@ -361,7 +361,7 @@ _MEANT: Final = {
     "kn": "write kN for a force, km/h for a speed", "kt": "write km/h for a speed, kg or t for a mass",
     "g_n": "write m/s^2", "g_0": "write m/s^2", "zoll": "write in", "umdr": _SPEED, "nms": "write N m s",
     "ns": "write N s for a momentum, ns for a time", "std": "write h", "sekunden": "write s", "grd": _DEGREES,
-    "knm": "write kNm", "nm": "write N m for a torque, nm for a length",
+    "knm": "write kNm", "inchs": "write in", "feets": "write ft", "nm": "write N m for a torque, nm for a length",
 }  # fmt: skip
 _PHRASES: Final = {  # whole units, without their spaces
     re.compile(r"[uUrR](pm|PM)?/[Mm]in\.?|[Mm]in(-1|⁻¹)|[1I]?/[Mm]in\.?"): _SPEED,

@@ -17,7 +17,7 @@ from trunnion.model.checks.drivers import driver_findings, gears
 from trunnion.model.checks.errors import errors, joint_errors
 from trunnion.model.checks.joints import joint_findings
 from trunnion.model.checks.loads import expression_name, load_findings, motion_dimensions, springs, tables, unknown_name
-from trunnion.model.checks.magnitudes import Bare, magnitudes, plain_dimensions, radians, unitless_angles
+from trunnion.model.checks.magnitudes import Bare, magnitudes, plain_dimensions, radians, thousands, unitless_angles
 from trunnion.model.checks.measures import check_measure, measure_values
 from trunnion.model.checks.space import coordinates, loop, space
 from trunnion.model.checks.tolerances import cost_names, cost_values, stated_entries, tolerance_names, tolerance_values
@@ -105,7 +105,8 @@ def _quantities(mechanism: Numbers, unreadable: set[str]) -> Iterator[Finding]:
             what = f"'{entry.quantity.source}' varies with the motion and has a tolerance"
             yield Finding(what, entry.where, "state a dimension with the tolerance and use it in the expression")
         try:
-            entry.quantity.check(sayable, entry.kind)
+            measures = entry.quantity.check(sayable, entry.kind)
+            yield from thousands(entry.where, entry.quantity, measures)
             bare += unitless_angles(mechanism, entry, sayable, plain)
         except UnitError as error:
             yield Finding(error.what, entry.where, error.remedy)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from trunnion.errors import Finding, Severity
@@ -20,6 +21,7 @@ __all__ = [
     "magnitudes",
     "plain_dimensions",
     "radians",
+    "thousands",
     "unitless_angles",
 ]
 
@@ -174,6 +176,19 @@ def unitless_angles(
             continue
         for name in plain[number]:
             yield f"dimensions.{name}", float(mechanism.dimensions[name].evaluate()), False
+
+
+def thousands(where: str, quantity: Quantity, dimension: Dimension | None) -> Iterator[Finding]:
+    """A warning of 30.000 N, which is 30 N, where thirty thousand may be meant; lengths are stated so in drawings."""
+    text = str(quantity.source)
+    if dimension is None or dimension in (LENGTH, NUMBER) or not (number := _GROUPED.search(text)):
+        return
+    what = f"'{number[0]}' in '{text[:60]}' is read as {float(number[0]):g}, not as {number[0].replace('.', '')}"
+    yield Finding(what, where, "write one of the two without closing zeros behind a point", Severity.WARNING)
+
+
+LENGTH = KINDS["length"].dimensions[0]
+_GROUPED = re.compile(r"(?<![\w.])[1-9][0-9]{0,2}\.[0-9]00(?=\s*[^\W\d])")  # and a unit
 
 
 def radians(mechanism: Numbers, found: Iterable[Bare]) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""The glossary's retired phrases stay out of what users read, and help fits a terminal."""
+"""Retired phrases stay out of what users read, and help fits a terminal."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ SCRIPT_TEXT = re.compile(r"\"[^\"\n]* [^\"\n]*\"|`[^`\n]* [^`\n]*`")
 
 
 def retired() -> list[str]:
-    """The phrases on the left of the last table of the glossary."""
-    text = (ROOT / "docs" / "glossary.md").read_text("utf-8")
-    rows = re.findall(r"^\| (.+?) \| .+? \|$", text.split("## Retired phrases")[1], re.MULTILINE)
-    return [row for row in rows if row != "Retired"]
+    """The phrases on the left of `retired_phrases.txt`."""
+    lines = (Path(__file__).parent / "retired_phrases.txt").read_text("utf-8").splitlines()
+    return [line.split(" | ")[0] for line in lines if not line.startswith("#")]
 
 
 def written(path: Path) -> Iterator[tuple[int, str]]:

@@ -1,0 +1,120 @@
+"""Whole campaigns, from data files to verdicts, efficiencies and friction: the figures may not change unawares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trunnion
+from trunnion.rig.judge import Verdict
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FRICTION = "joint_defaults.friction.coefficient"
+SPEED = {"unit": "rpm", "noise": "0.2 rpm", "accuracy": {"zero": "0.1 rpm"}}
+TORQUE = {"range": "20 N m", "noise": "10 mN m", "bits": 16, "accuracy": {"gain": "0.1 %", "zero": "15 mN m"}}
+COARSE = TORQUE | {"range": "400 N m", "bits": 12, "span": "409.6 N m", "noise": "20 mN m"}  # in steps of 0.2 N m
+
+
+def cardan_rig(torque: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    """A Cardan joint between two sensors of torque and speed."""
+    measures = {"torque-in": "effort:input", "torque-out": "load:brake"}
+    speeds = {"speed-in": "rate:input", "speed-out": "rate:output"}
+    sensors = {name: {"measures": what, **torque} for name, what in measures.items()}
+    sensors |= {name: {"measures": what, **SPEED} for name, what in speeds.items()}
+    rig = {"schedule": {"over": {"misalignment": "0 deg:30 deg:4"}, "turns": 10, "idle": "0.5 s"},
+           "set": {"input.speed": "500 rpm"}, "rate": "2 kHz", "encoder": {"per_turn": 60}}  # fmt: skip
+    return {"trunnion-rig": 1, "name": "bench", **rig, "sensors": sensors, **changes}
+
+
+COMPRESSOR = {
+    "trunnion-rig": 1, "name": "compressor", "rate": "5 kHz", "encoder": {"per_turn": 3600},
+    "schedule": {"over": {"O.speed": ["600 rpm", "1450 rpm"]}, "turns": 25, "idle": "1 s"},
+    "sensors": {
+        "M": {"measures": "effort:O", "range": "200 N m", "noise": "0.2 N m", "bits": 16,
+              "accuracy": {"gain": "0.1 %", "zero": "0.05 N m"}},
+        "n": {"measures": "rate:O", "unit": "rpm", "noise": "0.5 rpm"},
+    },
+}  # fmt: skip
+CAMPAIGNS: dict[str, tuple[str, dict[str, float], dict[str, Any], int]] = {
+    "true": ("pezzuti-cardan", {}, cardan_rig(TORQUE), 4),
+    "less friction": ("pezzuti-cardan", {FRICTION: 0.36}, cardan_rig(TORQUE), 4),
+    "level": (
+        "pezzuti-cardan", {},
+        cardan_rig(TORQUE, rate="20 kHz", encoder={"per_turn": 60, "kind": "level"},
+                   schedule={"over": {"misalignment": ["10 deg", "20 deg"]}, "turns": 10, "idle": "0.5 s"}), 7,
+    ),
+    "steps": (
+        "pezzuti-cardan", {FRICTION: 0.36},
+        cardan_rig(COARSE, schedule={"over": {"misalignment": ["5 deg", "25 deg"]}, "turns": 20, "idle": "0.5 s"}), 6,
+    ),
+    "compressor": ("slider-crank", {"S.friction.coefficient": 0.06}, COMPRESSOR, 5),
+}  # fmt: skip
+
+
+Campaign = Callable[[str], tuple[trunnion.Mechanism, Any]]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """The model as it is in its file, and the measurement of one with another friction, by the name of the campaign."""
+
+    @cache
+    def measured(name: str) -> tuple[trunnion.Mechanism, Any]:
+        model, changes, rig, seed = CAMPAIGNS[name]
+        mechanism = trunnion.read(EXAMPLES / f"{model}.yaml")
+        folder = tmp_path_factory.mktemp("campaign") / "data"
+        built = mechanism.with_values(dict(changes)) if changes else mechanism
+        trunnion.rig.observe(built, rig, seed).write(folder)
+        return mechanism, trunnion.rig.read(folder / "mapping.yaml")
+
+    return measured
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_verdicts(campaign: Campaign, name: str) -> None:
+    """Torque at the drive of a joint whose friction is not the model's is not within; everything else is."""
+    verdicts = trunnion.rig.compare(*campaign(name)).verdict
+    other = verdicts.sel(channel="torque-in").values if name in ("less friction", "steps") else np.empty(0)
+    assert np.count_nonzero(verdicts.values == Verdict.WITHIN) == verdicts.size - other.size
+    assert set(other.tolist()) <= {Verdict.NOT}
+
+
+@pytest.mark.parametrize(
+    ("name", "efficiency", "expanded"),
+    [
+        ("true", [0.90343, 0.89241, 0.84817, 0.79544], [0.00448, 0.004409, 0.004131, 0.003811]),
+        ("less friction", [0.92633, 0.91149, 0.87271, 0.82615], [0.004629, 0.004532, 0.004284, 0.003996]),
+        ("level", [0.89004, 0.84566], [0.004399, 0.00412]),
+        ("steps", [0.92507, 0.84794], [0.016642, 0.015445]),
+    ],
+)
+def test_efficiencies(campaign: Campaign, name: str, efficiency: list[float], expanded: list[float]) -> None:
+    found = trunnion.rig.compare(*campaign(name))
+    assert found.efficiency.values == pytest.approx(efficiency, abs=2e-5)
+    assert found.efficiency_expanded.values == pytest.approx(expanded, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "estimate", "uncertainty", "reduced"),
+    [
+        ("less friction", FRICTION, 0.359743, 1.694e-4, 1.149),
+        ("level", FRICTION, 0.419975, 8.454e-5, 1.007),
+        ("steps", FRICTION, 0.354908, 4.259e-3, 0.7186),
+        ("compressor", "S.friction.coefficient", 0.060832, 1.7068e-3, 0.9780),
+    ],
+)
+def test_friction(
+    campaign: Campaign, name: str, path: str, estimate: float, uncertainty: float, reduced: float
+) -> None:
+    """Estimate, standard uncertainty and reduced χ²; the interval holds the true value but once in twenty."""
+    found = trunnion.rig.identify(*campaign(name), {"mu": path})
+    assert found.estimate.item() == pytest.approx(estimate, abs=0.02 * uncertainty)
+    assert found.standard_uncertainty.item() == pytest.approx(uncertainty, rel=2e-3)
+    assert found.reduced_chi_squared.item() == pytest.approx(reduced, rel=2e-3)
+    true = CAMPAIGNS[name][1].get(path, 0.42)
+    assert found.lower.item() < true < found.upper.item()
